@@ -1,0 +1,141 @@
+"""What an effect is: an additive law with its own parameters and states, attached to a balance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from .quantity import Quantity
+
+if TYPE_CHECKING:
+    from .model import EffectModel
+
+SX = Any
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of balance: what an effect adds to it and which signals it may read.
+
+    Attributes:
+        effort_unit: unit of what is added ("" where it depends on the balance).
+        flow: signal whose product with the effort is power, "" if the balance carries none.
+        signals: name -> meaning of the signals that every balance of this kind offers.
+        optional: signals that some balances offer on top.
+    """
+
+    effort_unit: str
+    flow: str
+    signals: MappingProxyType[str, str]
+    optional: MappingProxyType[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+
+def _names(**entries: str) -> MappingProxyType[str, str]:
+    return MappingProxyType(entries)
+
+
+KINDS: dict[str, Kind] = {
+    "rotation": Kind(
+        "N.m",
+        "velocity",
+        _names(velocity="angular velocity of the shaft [rad/s]"),
+        _names(
+            angle="angle of the shaft [rad]",
+            load="torque transmitted through the shaft [N.m]",
+            normal="normal force that presses the friction partners together [N]",
+        ),
+    ),
+    "translation": Kind(
+        "N",
+        "velocity",
+        _names(velocity="velocity [m/s]"),
+        _names(position="position [m]", load="transmitted force [N]", normal="normal force [N]"),
+    ),
+    "winding": Kind(
+        "V",
+        "current",
+        _names(current="winding current [A]"),
+        _names(
+            speed="rotor speed [rad/s]",
+            voltage="terminal voltage [V]",
+            resistance="winding resistance [ohm]",
+            emf_constant="back-EMF constant [V.s/rad]",
+        ),
+    ),
+    "compliance": Kind(
+        "N.m",
+        "rate",
+        _names(
+            deflection="twist [rad]", rate="twist rate [rad/s]", stiffness="stiffness [N.m/rad]"
+        ),
+    ),
+    "signal": Kind("", "", _names(value="the undisturbed signal")),
+    "coefficient": Kind(
+        "",
+        "",
+        _names(value="the undisturbed coefficient"),
+        _names(
+            x="floor position x [m]",
+            y="floor position y [m]",
+            angle="wheel angle [rad]",
+            speed="speed that the coefficient may depend on",
+        ),
+    ),
+    "pivot": Kind(
+        "N.m",
+        "spin",
+        _names(
+            spin="rotation rate of the contact patch about the vertical [rad/s]",
+            rolling="rolling speed of the wheel over the floor [m/s]",
+            normal="normal force [N]",
+        ),
+    ),
+    "body": Kind(
+        "",
+        "",
+        _names(
+            velocity="velocity of the reference point, body axes [m/s], 3",
+            rate="angular velocity, body axes [rad/s], 3",
+            gravity="gravity, body axes [m/s2], 3",
+        ),
+        _names(
+            position="position of the reference point in the world [m], 3",
+            rotation="rotation matrix body to world, 3x3",
+        ),
+    ),
+}
+"""Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; a `body`
+takes a wrench (force and moment at the reference point, body axes) and additional mass."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect's declaration; the module also holds its `law(e)`.
+
+    Attributes:
+        name: the file's name.
+        text: one sentence.
+        kinds: kinds of balances that it can be attached to, in order of preference.
+        strength: the quantity whose value 0 is the effect's exact absence.
+        needs: signals beyond the obligatory ones of the kind that the law reads.
+        source: book or paper.
+    """
+
+    name: str
+    text: str
+    kinds: tuple[str, ...]
+    strength: Quantity
+    needs: tuple[str, ...] = ()
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for kind in self.kinds:
+            if kind not in KINDS:
+                raise ValueError(f"effect {self.name!r}: unknown kind of balance {kind!r}")
+        if not self.strength.strength:
+            raise ValueError(f"effect {self.name!r}: its strength quantity is not marked as such")
+
+
+Law = Callable[["EffectModel"], None]

@@ -1,0 +1,1 @@
+"""One physical law per file; each can be added to any balance of a fitting kind."""

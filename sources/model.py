@@ -1,0 +1,536 @@
+"""Collects the equations of one variant: declared quantities, balances, effects, energy.
+
+A fidelity file defines `equations(m: Model)`; an effect file defines `law(e: EffectModel)`. Both
+write CasADi SX expressions and nothing else; the C code, the XML and the tables are made from what
+is collected here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import casadi as ca
+
+from .component import Component, Port, Solver
+from .effect import KINDS, Effect, Law
+from .quantity import Quantity
+
+SX = Any
+Role = Literal["input", "state", "parameter", "discrete", "output"]
+
+
+class ModelError(ValueError):
+    """A description that cannot become a model; the text names the culprit and the way out."""
+
+
+@dataclass
+class Variable:
+    """One scalar variable of a variant.
+
+    Attributes:
+        name: full name, `prefix.name[index]`.
+        quantity: its declaration.
+        role: input, state, parameter, discrete (held between samples) or output.
+        start: start value.
+        symbol: the CasADi symbol (outputs: the defining expression).
+        of_effect: declared by an effect, not by the fidelity.
+    """
+
+    name: str
+    quantity: Quantity
+    role: Role
+    start: float
+    symbol: SX
+    of_effect: bool = False
+
+
+@dataclass
+class Clock:
+    """A sample clock: ticks at `k * period`, k = 0, 1, ...; the updates act simultaneously.
+
+    Clocks due at the same instant act in the order in which they were declared, later ones seeing
+    what earlier ones wrote.
+    """
+
+    name: str
+    period: SX
+    updates: dict[str, SX] = field(default_factory=dict)
+
+
+@dataclass
+class Balance:
+    """The sum of an equation that effects may add to.
+
+    Attributes:
+        effort: what the attached effects add (scalar or vector SX; 0 without effects).
+        mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
+            rotational inertia about the reference point (3x3) [kg.m2]; only of kind `body`.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    signals: dict[str, SX]
+    effort: SX
+    mass: SX = 0.0
+    first_moment: SX = None
+    inertia: SX = None
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """An effect that a variant asks for: `name` or `name@balance`."""
+
+    effect: Effect
+    law: Law
+    balance: str = ""
+
+    @property
+    def spelling(self) -> str:
+        return f"{self.effect.name}@{self.balance}" if self.balance else self.effect.name
+
+
+class Model:
+    """Collector of the equations of a variant.
+
+    Every method that declares returns the CasADi symbol (scalar, or column vector for a quantity
+    with a size).
+    """
+
+    def __init__(
+        self,
+        component: Component,
+        fidelity: str,
+        *,
+        values: Mapping[str, Any] | None = None,
+        attachments: tuple[Attachment, ...] = (),
+        slots: Mapping[str, str] | None = None,
+        prefix: str = "",
+        parent: Model | None = None,
+        of_effect: bool = False,
+    ) -> None:
+        self.component = component
+        self.fidelity = fidelity
+        self._of_effect = of_effect
+        self.prefix = prefix
+        self.values = dict(values or {})
+        self.slots = dict(slots or {})
+        self.solver = Solver()
+        self._root: Model = parent._root if parent else self
+        if parent is None:
+            self.time = ca.SX.sym("time")
+            self.variables: dict[str, Variable] = {}
+            self.derivatives: dict[str, SX] = {}
+            self.clocks: list[Clock] = []
+            self.balances: dict[str, Balance] = {}
+            self.attachments = attachments
+            self.ports: list[tuple[Port, str]] = []
+            self.stored: list[SX] = []
+            self.losses: list[tuple[str, SX]] = []
+            self.inflows: list[SX] = []
+            self._attached: set[str] = set()
+            self._vectors: dict[str, SX] = {}
+
+    @property
+    def t(self) -> SX:
+        """Simulation time [s]."""
+        return self._root.time
+
+    # -- quantities ------------------------------------------------------------------------------
+
+    def _full(self, name: str) -> str:
+        return f"{self.prefix}.{name}" if self.prefix else name
+
+    def _declare(self, quantity: Quantity, role: Role, symbol: SX | None = None) -> SX:
+        root = self._root
+        full = self._full(quantity.name)
+        if role != "output":
+            for values, name in ((self.values, quantity.name), (root.values, full)):
+                if name in values:
+                    quantity = quantity.with_start(values[name])
+        if full in root._vectors:
+            raise ModelError(f"{root.component.name}/{root.fidelity}: {full!r} is declared twice")
+        names = [self._full(name) for name in quantity.names()]
+        if symbol is None:
+            symbol = ca.vertcat(*[ca.SX.sym(name) for name in names])
+        else:
+            symbol = ca.SX(symbol)
+            if symbol.numel() != len(names):
+                raise ModelError(
+                    f"{root.component.name}/{root.fidelity}: {full!r} has {len(names)} elements "
+                    f"but its expression has {symbol.numel()}"
+                )
+        for index, (name, start) in enumerate(zip(names, quantity.starts(), strict=True)):
+            root.variables[name] = Variable(
+                name, quantity, role, start, symbol[index], self._of_effect
+            )
+        root._vectors[full] = symbol
+        return symbol
+
+    def parameter(self, quantity: Quantity) -> SX:
+        """Declare a parameter; its start value is the device's, else the declaration's."""
+        return self._declare(quantity, "parameter")
+
+    def constant(self, name: str) -> Any:
+        """A number (or list) of the device file that is baked into the code.
+
+        Constants keep structural zeros; make a quantity a parameter if users should change it.
+        """
+        if name not in self.values:
+            raise ModelError(
+                f"{self.component.name}/{self.fidelity}: the device file has no value {name!r}"
+            )
+        return self.values[name]
+
+    def input(self, quantity: Quantity) -> SX:
+        """Declare an input, held by the master over a communication step."""
+        return self._declare(quantity, "input")
+
+    def state(self, quantity: Quantity) -> SX:
+        """Declare a continuous state; give its `derivative`.
+
+        The implicit solver eliminates states in the order of their declaration: declare what is
+        local (a wheel) before what couples everything (the body).
+        """
+        return self._declare(quantity, "state")
+
+    def discrete(self, quantity: Quantity) -> SX:
+        """Declare a value that only an `update` of a clock changes."""
+        return self._declare(quantity, "discrete")
+
+    def output(self, quantity: Quantity, expression: SX) -> SX:
+        """Declare an output by its expression; returns the expression."""
+        return self._declare(quantity, "output", expression)
+
+    def derivative(self, state: SX, expression: SX) -> None:
+        """Set the time derivative of a state that `state()` returned (element by element)."""
+        expression = ca.SX(expression)
+        if expression.numel() != state.numel():
+            raise ModelError(
+                f"{self.component.name}/{self.fidelity}: derivative of {state} has "
+                f"{expression.numel()} elements instead of {state.numel()}"
+            )
+        for index in range(state.numel()):
+            name = state[index].name()
+            if name in self._root.derivatives:
+                raise ModelError(f"{name!r} has two derivatives")
+            self._root.derivatives[name] = expression[index]
+
+    # -- sampling --------------------------------------------------------------------------------
+
+    def clock(self, name: str, period: SX | float) -> Clock:
+        """Declare a sample clock with a period [s] (a number or an expression of parameters)."""
+        clock = Clock(self._full(name), ca.SX(period))
+        self._root.clocks.append(clock)
+        return clock
+
+    def update(self, clock: Clock, discrete: SX, expression: SX) -> None:
+        """At each tick of `clock`, replace the discrete variable by the expression."""
+        expression = ca.SX(expression)
+        for index in range(discrete.numel()):
+            clock.updates[discrete[index].name()] = expression[index]
+
+    # -- energy ----------------------------------------------------------------------------------
+
+    def port(self, port: Port, effort: SX, flow: SX) -> None:
+        """Bind a port's two variables; their product is power that enters the component.
+
+        In a part the port is internal to the whole and only its bookkeeping is dropped.
+        """
+        if self._root is self:
+            self.ports.append((port, port.name))
+            self.inflows.append(port.sign * ca.dot(ca.SX(effort), ca.SX(flow)))
+
+    def supply(self, power: SX) -> None:
+        """Add power [W] that enters other than through a port, e.g. from an ideal source."""
+        self._root.inflows.append(ca.SX(power))
+
+    def stored_energy(self, energy: SX) -> None:
+        """Add stored energy [J]."""
+        self._root.stored.append(ca.SX(energy))
+
+    def loss(self, name: str, power: SX) -> None:
+        """Add a loss [W], positive when it takes energy out of the component."""
+        self._root.losses.append((self._full(name), ca.SX(power)))
+
+    # -- effects ---------------------------------------------------------------------------------
+
+    def balance(self, name: str, kind: str, *, unit: str = "", **signals: SX) -> Balance:
+        """Open a balance to effects and return what the variant's effects add to it.
+
+        Args:
+            name: e.g. `shaft`; effects find it as `effect@shaft`.
+            kind: one of `effect.KINDS`.
+            unit: unit of the added effort where the kind leaves it open.
+            signals: what the effects may read; the kind says which names are obligatory.
+        """
+        root = self._root
+        full = self._full(name)
+        declared = KINDS[kind]
+        missing = set(declared.signals) - set(signals)
+        unknown = set(signals) - set(declared.signals) - set(declared.optional)
+        if missing or unknown:
+            raise ModelError(
+                f"balance {full!r} of kind {kind!r}: missing signals {sorted(missing)}, "
+                f"unknown signals {sorted(unknown)}"
+            )
+        if full in root.balances:
+            raise ModelError(f"balance {full!r} is declared twice")
+        expressions = {key: ca.SX(value) for key, value in signals.items()}
+        if kind == "body":
+            effort: SX = ca.SX.zeros(6)
+        elif declared.flow:
+            effort = ca.SX.zeros(expressions[declared.flow].numel())
+        else:
+            effort = ca.SX.zeros(expressions["value"].numel())
+        balance = Balance(full, kind, unit or declared.effort_unit, expressions, effort)
+        balance.first_moment = ca.SX.zeros(3)
+        balance.inertia = ca.SX.zeros(3, 3)
+        root.balances[full] = balance
+        for attachment in root.attachments:
+            if attachment.spelling in root._attached or not self._fits(attachment, balance):
+                continue
+            root._attached.add(attachment.spelling)
+            attachment.law(EffectModel(self, attachment, balance))
+        return balance
+
+    def _fits(self, attachment: Attachment, balance: Balance) -> bool:
+        effect = attachment.effect
+        if attachment.balance:
+            if attachment.balance != balance.name:
+                return False
+            if balance.kind not in effect.kinds:
+                raise ModelError(
+                    f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
+                    f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
+                )
+        elif balance.kind not in effect.kinds:
+            return False
+        lacking = [need for need in effect.needs if need not in balance.signals]
+        if lacking and attachment.balance:
+            raise ModelError(
+                f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
+                f"{balance.name!r} does not offer"
+            )
+        return not lacking
+
+    # -- composition -----------------------------------------------------------------------------
+
+    def part(
+        self,
+        name: str,
+        component: Component,
+        fidelity: str,
+        equations: Any,
+        *,
+        inputs: Mapping[str, SX],
+        parameters: Mapping[str, SX] | None = None,
+        values: Mapping[str, Any] | None = None,
+        shared: str = "",
+    ) -> dict[str, SX]:
+        """Build another component's fidelity into this model and return its outputs.
+
+        Its states, balances and losses appear as `name.…`; its energy counts as the whole's.
+
+        Args:
+            name: prefix of its states, balances and outputs.
+            component, fidelity, equations: what to build in (see `variant.fidelity`).
+            inputs: an expression for each of its inputs.
+            parameters: expressions for some of its parameters; the others become parameters
+                `name.…` of the whole.
+            values: start values that replace the declared ones.
+            shared: prefix of its parameters, the same for parts that share them (`drive_wheel`
+                for a left and a right one).
+        """
+        part = _Part(
+            self, name, component, fidelity, inputs, parameters or {}, values or {}, shared
+        )
+        equations(part)
+        unused = (set(inputs) - part.seen_inputs) | (set(parameters or {}) - part.seen_parameters)
+        if unused:
+            raise ModelError(
+                f"part {name!r} ({component.name}/{fidelity}) has no {', '.join(sorted(unused))}"
+            )
+        return part.results
+
+    # -- result ----------------------------------------------------------------------------------
+
+    def finish(self) -> Model:
+        """Check completeness and add the energy outputs `E_stored`, `P_in` and `P_loss`."""
+        where = f"{self.component.name}/{self.fidelity}"
+        for attachment in self.attachments:
+            if attachment.spelling not in self._attached:
+                offered = (
+                    ", ".join(f"{b.name} ({b.kind})" for b in self.balances.values()) or "none"
+                )
+                raise ModelError(
+                    f"effect {attachment.spelling!r} fits no balance of {where}: it acts on "
+                    f"{', '.join(attachment.effect.kinds)}"
+                    + "".join(f" with {need}" for need in attachment.effect.needs)
+                    + f"; {where} offers {offered}"
+                )
+        for name, variable in self.variables.items():
+            if variable.role == "state" and name not in self.derivatives:
+                raise ModelError(f"{where}: state {name!r} has no derivative")
+        if self.component.energy:
+            self.output(E_STORED, sum(self.stored, ca.SX(0)))
+            self.output(P_IN, sum(self.inflows, ca.SX(0)))
+            self.output(P_LOSS, sum((power for _, power in self.losses), ca.SX(0)))
+        return self
+
+    def of_role(self, role: Role) -> list[Variable]:
+        """The scalar variables of a role, in order of declaration, those of effects last.
+
+        Effects last keeps the elimination order of the implicit solver, and with it every rounding,
+        the same as without them.
+        """
+        chosen = [variable for variable in self.variables.values() if variable.role == role]
+        return sorted(chosen, key=lambda variable: variable.of_effect)
+
+
+E_STORED = Quantity("E_stored", "J", "energy stored in the component")
+P_IN = Quantity("P_in", "W", "power that enters through ports and sources")
+P_LOSS = Quantity("P_loss", "W", "power that leaves as heat")
+EFFECT_LOSS = Quantity("P_loss", "W", "power that the effect takes out as heat")
+
+
+class _Part(Model):
+    """A component inside another: inputs and some parameters are given, outputs are returned."""
+
+    def __init__(
+        self,
+        parent: Model,
+        name: str,
+        component: Component,
+        fidelity: str,
+        inputs: Mapping[str, SX],
+        parameters: Mapping[str, SX],
+        values: Mapping[str, Any],
+        shared: str,
+    ) -> None:
+        prefix = parent._full(name)
+        super().__init__(component, fidelity, values=values, prefix=prefix, parent=parent)
+        self._inputs = {key: ca.SX(value) for key, value in inputs.items()}
+        self._parameters = {key: ca.SX(value) for key, value in parameters.items()}
+        self._shared = parent._full(shared) if shared else prefix
+        self.slots = parent.slots
+        self.results: dict[str, SX] = {}
+        self.seen_inputs: set[str] = set()
+        self.seen_parameters: set[str] = set()
+
+    def input(self, quantity: Quantity) -> SX:
+        self.seen_inputs.add(quantity.name)
+        if quantity.name not in self._inputs:
+            raise ModelError(f"part {self.prefix!r}: nothing feeds its input {quantity.name!r}")
+        return self._inputs[quantity.name]
+
+    def parameter(self, quantity: Quantity) -> SX:
+        if quantity.name in self._parameters:
+            self.seen_parameters.add(quantity.name)
+            return self._parameters[quantity.name]
+        shared = f"{self._shared}.{quantity.name}"
+        if shared in self._root._vectors:
+            return self._root._vectors[shared]
+        prefix, self.prefix = self.prefix, self._shared
+        try:
+            return super().parameter(quantity)
+        finally:
+            self.prefix = prefix
+
+    def output(self, quantity: Quantity, expression: SX) -> SX:
+        self.results[quantity.name] = ca.SX(expression)
+        return self.results[quantity.name]
+
+
+class EffectModel:
+    """What an effect's law sees: the balance it acts on and its own quantities.
+
+    Names are prefixed with the effect's name (`coulomb.tau_c`), or with balance and effect where
+    the variant names the balance (`flange_b.coulomb.tau_c`).
+    """
+
+    def __init__(self, model: Model, attachment: Attachment, balance: Balance) -> None:
+        self._root = model._root
+        self._balance = balance
+        name = attachment.effect.name
+        self._prefix = f"{balance.name}.{name}" if attachment.balance else name
+        self._model = Model(
+            model.component,
+            model.fidelity,
+            prefix=self._prefix,
+            parent=self._root,
+            of_effect=True,
+        )
+        self.kind = balance.kind
+        self.size = int(balance.effort.numel())
+
+    @property
+    def t(self) -> SX:
+        """Simulation time [s]."""
+        return self._root.time
+
+    def signal(self, name: str) -> SX:
+        """A signal of the balance, see `effect.KINDS`."""
+        return self._balance.signals[name]
+
+    def parameter(self, quantity: Quantity) -> SX:
+        """Declare a parameter of the effect."""
+        return self._model.parameter(quantity)
+
+    def state(self, quantity: Quantity) -> SX:
+        """Declare a continuous state of the effect."""
+        return self._model.state(quantity)
+
+    def derivative(self, state: SX, expression: SX) -> None:
+        """Set the derivative of a state."""
+        self._model.derivative(state, expression)
+
+    def discrete(self, quantity: Quantity) -> SX:
+        """Declare a sampled value of the effect."""
+        return self._model.discrete(quantity)
+
+    def clock(self, name: str, period: SX | float) -> Clock:
+        """Declare a sample clock."""
+        return self._model.clock(name, period)
+
+    def update(self, clock: Clock, discrete: SX, expression: SX) -> None:
+        """At each tick, replace the discrete variable."""
+        self._model.update(clock, discrete, expression)
+
+    def output(self, quantity: Quantity, expression: SX) -> SX:
+        """Declare an output of the effect."""
+        return self._model.output(quantity, expression)
+
+    def add(self, effort: SX) -> None:
+        """Add an effort to the balance (6 elements, force and moment, for kind `body`)."""
+        effort = ca.SX(effort)
+        if effort.numel() != self.size:
+            raise ModelError(
+                f"effect {self._prefix!r} adds {effort.numel()} elements to balance "
+                f"{self._balance.name!r}, which has {self.size}"
+            )
+        self._balance.effort = self._balance.effort + effort
+
+    def add_mass(self, mass: SX, position: SX, inertia: SX) -> None:
+        """Add a rigid mass to a `body`: mass [kg], position (3) [m], inertia about its centre (3x3)."""
+        position = ca.SX(position)
+        self._balance.mass = self._balance.mass + mass
+        self._balance.first_moment = self._balance.first_moment + mass * position
+        steiner = mass * (ca.dot(position, position) * ca.SX.eye(3) - position @ position.T)
+        self._balance.inertia = self._balance.inertia + inertia + steiner
+
+    def loss(self, power: SX) -> None:
+        """Report loss power [W]: output `P_loss` of the effect and part of the component's."""
+        power = ca.SX(power)
+        self._model.output(EFFECT_LOSS, power)
+        self._model.loss("P_loss", power)
+
+    def stored_energy(self, energy: SX) -> None:
+        """Add energy [J] that the effect stores."""
+        self._root.stored.append(ca.SX(energy))
+
+    def supply(self, power: SX) -> None:
+        """Add power [W] that the effect brings in from outside."""
+        self._root.inflows.append(ca.SX(power))
