@@ -81,6 +81,7 @@ KINDS: dict[str, Kind] = {
             y="floor position y [m]",
             angle="wheel angle [rad]",
             speed="speed that the coefficient may depend on",
+            current="current that the coefficient may depend on [A]",
         ),
     ),
     "pivot": Kind(
@@ -103,8 +104,11 @@ KINDS: dict[str, Kind] = {
         _names(
             position="position of the reference point in the world [m], 3",
             rotation="rotation matrix body to world, 3x3",
+            mass="mass without what effects add [kg]",
+            first_moment="mass times position of the mass centre, without effects [kg.m], 3",
         ),
     ),
+    "position": Kind("m", "", _names(value="the undisturbed position, body axes [m], 3")),
 }
 """Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; a `body`
 takes a wrench (force and moment at the reference point, body axes) and additional mass."""
@@ -121,6 +125,8 @@ class Effect:
         strength: the quantity whose value 0 is the effect's exact absence.
         needs: signals beyond the obligatory ones of the kind that the law reads.
         source: book or paper.
+        unit: unit of what it adds, where the kind leaves it open: the effect fits only balances
+            with this unit ("" fits any).
     """
 
     name: str
@@ -129,6 +135,7 @@ class Effect:
     strength: Quantity
     needs: tuple[str, ...] = ()
     source: str = ""
+    unit: str = ""
 
     def __post_init__(self) -> None:
         for kind in self.kinds:
