@@ -16,6 +16,7 @@ import casadi as ca
 from .component import Component, Port, Solver
 from .effect import KINDS, Effect, Law
 from .quantity import Quantity
+from .units import parse
 
 SX = Any
 Role = Literal["input", "state", "parameter", "discrete", "output"]
@@ -308,6 +309,13 @@ class Model:
                 )
         elif balance.kind not in effect.kinds:
             return False
+        if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
+            if attachment.balance:
+                raise ModelError(
+                    f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} is in "
+                    f"{balance.unit or '1'}"
+                )
+            return False
         lacking = [need for need in effect.needs if need not in balance.signals]
         if lacking and attachment.balance:
             raise ModelError(
@@ -474,6 +482,10 @@ class EffectModel:
     def signal(self, name: str) -> SX:
         """A signal of the balance, see `effect.KINDS`."""
         return self._balance.signals[name]
+
+    def offers(self, name: str) -> bool:
+        """Whether the balance has this optional signal."""
+        return name in self._balance.signals
 
     def parameter(self, quantity: Quantity) -> SX:
         """Declare a parameter of the effect."""
