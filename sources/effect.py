@@ -82,6 +82,8 @@ KINDS: dict[str, Kind] = {
             angle="wheel angle [rad]",
             speed="speed that the coefficient may depend on",
             current="current that the coefficient may depend on [A]",
+            side="-1 right, +1 left of the vehicle",
+            longitudinal="the same coefficient along the track or wheel",
         ),
     ),
     "pivot": Kind(
