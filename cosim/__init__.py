@@ -1,0 +1,1 @@
+"""Run systems of FMUs, compare them with measurements, and ask what is missing."""

@@ -1,0 +1,132 @@
+"""What can go wrong, and what to do about it.
+
+    * CosimError                    exit code 1: the work failed
+      x InputError                  exit code 2: wrong usage or input
+        - FmuFileError              missing, corrupt or truncated .fmu, or not one we can run
+        + PlatformError             the FMU has no binary for this machine
+        - VariantError              unknown component, fidelity or effect; effect without a balance
+        - GraphError                the graph is wrong
+          + UnknownNameError        no such instance, variable, scenario, file, column
+          + ConnectError           causality, type, size or double driver
+          + UnitError               units that do not convert
+        - ValueRangeError           a value outside its bounds, or not finite
+        - ScenarioError             a scenario, system or data file that cannot be read
+      x FmuCallError                an FMU refused a call; carries its own log messages
+        + StepError                 the run stopped; carries what was recorded until then
+      x AlgebraicLoopError          connected values that do not settle
+      x CheckError                  a scenario ran, but a check of it failed
+
+Every text names both ends, both values and the time where there are such, and the way out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .recording import Recording
+
+
+class CosimError(Exception):
+    """The work failed."""
+
+    exit_code = 1
+
+
+class InputError(CosimError):
+    """Wrong usage or input."""
+
+    exit_code = 2
+
+
+class FmuFileError(InputError):
+    """An .fmu that is missing, corrupt, truncated, or of a kind that cannot be run."""
+
+
+class PlatformError(FmuFileError):
+    """An FMU without a binary for this machine."""
+
+
+class VariantError(InputError):
+    """A variant that does not exist or cannot be built."""
+
+
+class GraphError(InputError):
+    """A wrong graph of instances and connections."""
+
+
+class UnknownNameError(GraphError):
+    """A name that does not exist; the text lists what does."""
+
+
+class ConnectError(GraphError):
+    """Two ends that do not fit."""
+
+
+class UnitError(GraphError):
+    """Units that are unknown or do not convert into each other."""
+
+
+class ValueRangeError(InputError):
+    """A value outside its bounds, or not finite."""
+
+
+class ScenarioError(InputError):
+    """A scenario, system or data file that cannot be read."""
+
+
+class FmuCallError(CosimError):
+    """An FMU refused a call.
+
+    Attributes:
+        messages: what the FMU itself logged.
+    """
+
+    def __init__(self, text: str, messages: Iterable[str] = ()) -> None:
+        super().__init__(text)
+        self.messages = tuple(messages)
+
+
+class StepError(FmuCallError):
+    """A run that stopped before its end.
+
+    Attributes:
+        time: the communication point from which the failing step started [s].
+        recording: what was recorded until then, None if nothing was.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        messages: Iterable[str] = (),
+        *,
+        time: float,
+        recording: Recording | None = None,
+    ) -> None:
+        super().__init__(text, messages)
+        self.time = time
+        self.recording = recording
+
+
+class AlgebraicLoopError(CosimError):
+    """Connected values that depend on each other at the same instant and do not settle."""
+
+
+class CheckError(CosimError):
+    """A scenario ran, but a check of it failed."""
+
+
+def listing(names: Iterable[str], wanted: str = "", limit: int = 12) -> str:
+    """Name what exists, nearest to `wanted` first, for the end of an error text."""
+    everything = list(names)
+    if not everything:
+        return "there is none"
+    near = get_close_matches(wanted, everything, n=3, cutoff=0.6) if wanted else []
+    shown = [*near, *[name for name in everything if name not in near]][:limit]
+    rest = len(everything) - len(shown)
+    text = ", ".join(shown) + (f" and {rest} more" if rest > 0 else "")
+    if near:
+        return f"did you mean {' or '.join(repr(name) for name in near)}? There is {text}"
+    return f"there is {text}"
