@@ -63,7 +63,7 @@ def build_functions(model: Model) -> Functions:
     Raises:
         ValueError: an expression uses a symbol that nobody declared.
     """
-    roles = {role: model.of_role(role) for role in ("state", "discrete", "input", "parameter")}  # type: ignore[arg-type]
+    roles = {role: model.of_role(role) for role in ("state", "discrete", "input", "parameter")}
     outputs = model.of_role("output")
     t = model.time
     x, z, u, p = (_stack(roles[role]) for role in ("state", "discrete", "input", "parameter"))
@@ -74,9 +74,7 @@ def build_functions(model: Model) -> Functions:
     pattern = jacobian.sparsity()
     rows, columns = pattern.get_triplet()
     seeds = [ca.SX.sym(f"d_{index}", item.numel()) for index, item in enumerate(arguments)]
-    tangent = ca.jtimes(
-        ca.vertcat(xdot, y), ca.vertcat(*arguments), ca.vertcat(*seeds)
-    )
+    tangent = ca.jtimes(ca.vertcat(xdot, y), ca.vertcat(*arguments), ca.vertcat(*seeds))
     split = xdot.numel()
     known = ca.vertcat(x, u, z)
     known_names = [v.name for role in ("state", "input", "discrete") for v in roles[role]]
@@ -95,9 +93,7 @@ def build_functions(model: Model) -> Functions:
     return Functions(
         outputs=function("f_outputs", [xdot, y]),
         derivatives=function("f_derivatives", [xdot]),
-        jacobian=function(
-            "f_jacobian", [xdot, _nonzeros(jacobian), ca.jacobian(xdot, t)]
-        ),
+        jacobian=function("f_jacobian", [xdot, _nonzeros(jacobian), ca.jacobian(xdot, t)]),
         jacobian_pattern=tuple(zip(rows, columns, strict=True)),
         directional=function("f_directional", [tangent[:split], tangent[split:]], seeds),
         updates=tuple(
@@ -130,7 +126,7 @@ class Oracle:
         self.output_names = [v.name for v in model.of_role("output")]
         self._roles = [
             model.of_role(role)
-            for role in ("state", "discrete", "input", "parameter")  # type: ignore[arg-type]
+            for role in ("state", "discrete", "input", "parameter")
         ]
 
     def arguments(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> list[Any]:
@@ -144,17 +140,23 @@ class Oracle:
             np.array([float(values.get(v.name, v.start)) for v in group]) for group in self._roles
         ]
 
-    def outputs(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> dict[str, float]:
+    def outputs(
+        self, values: Mapping[str, float] | None = None, t: float = 0.0
+    ) -> dict[str, float]:
         """Outputs by name."""
         _, y = self.functions.outputs(*self.arguments(values, t))
         return dict(zip(self.output_names, np.asarray(y).ravel().tolist(), strict=True))
 
-    def derivatives(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> dict[str, float]:
+    def derivatives(
+        self, values: Mapping[str, float] | None = None, t: float = 0.0
+    ) -> dict[str, float]:
         """State derivatives by state name."""
         xdot = self.functions.derivatives(*self.arguments(values, t))
         return dict(zip(self.state_names, np.asarray(xdot).ravel().tolist(), strict=True))
 
-    def energy_defect(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> tuple[float, float]:
+    def energy_defect(
+        self, values: Mapping[str, float] | None = None, t: float = 0.0
+    ) -> tuple[float, float]:
         """dE/dt - (P_in - P_loss) and the largest of its terms [W], pointwise."""
         args = self.arguments(values, t)
         xdot, y = self.functions.outputs(*args)

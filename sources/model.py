@@ -90,6 +90,7 @@ class Attachment:
 
     @property
     def spelling(self) -> str:
+        """As in a variant's name."""
         return f"{self.effect.name}@{self.balance}" if self.balance else self.effect.name
 
 

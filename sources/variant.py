@@ -1,7 +1,7 @@
 """Names of variants: `component[.device]/fidelity[slot=fidelity,…][+effect[@balance]…]`.
 
-Examples: `gearbox/elastic+backlash`, `ur5_arm.ur5e/rigid`, `mobile_base/six_dof[wheel_contact=brush]`,
-`dc_motor/sampled+coulomb@shaft`.
+Examples: `gearbox/elastic+backlash`, `ur5_arm.ur5e/rigid`, `dc_motor/sampled+coulomb@shaft`,
+`mobile_base/six_dof[wheel_contact=brush]`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ class Name:
         device = f".{self.device}" if self.device else ""
         slots = ",".join(f"{slot}={fidelity}" for slot, fidelity in self.slots)
         effects = "".join(f"+{name}" + (f"@{at}" if at else "") for name, at in self.effects)
-        return f"{self.component}{device}/{self.fidelity}" + (f"[{slots}]" if slots else "") + effects
+        return (
+            f"{self.component}{device}/{self.fidelity}" + (f"[{slots}]" if slots else "") + effects
+        )
 
     @property
     def identifier(self) -> str:
@@ -84,7 +86,7 @@ def parse_name(text: str) -> Name:
         match["component"],
         match["fidelity"],
         match["device"] or "",
-        slots,  # type: ignore[arg-type]
+        slots,
         effects,
     )
 
@@ -236,7 +238,9 @@ def build_model(name: Name | str) -> Model:
     equations(model)
     model.finish()
     for key, origin in origins.items():
-        declared = next((v.quantity for v in model.variables.values() if v.quantity.name == key), None)
+        declared = next(
+            (v.quantity for v in model.variables.values() if v.quantity.name == key), None
+        )
         if declared is not None and parse(declared.unit).exponents != parse(origin.unit).exponents:
             raise ValueError(
                 f"device file {name.device or component.device}.toml gives {key!r} in "

@@ -1,0 +1,242 @@
+"""Build the FMU of a variant: native (C for all platforms) or python (pythonfmu)."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import inspect
+import json
+import platform as host
+from dataclasses import dataclass
+from functools import lru_cache
+from html import escape
+from pathlib import Path
+from typing import Literal
+
+from ..function import Functions, build_functions
+from ..model import Model
+from ..variant import Name, build_model, fidelities, parse_name
+from . import description, native, python
+from .archive import pack
+from .cache import cache_folder, write_atomically
+from .layout import Entry, layout
+
+Kind = description.Kind
+_SOURCES = Path(__file__).parent.parent
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Everything that packaging needs of a variant."""
+
+    name: Name
+    model: Model
+    functions: Functions
+    entries: list[Entry]
+
+
+def collect(name: str) -> Variant:
+    """Collect the equations, functions and variables of a variant.
+
+    Raises:
+        UnknownVariantError, ModelError: see `variant.build_model`.
+    """
+    parsed = parse_name(name)
+    model = build_model(parsed)
+    return Variant(parsed, model, build_functions(model), layout(model))
+
+
+def _token(*contents: str) -> str:
+    digest = hashlib.sha256("\0".join(contents).encode()).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+
+
+def component_json(variant: Variant) -> bytes:
+    """`extra/cosim/component.json`: ports, balances and effects, for masters that look for them."""
+    model, name = variant.model, variant.name
+    content = {
+        "variant": str(name),
+        "component": name.component,
+        "fidelity": name.fidelity,
+        "effects": [effect + (f"@{at}" if at else "") for effect, at in name.effects],
+        "ports": [
+            {
+                "name": port_name,
+                "effort": list(port.effort.names()),
+                "flow": list(port.flow.names()),
+                "sign": port.sign,
+                "causality": port.causality,
+            }
+            for port, port_name in model.ports
+        ],
+        "balances": [
+            {"name": balance.name, "kind": balance.kind} for balance in model.balances.values()
+        ],
+        "strengths": [
+            variable.name
+            for variable in model.of_role("parameter")
+            if variable.of_effect and variable.quantity.strength
+        ],
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+def _documentation(variant: Variant) -> bytes:
+    rows = "".join(
+        f"<tr><td>{escape(entry.name)}</td><td>{entry.part}</td><td>{escape(entry.quantity.unit)}</td>"
+        f"<td>{entry.start:g}</td><td>{escape(entry.quantity.text)}</td></tr>\n"
+        for entry in variant.entries
+        if entry.part not in ("time", "derivative")
+    )
+    text = inspect.getdoc(fidelities(variant.name.component)[variant.name.fidelity]) or ""
+    page = (
+        "<!DOCTYPE html><html><head><meta charset='utf-8'>"
+        f"<title>{escape(str(variant.name))}</title></head><body>"
+        f"<h1>{escape(str(variant.name))}</h1><p>{escape(variant.model.component.text)}"
+        f"</p><pre>{escape(text)}</pre><table border='1'><tr><th>variable</th><th>role</th>"
+        f"<th>unit</th><th>start</th><th>meaning</th></tr>\n{rows}</table></body></html>\n"
+    )
+    return page.encode()
+
+
+def _native_files(variant: Variant, fmi: int, platforms: list[str]) -> dict[str, bytes]:
+    identifier = variant.name.identifier
+    template = native.model_source(variant.model, variant.functions, variant.entries, identifier)
+    fixed = {path.name: path.read_text(encoding="utf-8") for path in native.C_SOURCES.glob("*.c")}
+    xml2 = description.describe_fmi2(
+        variant.model,
+        variant.functions,
+        variant.entries,
+        identifier=identifier,
+        name=str(variant.name),
+        token="",
+        kind="native",
+    )
+    # one token for both versions, so that one binary serves both
+    token = _token(template, *(fixed[name] for name in sorted(fixed)), xml2.decode())
+    source = native.with_token(template, token)
+    files: dict[str, bytes] = {}
+    arguments = (variant.model, variant.functions, variant.entries)
+    if fmi == 2:
+        files["modelDescription.xml"] = description.describe_fmi2(
+            *arguments, identifier=identifier, name=str(variant.name), token=token, kind="native"
+        )
+    else:
+        files["modelDescription.xml"] = description.describe_fmi3(
+            *arguments, identifier=identifier, name=str(variant.name), token=token
+        )
+        files["sources/buildDescription.xml"] = description.build_description(identifier)
+        if (terminals := description.terminals(variant.model)) is not None:
+            files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals
+    for name, text in {**fixed, "model.c": source}.items():
+        files[f"sources/{name}"] = text.encode()
+    for platform in platforms:
+        target = native.PLATFORMS[platform]
+        folder = target.fmi2 if fmi == 2 else target.fmi3
+        library = native.compile_library(source, identifier, platform)
+        files[f"binaries/{folder}/{identifier}{target.suffix}"] = library
+    return files
+
+
+def _python_files(variant: Variant) -> dict[str, bytes]:
+    source = python.slave_source(variant.model, variant.functions, variant.entries, variant.name)
+    arguments = (variant.model, variant.functions, variant.entries)
+    identifier = variant.name.identifier
+    blank = description.describe_fmi2(
+        *arguments, identifier=identifier, name=str(variant.name), token="", kind="python"
+    )
+    token = _token(source, blank.decode())
+    module = f"{identifier}_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+    files = {
+        "modelDescription.xml": description.describe_fmi2(
+            *arguments, identifier=identifier, name=str(variant.name), token=token, kind="python"
+        ),
+        "resources/slavemodule.txt": module.encode(),
+        f"resources/{module}.py": source.encode(),
+    }
+    return files | python.binaries()
+
+
+@lru_cache(maxsize=1)
+def sources_key() -> str:
+    """Hash of everything that an FMU is made of: our sources and the versions of the makers."""
+    digest = hashlib.sha256()
+    for path in sorted(_SOURCES.rglob("*")):
+        if path.suffix in (".py", ".c", ".toml"):
+            digest.update(
+                path.relative_to(_SOURCES).as_posix().encode() + b"\0" + path.read_bytes()
+            )
+    for package in ("casadi", "pythonfmu", "ziglang"):
+        digest.update(importlib.metadata.version(package).encode())
+    return digest.hexdigest()
+
+
+def _platforms(choice: str) -> list[str]:
+    return list(native.PLATFORMS) if choice == "all" else [host_platform()]
+
+
+def host_platform() -> str:
+    """This machine's entry of `native.PLATFORMS`.
+
+    Raises:
+        ValueError: no FMU can be built for this machine.
+    """
+    machine = host.machine().lower()
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+    name = f"{machine}-{host.system().lower()}"
+    if name not in native.PLATFORMS:
+        raise ValueError(f"no FMUs for {name}; there are {', '.join(native.PLATFORMS)}")
+    return name
+
+
+def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
+    """Where the FMU of a variant lies below the output folder."""
+    folder = "python" if kind == "python" else f"fmi{fmi}"
+    return out / folder / f"{name.filename}.fmu"
+
+
+def _stamp(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
+    """A file that holds the hash of the FMU built from these very sources."""
+    key = f"{sources_key()} {name} {fmi} {kind} {_platforms(platform)}"
+    return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
+
+
+def build(
+    name: str,
+    *,
+    out: Path,
+    fmi: Literal[2, 3] = 2,
+    kind: Kind = "native",
+    platform: Literal["host", "all"] = "host",
+) -> Path:
+    """Build the FMU of a variant unless it is there and up to date; returns its path.
+
+    The same sources give the same archive, byte for byte, in any folder.
+
+    Raises:
+        UnknownVariantError, ModelError: see `variant.build_model`.
+        CompilerError: the C compiler failed.
+        ValueError: FMI 3 asked of the python kind (pythonfmu is FMI 2.0 co-simulation only).
+    """
+    if kind == "python" and fmi != 2:
+        raise ValueError("python FMUs are FMI 2.0 (pythonfmu writes no other version)")
+    parsed = parse_name(name)
+    path = target_path(parsed, out, fmi, kind)
+    if path.exists():
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        for served in dict.fromkeys((platform, "all")):  # an FMU for all platforms serves the host
+            stamp = _stamp(parsed, fmi, kind, served)
+            if stamp.exists() and stamp.read_text() == digest:
+                return path
+    variant = collect(name)
+    if kind == "native":
+        files = _native_files(variant, fmi, _platforms(platform))
+    else:
+        files = _python_files(variant)
+    files["documentation/index.html"] = _documentation(variant)
+    files["extra/cosim/component.json"] = component_json(variant)
+    content = pack(files)
+    write_atomically(path, content)
+    stamp = _stamp(parsed, fmi, kind, platform)
+    write_atomically(stamp, hashlib.sha256(content).hexdigest().encode())
+    return path

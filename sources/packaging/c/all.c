@@ -1,0 +1,8 @@
+/* The whole FMU as one translation unit: nothing but the FMI functions is visible outside. */
+#include "model.c"
+
+#include "core.c"
+
+#include "fmi2.c"
+
+#include "fmi3.c"

@@ -1,0 +1,443 @@
+/* One FMU instance: variables, sample clocks, solvers. Included by all.c after the generated
+   model.c, which defines the sizes NX NU NY NP NZ NC, the tables and the CasADi functions.
+
+   All variables stand in one array v of doubles; the value reference of a variable is its index:
+   [time, x, xdot, u, y, p, z, solver.method, solver.step, solver.tolerance].
+   Everything that a saved state must hold is in Memory, a plain struct. */
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { IX = 1, IXD = IX + NX, IU = IXD + NX, IY = IU + NU, IP = IY + NY, IZ = IP + NP, IS = IZ + NZ };
+enum { NV = IS + 3 };
+enum { METHOD = IS, STEP = IS + 1, TOLERANCE = IS + 2 };
+enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4 };
+enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, TERMINATED, FAILED };
+enum { OK, WARNING, DISCARD, ERROR, FATAL };
+
+typedef struct {
+  double v[NV];
+  double tick[NC + 1];  /* index of the next tick of each clock */
+  double next[NC + 1];  /* its time */
+  double h;             /* last accepted step of an error-controlled solver, 0: none yet */
+  int32_t mode;
+  int32_t stale;        /* outputs and derivatives must be evaluated again */
+} Memory;
+
+typedef struct {
+  Memory m;
+  int model_exchange;
+  int version;
+  int logging;
+  char *name;
+  void *environment;
+  void (*log2)(void *, const char *, int, const char *, const char *, ...);
+  void (*log3)(void *, int, const char *, const char *);
+} Instance;
+
+static int report(Instance *c, int status, const char *format, ...) {
+  char text[512];
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  const char *category = status == ERROR ? "logStatusError" : "logStatusWarning";
+  if (c->version == 2 && c->log2) c->log2(c->environment, c->name, status, category, text);
+  if (c->version == 3 && c->log3) c->log3(c->environment, status, category, text);
+  return status;
+}
+
+/* -- model functions ------------------------------------------------------------------------ */
+
+static void evaluate_outputs(double *v) {
+  const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
+  double *res[] = {v + IXD, v + IY};
+  f_outputs(arg, res, 0, 0, 0);
+}
+
+static void derivatives(const double *v, double t, const double *x, double *xdot) {
+  const double *arg[] = {&t, x, v + IZ, v + IU, v + IP};
+  double *res[] = {xdot};
+  f_derivatives(arg, res, 0, 0, 0);
+}
+
+static void refresh(Instance *c) {
+  if (c->m.stale) {
+    evaluate_outputs(c->m.v);
+    c->m.stale = 0;
+  }
+}
+
+static int check_finite(Instance *c, int from, int count) {
+  for (int i = from; i < from + count; i++)
+    if (!isfinite(c->m.v[i]))
+      return report(c, ERROR, "%s: variable %s is not finite (%g) at time %.9g s", MODEL, NAMES[i],
+                    c->m.v[i], c->m.v[0]);
+  return OK;
+}
+
+/* -- start, reset, get, set -------------------------------------------------------------------- */
+
+static void set_start(Instance *c) {
+  memset(&c->m, 0, sizeof c->m);
+  memcpy(c->m.v, START, sizeof c->m.v);
+  c->m.mode = INSTANTIATED;
+  c->m.stale = 1;
+}
+
+static Instance *instantiate(const char *name, const char *token, int version, int model_exchange,
+                             int logging, void *environment) {
+  Instance *c = calloc(1, sizeof *c);
+  if (!c) return 0;
+  c->version = version;
+  c->model_exchange = model_exchange;
+  c->logging = logging;
+  c->environment = environment;
+  c->name = malloc(strlen(name ? name : "") + 1);
+  if (!c->name) {
+    free(c);
+    return 0;
+  }
+  strcpy(c->name, name ? name : "");
+  set_start(c);
+  (void)token;
+  return c;
+}
+
+static void release(Instance *c) {
+  if (c) free(c->name);
+  free(c);
+}
+
+static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
+  for (size_t i = 0; i < n; i++) {
+    uint32_t k = vr[i];
+    if (k >= NV) return report(c, ERROR, "%s: there is no variable with value reference %u", MODEL, k);
+    if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh(c);
+    values[i] = c->m.v[k];
+  }
+  return OK;
+}
+
+static int set_value(Instance *c, uint32_t k, double value) {
+  double *v = c->m.v;
+  if (k >= NV) return report(c, ERROR, "%s: there is no variable with value reference %u", MODEL, k);
+  if (!isfinite(value))
+    return report(c, ERROR, "%s: variable %s cannot be set to %g at time %.9g s: not finite", MODEL,
+                  NAMES[k], value, v[0]);
+  int parameter = (k >= IP && k < IZ) || k >= IS;
+  int state = (k >= IX && k < IXD) || (k >= IZ && k < IS);
+  if (!parameter && !state && !(k >= IU && k < IY))
+    return report(c, ERROR, "%s: variable %s is calculated and cannot be set", MODEL, NAMES[k]);
+  if (state && c->m.mode > INITIALIZING)
+    return report(c, ERROR, "%s: state %s can only be set before the end of initialization (time %.9g s)",
+                  MODEL, NAMES[k], v[0]);
+  if (parameter) {
+    if (FIXED[k] && c->m.mode > INITIALIZING)
+      return report(c, ERROR, "%s: fixed parameter %s can only be set before the end of initialization",
+                    MODEL, NAMES[k]);
+    if (value < MINIMUM[k] || value > MAXIMUM[k])
+      return report(c, ERROR, "%s: parameter %s = %g is outside [%g, %g]", MODEL, NAMES[k], value,
+                    MINIMUM[k], MAXIMUM[k]);
+  }
+  v[k] = value;
+  c->m.stale = 1;
+  return OK;
+}
+
+static int set_values(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
+  double *v = c->m.v;
+  for (size_t i = 0; i < n; i++) {
+    uint32_t k = vr[i];
+    if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input */
+      v[k] = values[i];
+      c->m.stale = 1;
+      continue;
+    }
+    int status = set_value(c, k, values[i]);
+    if (status != OK) return status;
+  }
+  return OK;
+}
+
+/* -- sample clocks ----------------------------------------------------------------------------- */
+
+static void periods(const double *v, double *period) {
+#if NC
+  const double *arg[] = {v + IP};
+  double *res[] = {period};
+  f_periods(arg, res, 0, 0, 0);
+#else
+  (void)v;
+  (void)period;
+#endif
+}
+
+static int start_clocks(Instance *c) {
+  double period[NC + 1];
+  periods(c->m.v, period);
+  for (int k = 0; k < NC; k++) {
+    if (!(period[k] > 0))
+      return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, period[k]);
+    c->m.tick[k] = ceil(c->m.v[0] / period[k] - 1e-7);
+    c->m.next[k] = c->m.tick[k] * period[k];
+  }
+  return OK;
+}
+
+/* Execute the clocks that are due at the present time; returns the time of the next tick. A tick is
+   due from 1e-7 of its period before its time on, so that rounding of k*H and k*T cannot split one
+   instant into two. */
+static double run_ticks(Instance *c) {
+  double next = INFINITY;
+#if NC
+  double *v = c->m.v, period[NC + 1], z[NZ + 1];
+  periods(v, period);
+  for (int k = 0; k < NC; k++) {
+    if (c->m.next[k] <= v[0] + 1e-7 * period[k]) {
+      const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
+      double *res[] = {z};
+      UPDATES[k](arg, res, 0, 0, 0);
+      memcpy(v + IZ, z, NZ * sizeof *z);
+      c->m.tick[k] += 1;
+      c->m.next[k] = c->m.tick[k] * period[k];
+      c->m.stale = 1;
+    }
+    if (c->m.next[k] - 1e-7 * period[k] < next) next = c->m.next[k] - 1e-7 * period[k];
+  }
+#else
+  (void)c;
+#endif
+  return next;
+}
+
+/* -- solvers ----------------------------------------------------------------------------------- */
+
+#if NX
+/* Classical Runge-Kutta, order 4. */
+static void rk4(const double *v, double t, double h, double *x) {
+  double k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
+  derivatives(v, t, x, k1);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k1[i];
+  derivatives(v, t + 0.5 * h, y, k2);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k2[i];
+  derivatives(v, t + 0.5 * h, y, k3);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + h * k3[i];
+  derivatives(v, t + h, y, k4);
+  for (int i = 0; i < NX; i++) x[i] = x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+}
+
+/* Rodas3: linearly implicit, 4 stages, order 3(2), L-stable; Sandu et al., Atmos. Environ. 31 (1997).
+   e receives the difference to the embedded solution of order 2. */
+static void rodas3(const double *v, double t, double h, double *x, double *e) {
+  double f[NX], ft[NX], j[NJ + 1], w[NLU + 1], k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
+  const double *arg[] = {&t, x, v + IZ, v + IU, v + IP};
+  double *res[] = {f, j, ft};
+  const double ih = 1.0 / h;
+  f_jacobian(arg, res, 0, 0, 0);
+  f_factor(j, 2.0 * ih, w);
+  for (int i = 0; i < NX; i++) k1[i] = f[i] + 0.5 * h * ft[i];
+  f_solve(w, k1);
+  for (int i = 0; i < NX; i++) k2[i] = f[i] + 4.0 * ih * k1[i] + 1.5 * h * ft[i];
+  f_solve(w, k2);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + 2.0 * k1[i];
+  derivatives(v, t + h, y, f);
+  for (int i = 0; i < NX; i++) k3[i] = f[i] + ih * (k1[i] - k2[i]);
+  f_solve(w, k3);
+  for (int i = 0; i < NX; i++) y[i] = y[i] + k3[i];
+  derivatives(v, t + h, y, f);
+  for (int i = 0; i < NX; i++) k4[i] = f[i] + ih * (k1[i] - k2[i] - (8.0 / 3.0) * k3[i]);
+  f_solve(w, k4);
+  for (int i = 0; i < NX; i++) {
+    x[i] = y[i] + k4[i];
+    e[i] = k4[i];
+  }
+}
+
+/* Dormand-Prince, order 5(4). */
+static void dopri5(const double *v, double t, double h, double *x, double *e) {
+  double k1[NX], k2[NX], k3[NX], k4[NX], k5[NX], k6[NX], k7[NX], y[NX];
+  derivatives(v, t, x, k1);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + h * (1.0 / 5.0 * k1[i]);
+  derivatives(v, t + 1.0 / 5.0 * h, y, k2);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + h * (3.0 / 40.0 * k1[i] + 9.0 / 40.0 * k2[i]);
+  derivatives(v, t + 3.0 / 10.0 * h, y, k3);
+  for (int i = 0; i < NX; i++)
+    y[i] = x[i] + h * (44.0 / 45.0 * k1[i] - 56.0 / 15.0 * k2[i] + 32.0 / 9.0 * k3[i]);
+  derivatives(v, t + 4.0 / 5.0 * h, y, k4);
+  for (int i = 0; i < NX; i++)
+    y[i] = x[i] + h * (19372.0 / 6561.0 * k1[i] - 25360.0 / 2187.0 * k2[i] +
+                       64448.0 / 6561.0 * k3[i] - 212.0 / 729.0 * k4[i]);
+  derivatives(v, t + 8.0 / 9.0 * h, y, k5);
+  for (int i = 0; i < NX; i++)
+    y[i] = x[i] + h * (9017.0 / 3168.0 * k1[i] - 355.0 / 33.0 * k2[i] + 46732.0 / 5247.0 * k3[i] +
+                       49.0 / 176.0 * k4[i] - 5103.0 / 18656.0 * k5[i]);
+  derivatives(v, t + h, y, k6);
+  for (int i = 0; i < NX; i++)
+    x[i] = x[i] + h * (35.0 / 384.0 * k1[i] + 500.0 / 1113.0 * k3[i] + 125.0 / 192.0 * k4[i] -
+                       2187.0 / 6784.0 * k5[i] + 11.0 / 84.0 * k6[i]);
+  derivatives(v, t + h, x, k7);
+  for (int i = 0; i < NX; i++)
+    e[i] = h * (71.0 / 57600.0 * k1[i] - 71.0 / 16695.0 * k3[i] + 71.0 / 1920.0 * k4[i] -
+                17253.0 / 339200.0 * k5[i] + 22.0 / 525.0 * k6[i] - 1.0 / 40.0 * k7[i]);
+}
+
+/* Error-controlled integration from the present time to t1; steps are at most solver.step long. */
+static int adaptive(Instance *c, double t1) {
+  double *v = c->m.v, x[NX], e[NX], t = v[0];
+  const int implicit = v[METHOD] == RODAS3_ADAPTIVE;
+  double h = c->m.h > 0 ? c->m.h : 0.1 * v[STEP];
+  const double exponent = implicit ? -1.0 / 3.0 : -1.0 / 5.0;
+  while (t < t1) {
+    if (h > v[STEP]) h = v[STEP];
+    const int last = t + h * (1 + 1e-9) >= t1;
+    const double hs = last ? t1 - t : h;
+    memcpy(x, v + IX, sizeof x);
+    if (implicit) rodas3(v, t, hs, x, e);
+    else dopri5(v, t, hs, x, e);
+    double error = 0;
+    for (int i = 0; i < NX; i++) {
+      const double scale = v[TOLERANCE] * (NOMINAL[i] + fabs(v[IX + i]));
+      const double ratio = fabs(e[i]) / scale;
+      if (!(ratio <= error)) error = ratio; /* a NaN ends up here too */
+    }
+    if (error <= 1) {
+      memcpy(v + IX, x, sizeof x);
+      t = last ? t1 : t + hs;
+    }
+    double factor = isfinite(error) ? 0.9 * pow(error + 1e-10, exponent) : 0.1;
+    if (factor > 5) factor = 5;
+    if (factor < 0.1) factor = 0.1;
+    if (!last || error > 1) h = hs * factor;
+    else if (hs * factor > h) h = hs * factor;
+    if (h < 1e-12 * (1 + fabs(t)))
+      return report(c, ERROR, "%s: the solver's step fell to %g s at time %.9g s; loosen solver.tolerance "
+                    "or use the fixed-step method", MODEL, h, t);
+  }
+  c->m.h = h;
+  return OK;
+}
+#endif
+
+static int integrate(Instance *c, double t1) {
+  double *v = c->m.v;
+#if NX
+  const double t0 = v[0];
+  if (v[METHOD] == RK4 || v[METHOD] == RODAS3) {
+    const double count = ceil((t1 - t0) / v[STEP] * (1 - 1e-9));
+    if (!(count < 1e9))
+      return report(c, ERROR, "%s: %g s with solver.step %g s are too many steps", MODEL, t1 - t0, v[STEP]);
+    const int n = count < 1 ? 1 : (int)count;
+    const double h = (t1 - t0) / n;
+    double e[NX];
+    for (int i = 0; i < n; i++) {
+      const double t = t0 + i * h;
+      if (v[METHOD] == RK4) rk4(v, t, h, v + IX);
+      else rodas3(v, t, h, v + IX, e);
+    }
+  } else {
+    const int status = adaptive(c, t1);
+    if (status != OK) return status;
+  }
+#endif
+  v[0] = t1;
+  c->m.stale = 1;
+  return check_finite(c, IX, NX);
+}
+
+static int do_step(Instance *c, double t, double h) {
+  double *v = c->m.v;
+  if (c->m.mode != STEPPING) return report(c, ERROR, "%s: doStep before the end of initialization", MODEL);
+  if (!(h > 0) || !isfinite(h)) return report(c, ERROR, "%s: communication step %g s at time %.9g s", MODEL, h, t);
+  if (!(fabs(t - v[0]) <= 1e-9 * (1 + fabs(t))))
+    return report(c, ERROR, "%s: doStep starts at %.9g s but the FMU is at %.9g s", MODEL, t, v[0]);
+  v[0] = t;
+  const double t1 = t + h;
+  for (;;) {
+    const double next = run_ticks(c);
+    const int last = !(next < t1);
+    const int status = integrate(c, last ? t1 : next);
+    if (status != OK) {
+      c->m.mode = FAILED;
+      return status;
+    }
+    if (last) return check_finite(c, IZ, NZ);
+  }
+}
+
+/* -- modes --------------------------------------------------------------------------------------- */
+
+static int leave_initialization(Instance *c) {
+  if (c->m.mode != INITIALIZING) return report(c, ERROR, "%s: initialization mode was not entered", MODEL);
+  int status = start_clocks(c);
+  if (status != OK) return status;
+  evaluate_outputs(c->m.v);
+  c->m.stale = 0;
+  status = check_finite(c, IXD, NX);
+  if (status == OK) status = check_finite(c, IY, NY);
+  if (status != OK) return status;
+  c->m.mode = c->model_exchange ? EVENT : STEPPING;
+  return OK;
+}
+
+static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const uint32_t knowns[], size_t nk,
+                       const double seed[], double result[]) {
+  double s[NV] = {0}, dxdot[NX + 1], dy[NY + 1];
+  double *v = c->m.v;
+  for (size_t i = 0; i < nk; i++) {
+    uint32_t k = knowns[i];
+    if (k >= NV || (k >= IXD && k < IU) || (k >= IY && k < IP) || k >= IS)
+      return report(c, ERROR, "%s: no directional derivative with respect to value reference %u", MODEL, k);
+    s[k] = seed[i];
+  }
+  const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP, s, s + IX, s + IZ, s + IU, s + IP};
+  double *res[] = {dxdot, dy};
+  f_directional(arg, res, 0, 0, 0);
+  for (size_t i = 0; i < nu; i++) {
+    uint32_t k = unknowns[i];
+    if (k >= IXD && k < IU) result[i] = dxdot[k - IXD];
+    else if (k >= IY && k < IP) result[i] = dy[k - IY];
+    else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, k);
+  }
+  return OK;
+}
+
+/* -- saved states --------------------------------------------------------------------------------- */
+
+static int save_state(Instance *c, void **state) {
+  if (!*state) *state = malloc(sizeof(Memory));
+  if (!*state) return report(c, ERROR, "%s: out of memory", MODEL);
+  memcpy(*state, &c->m, sizeof(Memory));
+  return OK;
+}
+
+enum { TOKEN_BYTES = 16 };
+
+static int serialize(Instance *c, const void *state, uint8_t bytes[], size_t size) {
+  if (size < TOKEN_BYTES + sizeof(Memory))
+    return report(c, ERROR, "%s: %zu bytes are too few for a state", MODEL, size);
+  memcpy(bytes, TOKEN, TOKEN_BYTES);
+  memcpy(bytes + TOKEN_BYTES, state, sizeof(Memory));
+  return OK;
+}
+
+static int deserialize(Instance *c, const uint8_t bytes[], size_t size, void **state) {
+  if (size != TOKEN_BYTES + sizeof(Memory) || memcmp(bytes, TOKEN, TOKEN_BYTES))
+    return report(c, ERROR, "%s: these %zu bytes are not a state of this FMU", MODEL, size);
+  if (!*state) *state = malloc(sizeof(Memory));
+  if (!*state) return report(c, ERROR, "%s: out of memory", MODEL);
+  memcpy(*state, bytes + TOKEN_BYTES, sizeof(Memory));
+  return OK;
+}

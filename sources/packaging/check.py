@@ -1,0 +1,75 @@
+"""Check FMUs: fmpy's validation of any, and our contract for our own."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+from fmpy.model_description import ModelDescription, ValidationError, read_model_description
+
+_ENTRY = "extra/cosim/component.json"
+
+
+def check(path: Path) -> list[str]:
+    """Problems of an FMU, an empty list if there is none.
+
+    For any FMU: the archive is readable, the model description valid and consistent. For ours also:
+    every variable has a unit and a description, the capabilities that we promise are declared,
+    output dependencies are given, ports name existing variables, and a binary or a slave is there.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            broken = archive.testzip()
+            if broken:
+                return [f"{path.name}: the file {broken} in the archive is damaged"]
+            names = set(archive.namelist())
+            ours = json.loads(archive.read(_ENTRY)) if _ENTRY in names else None
+    except (OSError, zipfile.BadZipFile) as error:
+        return [f"{path.name}: not a readable .fmu archive ({error})"]
+    try:
+        model = read_model_description(str(path), validate=True)
+    except ValidationError as error:
+        return [f"{path.name}: {problem}" for problem in error.problems]
+    except Exception as error:  # fmpy raises plain Exception for XML that it cannot read
+        return [f"{path.name}: {error}"]
+    problems = _problems_of_ours(model, ours, names) if ours is not None else []
+    return [f"{path.name}: {problem}" for problem in problems]
+
+
+def _problems_of_ours(
+    model: ModelDescription, ours: dict[str, object], names: set[str]
+) -> list[str]:
+    problems = []
+    for variable in model.modelVariables:
+        if variable.type in ("Real", "Float64") and not (variable.unit or variable.declaredType):
+            problems.append(f"variable {variable.name!r} has no unit")
+        if not variable.description:
+            problems.append(f"variable {variable.name!r} has no description")
+    python = any(name.startswith("resources/slavemodule") for name in names)
+    interfaces = [model.coSimulation] if python else [model.coSimulation, model.modelExchange]
+    for interface, title in zip(interfaces, ("co-simulation", "model exchange"), strict=False):
+        if interface is None:
+            problems.append(f"{title} is missing")
+            continue
+        wanted = ["canGetAndSetFMUstate", "canSerializeFMUstate"]
+        if not python:
+            wanted.append("providesDirectionalDerivative")
+        problems += [
+            f"{title}: {flag} is not declared" for flag in wanted if not getattr(interface, flag)
+        ]
+    problems += [
+        f"output {unknown.variable.name!r} declares no dependencies"
+        for unknown in model.outputs
+        if unknown.dependencies is None
+    ]
+    declared = {variable.name for variable in model.modelVariables}
+    for port in ours["ports"]:  # type: ignore[attr-defined]
+        for variable in (*port["effort"], *port["flow"]):
+            if variable not in declared:
+                problems.append(f"port {port['name']!r} names the unknown variable {variable!r}")
+    if not any(name.startswith("binaries/") for name in names):
+        problems.append("there is no binary")
+    if not python and "sources/model.c" not in names:
+        problems.append("the C sources are missing")
+    return problems

@@ -1,0 +1,200 @@
+"""C sources of a variant and their compilation for all platforms by the `ziglang` package."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+
+from ..function import Functions
+from ..model import Model
+from .cache import cache_folder, write_atomically
+from .elimination import eliminate
+from .layout import Entry
+
+C_SOURCES = Path(__file__).parent / "c"
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A target platform.
+
+    Attributes:
+        target: zig's target triple; glibc 2.17 and macOS 11 are the oldest systems served.
+        suffix: of the shared library.
+        fmi2, fmi3: folder names below `binaries/`.
+    """
+
+    target: str
+    suffix: str
+    fmi2: str
+    fmi3: str
+
+
+PLATFORMS: dict[str, Platform] = {
+    "x86_64-linux": Platform("x86_64-linux-gnu.2.17", ".so", "linux64", "x86_64-linux"),
+    "aarch64-linux": Platform("aarch64-linux-gnu.2.17", ".so", "aarch64-linux", "aarch64-linux"),
+    "x86_64-windows": Platform("x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
+    "x86_64-darwin": Platform("x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
+    "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
+}
+
+
+class CompilerError(RuntimeError):
+    """The C compiler failed; the text carries what it said."""
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _casadi_code(functions: Functions) -> str:
+    generator = ca.CodeGenerator("model", {"casadi_int": "int"})
+    used = [functions.outputs, functions.derivatives, functions.directional]
+    if functions.derivatives.numel_out():
+        used.append(functions.jacobian)
+    if functions.updates:
+        used += [functions.periods, *functions.updates]
+    for function in used:
+        generator.add(function)
+    return str(generator.dump())
+
+
+def model_source(model: Model, functions: Functions, entries: list[Entry], identifier: str) -> str:
+    """The generated C file `model.c` of a variant: sizes, tables, CasADi functions, elimination.
+
+    The instantiation token is left out; `with_token` puts it in.
+    """
+    counts = {
+        part: sum(entry.part == part for entry in entries)
+        for part in ("state", "input", "output", "parameter", "discrete")
+    }
+    nx = counts["state"]
+    elimination = eliminate(nx, functions.jacobian_pattern)
+    sizes = {
+        "NX": nx,
+        "NU": counts["input"],
+        "NY": counts["output"],
+        "NP": counts["parameter"],
+        "NZ": counts["discrete"],
+        "NC": len(functions.updates),
+        "NJ": len(functions.jacobian_pattern),
+        "NLU": elimination.size,
+    }
+    infinity = float("inf")
+
+    def bound(value: float | None, default: float) -> str:
+        value = default if value is None else value
+        return ("-" if value < 0 else "") + "INFINITY" if abs(value) == infinity else _number(value)
+
+    nominal = [entry.quantity.nominal or 1.0 for entry in entries if entry.part == "state"]
+    quoted = ", ".join(f'"{entry.name}"' for entry in entries)
+    lines = [
+        f"/* Model {identifier}: generated, do not edit. */",
+        "#define CASADI_SYMBOL_EXPORT static",
+        _casadi_code(functions),
+        *(f"#define {name} {value}" for name, value in sizes.items()),
+        f'#define MODEL "{identifier}"',
+        '#define TOKEN "@TOKEN@"',
+        f"static const char *const NAMES[] = {{{quoted}}};",
+        f"static const double START[] = {{{', '.join(_number(e.start) for e in entries)}}};",
+        "static const double MINIMUM[] = {"
+        + ", ".join(bound(e.quantity.minimum, -infinity) for e in entries)
+        + "};",
+        "static const double MAXIMUM[] = {"
+        + ", ".join(bound(e.quantity.maximum, infinity) for e in entries)
+        + "};",
+        "static const char FIXED[] = {"
+        + ", ".join(
+            str(int(e.part == "parameter" and e.quantity.variability == "fixed")) for e in entries
+        )
+        + "};",
+        f"static const double NOMINAL[] = {{{', '.join(map(_number, [*nominal, 1.0]))}}};",
+    ]
+    if functions.updates:
+        names = ", ".join(function.name() for function in functions.updates)
+        lines.append(
+            "static int (*const UPDATES[])(const double **, double **, int *, double *, int) = "
+            f"{{{names}}};"
+        )
+    if nx:
+        lines += [
+            "static void f_factor(const double *j, double d, double *w) {",
+            "  (void)j;",
+            *(f"  {statement};" for statement in elimination.factor),
+            "}",
+            "static void f_solve(const double *w, double *b) {",
+            *(f"  {statement};" for statement in elimination.solve),
+            "}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def with_token(source: str, token: str) -> str:
+    """The C source with its instantiation token."""
+    return source.replace("@TOKEN@", token)
+
+
+def compiler_version() -> str:
+    """Name and version of the compiler, part of every cache key."""
+    return f"ziglang {importlib.metadata.version('ziglang')}"
+
+
+def compile_library(source: str, identifier: str, platform: str) -> bytes:
+    """Compile a variant for one platform; cached by the content of all C files.
+
+    Raises:
+        CompilerError: with the compiler's message.
+    """
+    target = PLATFORMS[platform]
+    fixed = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_SOURCES.glob("*.c"))}
+    flags = [
+        *("-target", target.target, "-std=c99", "-O2", "-shared", "-fPIC", "-s", "-g0"),
+        # no fused multiply-add: every platform and the Python twin round alike
+        *("-fvisibility=hidden", "-ffp-contract=off", "-w"),
+    ]
+    if "macos" in target.target:
+        flags.append(f"-Wl,-install_name,@rpath/{identifier}.dylib")
+    elif "windows" not in target.target:
+        flags.append(f"-Wl,-soname,{identifier}.so")
+    content = "\0".join([source, *fixed.values(), *flags, identifier, compiler_version()])
+    key = hashlib.sha256(content.encode()).hexdigest()
+    cached = cache_folder("libraries") / f"{key}{target.suffix}"
+    if cached.exists():
+        return cached.read_bytes()
+    folder = cache_folder("compile") / f"{key[:16]}-{os.getpid()}"
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        for name, text in {**fixed, "model.c": source}.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        output = folder / f"{identifier}{target.suffix}"
+        command = [sys.executable, "-m", "ziglang", "cc", *flags, "-o", output.name, "all.c"]
+        if "windows" not in target.target:
+            command.append("-lm")
+        zig = cache_folder("zig")
+        result = subprocess.run(
+            command,
+            cwd=folder,
+            env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(zig)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode:
+            raise CompilerError(
+                f"compiling {identifier} for {platform} failed (is ziglang complete?):\n"
+                f"{result.stderr[-4000:]}"
+            )
+        library = output.read_bytes()
+    finally:
+        for path in folder.iterdir():
+            path.unlink()
+        folder.rmdir()
+    write_atomically(cached, library)
+    return library

@@ -1,0 +1,414 @@
+"""Run time of the python FMUs: what c/core.c does, on lists. Its text is copied into every slave.
+
+Above the line stand the names that a generated slave defines before it.
+"""
+
+import math as _math
+from typing import Any
+
+Fmi2Slave: Any = object
+MODEL: Any = None
+NX: Any = None
+NU: Any = None
+NY: Any = None
+NP: Any = None
+NZ: Any = None
+NC: Any = None
+NJ: Any = None
+NLU: Any = None
+NAMES: Any = None
+START: Any = None
+MINIMUM: Any = None
+MAXIMUM: Any = None
+FIXED: Any = None
+NOMINAL: Any = None
+UPDATES: Any = None
+f_outputs: Any = None
+f_derivatives: Any = None
+f_jacobian: Any = None
+f_periods: Any = None
+f_factor: Any = None
+f_solve: Any = None
+
+
+# -- run time ---------------------------------------------------------------------------------
+# Functions that follow C where Python raises: division by zero, overflow, domain errors.
+
+
+def _div(a: float, b: float) -> float:
+    if b != 0.0:
+        return a / b
+    if a == 0.0 or a != a:
+        return _math.nan
+    return _math.copysign(_math.inf, a) * _math.copysign(1.0, b)
+
+
+def _guarded(function: Any, *values: float) -> float:
+    try:
+        return float(function(*values))
+    except OverflowError:
+        return _math.inf
+    except ValueError:
+        return _math.nan
+
+
+def _pow(a: float, b: float) -> float:
+    if a == 0.0 and b < 0.0:
+        return _math.inf
+    return _guarded(_math.pow, a, b)
+
+
+def _exp(a: float) -> float:
+    return _guarded(_math.exp, a)
+
+
+def _sinh(a: float) -> float:
+    return _guarded(_math.sinh, a)
+
+
+def _cosh(a: float) -> float:
+    return _guarded(_math.cosh, a)
+
+
+def _log(a: float) -> float:
+    return -_math.inf if a == 0.0 else _guarded(_math.log, a)
+
+
+def _sqrt(a: float) -> float:
+    return _guarded(_math.sqrt, a)
+
+
+def _fmod(a: float, b: float) -> float:
+    return _guarded(_math.fmod, a, b)
+
+
+def _floor(a: float) -> float:
+    return float(_math.floor(a)) if _math.isfinite(a) else a
+
+
+def _ceil(a: float) -> float:
+    return float(_math.ceil(a)) if _math.isfinite(a) else a
+
+
+def _sign(a: float) -> float:
+    return -1.0 if a < 0.0 else 1.0 if a > 0.0 else a
+
+
+def _fmin(a: float, b: float) -> float:
+    if a != a:
+        return b
+    return a if a <= b or b != b else b
+
+
+def _fmax(a: float, b: float) -> float:
+    if a != a:
+        return b
+    return a if a >= b or b != b else b
+
+
+class Slave(Fmi2Slave):  # type: ignore[misc]
+    """The variables in one list; a value reference is an index into it."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Start values."""
+        super().__init__(**kwargs)
+        self.IX = 1
+        self.IXD = self.IX + NX
+        self.IU = self.IXD + NX
+        self.IY = self.IU + NU
+        self.IP = self.IY + NY
+        self.IZ = self.IP + NP
+        self.IS = self.IZ + NZ
+        self.v = list(START)
+        self.tick = [0.0] * NC
+        self.next = [0.0] * NC
+        self.h = 0.0
+        self.initialized = False
+        self.stale = True
+
+    # -- FMI ----------------------------------------------------------------------------------
+
+    def setup_experiment(self, start_time: float, stop_time: Any, tolerance: Any) -> None:
+        """Take the start time."""
+        self.v[0] = start_time
+
+    def exit_initialization_mode(self) -> None:
+        """Start the sample clocks."""
+        for k, period in enumerate(self._periods()):
+            if not period > 0.0:
+                raise ValueError(
+                    f"{MODEL}: sample clock {k} has period {period:g} s; it must be positive"
+                )
+            self.tick[k] = float(_math.ceil(self.v[0] / period - 1e-7))
+            self.next[k] = self.tick[k] * period
+        self._refresh()
+        self._check(self.IXD, NX)
+        self._check(self.IY, NY)
+        self.initialized = True
+
+    def get_real(self, vrs: Any) -> list[float]:
+        """Values by value reference."""
+        self._refresh()
+        return [self.v[vr] for vr in vrs]
+
+    def set_real(self, vrs: Any, values: Any) -> None:
+        """Set inputs and parameters, before the end of initialization states too."""
+        for vr, value in zip(vrs, values, strict=True):
+            self._set(vr, float(value))
+
+    def get_integer(self, vrs: Any) -> list[int]:
+        """Value of `solver.method`."""
+        return [int(self.v[vr]) for vr in vrs]
+
+    def set_integer(self, vrs: Any, values: Any) -> None:
+        """Set `solver.method`."""
+        for vr, value in zip(vrs, values, strict=True):
+            self._set(vr, float(value))
+
+    def _set(self, vr: int, value: float) -> None:
+        if not _math.isfinite(value):
+            raise ValueError(
+                f"{MODEL}: variable {NAMES[vr]} cannot be set to {value:g} "
+                f"at time {self.v[0]:.9g} s: not finite"
+            )
+        parameter = self.IP <= vr < self.IZ or vr >= self.IS
+        state = self.IX <= vr < self.IXD or self.IZ <= vr < self.IS
+        if not (parameter or state or self.IU <= vr < self.IY):
+            raise ValueError(f"{MODEL}: variable {NAMES[vr]} is calculated and cannot be set")
+        if (state or FIXED[vr]) and self.initialized:
+            raise ValueError(
+                f"{MODEL}: {NAMES[vr]} can only be set before the end of initialization"
+            )
+        if parameter and not MINIMUM[vr] <= value <= MAXIMUM[vr]:
+            raise ValueError(
+                f"{MODEL}: parameter {NAMES[vr]} = {value:g} is outside "
+                f"[{MINIMUM[vr]:g}, {MAXIMUM[vr]:g}]"
+            )
+        self.v[vr] = value
+        self.stale = True
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {
+            "v": list(self.v),
+            "tick": list(self.tick),
+            "next": list(self.next),
+            "h": self.h,
+            "initialized": self.initialized,
+        }
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        self.v, self.tick, self.next = list(state["v"]), list(state["tick"]), list(state["next"])
+        self.h, self.initialized = state["h"], state["initialized"]
+        self.stale = True
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance over a communication step, tick by tick."""
+        v = self.v
+        if not abs(current_time - v[0]) <= 1e-9 * (1 + abs(current_time)):
+            raise ValueError(
+                f"{MODEL}: doStep starts at {current_time:.9g} s but the FMU is at {v[0]:.9g} s"
+            )
+        v[0] = current_time
+        end = current_time + step_size
+        while True:
+            following = self._run_ticks()
+            last = not following < end
+            self._integrate(end if last else following)
+            if last:
+                self._check(self.IZ, NZ)
+                return True
+
+    # -- model ----------------------------------------------------------------------------------
+
+    def _slices(self) -> tuple[list[float], list[float], list[float]]:
+        v = self.v
+        return v[self.IZ : self.IS], v[self.IU : self.IY], v[self.IP : self.IZ]
+
+    def _refresh(self) -> None:
+        if self.stale:
+            v = self.v
+            z, u, p = self._slices()
+            xdot, y = [0.0] * NX, [0.0] * NY
+            f_outputs([v[0]], v[self.IX : self.IXD], z, u, p, xdot, y)
+            v[self.IXD : self.IU] = xdot
+            v[self.IY : self.IP] = y
+            self.stale = False
+
+    def _check(self, start: int, count: int) -> None:
+        for vr in range(start, start + count):
+            if not _math.isfinite(self.v[vr]):
+                raise ValueError(
+                    f"{MODEL}: variable {NAMES[vr]} is not finite ({self.v[vr]:g}) "
+                    f"at time {self.v[0]:.9g} s"
+                )
+
+    def _periods(self) -> list[float]:
+        result = [0.0] * NC
+        if NC:
+            f_periods(self.v[self.IP : self.IZ], result)
+        return result
+
+    def _run_ticks(self) -> float:
+        v, following = self.v, _math.inf
+        for k, period in enumerate(self._periods()):
+            if self.next[k] <= v[0] + 1e-7 * period:
+                z, u, p = self._slices()
+                result = [0.0] * NZ
+                UPDATES[k]([v[0]], v[self.IX : self.IXD], z, u, p, result)
+                v[self.IZ : self.IS] = result
+                self.tick[k] += 1
+                self.next[k] = self.tick[k] * period
+                self.stale = True
+            if self.next[k] - 1e-7 * period < following:
+                following = self.next[k] - 1e-7 * period
+        return following
+
+    # -- solvers ----------------------------------------------------------------------------------
+
+    def _integrate(self, t1: float) -> None:
+        v = self.v
+        if NX:
+            method, step = v[self.IS], v[self.IS + 1]
+            if method <= 2:
+                t0 = v[0]
+                count = _math.ceil((t1 - t0) / step * (1 - 1e-9))
+                n = 1 if count < 1 else int(count)
+                h = (t1 - t0) / n
+                for i in range(n):
+                    x = v[self.IX : self.IXD]
+                    x = (
+                        self._rk4(t0 + i * h, h, x)
+                        if method == 1
+                        else self._rodas3(t0 + i * h, h, x)[0]
+                    )
+                    v[self.IX : self.IXD] = x
+            else:
+                self._adaptive(t1, method == 4)
+        v[0] = t1
+        self.stale = True
+        self._check(self.IX, NX)
+
+    def _derivatives(self, t: float, x: list[float]) -> list[float]:
+        result = [0.0] * NX
+        f_derivatives([t], x, *self._held, result)
+        return result
+
+    def _rk4(self, t: float, h: float, x: list[float]) -> list[float]:
+        self._held = self._slices()
+        r = range(NX)
+        k1 = self._derivatives(t, x)
+        k2 = self._derivatives(t + 0.5 * h, [x[i] + 0.5 * h * k1[i] for i in r])
+        k3 = self._derivatives(t + 0.5 * h, [x[i] + 0.5 * h * k2[i] for i in r])
+        k4 = self._derivatives(t + h, [x[i] + h * k3[i] for i in r])
+        return [x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) for i in r]
+
+    def _rodas3(self, t: float, h: float, x: list[float]) -> tuple[list[float], list[float]]:
+        self._held = self._slices()
+        r = range(NX)
+        f, j, ft, w = [0.0] * NX, [0.0] * NJ, [0.0] * NX, [0.0] * NLU
+        f_jacobian([t], x, *self._held, f, j, ft)
+        ih = 1.0 / h
+        f_factor(j, 2.0 * ih, w)
+        k1 = [f[i] + 0.5 * h * ft[i] for i in r]
+        f_solve(w, k1)
+        k2 = [f[i] + 4.0 * ih * k1[i] + 1.5 * h * ft[i] for i in r]
+        f_solve(w, k2)
+        y = [x[i] + 2.0 * k1[i] for i in r]
+        f = self._derivatives(t + h, y)
+        k3 = [f[i] + ih * (k1[i] - k2[i]) for i in r]
+        f_solve(w, k3)
+        y = [y[i] + k3[i] for i in r]
+        f = self._derivatives(t + h, y)
+        k4 = [f[i] + ih * (k1[i] - k2[i] - (8.0 / 3.0) * k3[i]) for i in r]
+        f_solve(w, k4)
+        return [y[i] + k4[i] for i in r], k4
+
+    def _dopri5(self, t: float, h: float, x: list[float]) -> tuple[list[float], list[float]]:
+        self._held = self._slices()
+        r = range(NX)
+        k1 = self._derivatives(t, x)
+        k2 = self._derivatives(t + 1.0 / 5.0 * h, [x[i] + h * (1.0 / 5.0 * k1[i]) for i in r])
+        y = [x[i] + h * (3.0 / 40.0 * k1[i] + 9.0 / 40.0 * k2[i]) for i in r]
+        k3 = self._derivatives(t + 3.0 / 10.0 * h, y)
+        y = [x[i] + h * (44.0 / 45.0 * k1[i] - 56.0 / 15.0 * k2[i] + 32.0 / 9.0 * k3[i]) for i in r]
+        k4 = self._derivatives(t + 4.0 / 5.0 * h, y)
+        y = [
+            x[i]
+            + h
+            * (
+                19372.0 / 6561.0 * k1[i]
+                - 25360.0 / 2187.0 * k2[i]
+                + 64448.0 / 6561.0 * k3[i]
+                - 212.0 / 729.0 * k4[i]
+            )
+            for i in r
+        ]
+        k5 = self._derivatives(t + 8.0 / 9.0 * h, y)
+        y = [
+            x[i]
+            + h
+            * (
+                9017.0 / 3168.0 * k1[i]
+                - 355.0 / 33.0 * k2[i]
+                + 46732.0 / 5247.0 * k3[i]
+                + 49.0 / 176.0 * k4[i]
+                - 5103.0 / 18656.0 * k5[i]
+            )
+            for i in r
+        ]
+        k6 = self._derivatives(t + h, y)
+        y = [
+            x[i]
+            + h
+            * (
+                35.0 / 384.0 * k1[i]
+                + 500.0 / 1113.0 * k3[i]
+                + 125.0 / 192.0 * k4[i]
+                - 2187.0 / 6784.0 * k5[i]
+                + 11.0 / 84.0 * k6[i]
+            )
+            for i in r
+        ]
+        k7 = self._derivatives(t + h, y)
+        e = [
+            h
+            * (
+                71.0 / 57600.0 * k1[i]
+                - 71.0 / 16695.0 * k3[i]
+                + 71.0 / 1920.0 * k4[i]
+                - 17253.0 / 339200.0 * k5[i]
+                + 22.0 / 525.0 * k6[i]
+                - 1.0 / 40.0 * k7[i]
+            )
+            for i in r
+        ]
+        return y, e
+
+    def _adaptive(self, t1: float, implicit: bool) -> None:
+        v = self.v
+        largest, tolerance = v[self.IS + 1], v[self.IS + 2]
+        t, h = v[0], self.h if self.h > 0 else 0.1 * largest
+        exponent = -1.0 / 3.0 if implicit else -1.0 / 5.0
+        method = self._rodas3 if implicit else self._dopri5
+        while t < t1:
+            if h > largest:
+                h = largest
+            last = t + h * (1 + 1e-9) >= t1
+            hs = t1 - t if last else h
+            x = v[self.IX : self.IXD]
+            new, e = method(t, hs, x)
+            error = 0.0
+            for i in range(NX):
+                ratio = abs(e[i]) / (tolerance * (NOMINAL[i] + abs(x[i])))
+                if not ratio <= error:
+                    error = ratio
+            if error <= 1:
+                v[self.IX : self.IXD] = new
+                t = t1 if last else t + hs
+            factor = 0.9 * _math.pow(error + 1e-10, exponent) if _math.isfinite(error) else 0.1
+            factor = min(max(factor, 0.1), 5.0)
+            if not last or error > 1 or hs * factor > h:
+                h = hs * factor
+            if h < 1e-12 * (1 + abs(t)):
+                raise ValueError(f"{MODEL}: the solver's step fell to {h:g} s at time {t:.9g} s")
+        self.h = h
