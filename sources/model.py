@@ -313,8 +313,8 @@ class Model:
         if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
             if attachment.balance:
                 raise ModelError(
-                    f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} is in "
-                    f"{balance.unit or '1'}"
+                    f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
+                    f"is in {balance.unit or '1'}"
                 )
             return False
         lacking = [need for need in effect.needs if need not in balance.signals]
