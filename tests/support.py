@@ -97,7 +97,7 @@ class Stepper:
             self.u[self._names["u"].index(name)] = value
 
     def step(self, inputs: Mapping[str, float] | None = None, dt: float = 1e-3) -> dict[str, float]:
-        """One communication step with held inputs (those not named keep their value); its outputs."""
+        """One communication step with held inputs (others stay); the outputs after it."""
         self.set(inputs or {})
         end = self.t + dt
         while True:
