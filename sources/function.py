@@ -88,7 +88,8 @@ def build_functions(model: Model) -> Functions:
         return {name: tuple(items) for name, items in found.items()}
 
     def function(name: str, results: list[Any], extra: list[Any] | None = None) -> ca.Function:
-        return ca.Function(name, arguments + (extra or []), results)
+        # structural zeros are written too: the C code and the Python twin index densely
+        return ca.Function(name, arguments + (extra or []), [ca.densify(r) for r in results])
 
     return Functions(
         outputs=function("f_outputs", [xdot, y]),
@@ -100,7 +101,9 @@ def build_functions(model: Model) -> Functions:
             function(f"f_update{index}", [_update(model, clock, roles["discrete"])])
             for index, clock in enumerate(model.clocks)
         ),
-        periods=ca.Function("f_periods", [p], [_column([c.period for c in model.clocks])]),
+        periods=ca.Function(
+            "f_periods", [p], [ca.densify(_column([c.period for c in model.clocks]))]
+        ),
         output_dependencies=dependencies(y, [v.name for v in outputs]),
         derivative_dependencies=dependencies(xdot, [v.name for v in roles["state"]]),
     )

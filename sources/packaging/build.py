@@ -154,7 +154,7 @@ def _python_files(variant: Variant) -> dict[str, bytes]:
         "resources/slavemodule.txt": module.encode(),
         f"resources/{module}.py": source.encode(),
     }
-    return files | python.binaries()
+    return files | python.binaries(identifier)
 
 
 @lru_cache(maxsize=1)

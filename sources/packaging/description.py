@@ -152,7 +152,7 @@ def describe_fmi2(
         root,
         "CoSimulation",
         _attributes(
-            modelIdentifier=identifier if native else "pythonfmu-export",
+            modelIdentifier=identifier,
             needsExecutionTool=None if native else True,
             canHandleVariableCommunicationStepSize=True,
             canNotUseMemoryManagementFunctions=True,
@@ -225,7 +225,7 @@ def describe_fmi2(
                         index=position[entry.name], dependencies=" ".join(map(str, dependencies))
                     ),
                 )
-    unknowns = [entry for entry, _ in calculated["output"] + calculated["derivative"]]
+    unknowns = [entry for _, items in sections for entry, _ in items]
     if unknowns:
         section = ET.SubElement(structure, "InitialUnknowns")
         for entry in sorted(unknowns, key=lambda item: position[item.name]):

@@ -172,8 +172,8 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
     )
 
 
-def binaries() -> dict[str, bytes]:
-    """pythonfmu's prebuilt libraries, from the installed package.
+def binaries(identifier: str) -> dict[str, bytes]:
+    """pythonfmu's prebuilt libraries, from the installed package, named as FMI asks.
 
     Raises:
         FileNotFoundError: pythonfmu is not installed or has no binaries.
@@ -185,7 +185,7 @@ def binaries() -> dict[str, bytes]:
     if folder is None or not folder.is_dir():
         raise FileNotFoundError("the package pythonfmu has no binaries; reinstall it")
     return {
-        f"binaries/{path.relative_to(folder).as_posix()}": path.read_bytes()
+        f"binaries/{path.parent.name}/{identifier}{path.suffix}": path.read_bytes()
         for path in sorted(folder.rglob("*"))
         if path.suffix in (".so", ".dll", ".dylib")
     }
