@@ -153,6 +153,7 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
             f'"""{model.component.text} Variant {name}; generated from its equations."""',
             "",
             "import math as _math",
+            "from typing import Any",
             "",
             "from pythonfmu import Fmi2Slave",
             "",
