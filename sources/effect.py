@@ -111,9 +111,14 @@ KINDS: dict[str, Kind] = {
         ),
     ),
     "position": Kind("m", "", _names(value="the undisturbed position, body axes [m], 3")),
+    "pose": Kind("", "", _names(value="the undisturbed planar pose x [m], y [m], yaw [rad], 3")),
+    "point": Kind("m", "", _names(value="the undisturbed point in a fixed frame [m], 2 or 3")),
+    "bundle": Kind("", "", _names(value="signals of several units that travel together")),
 }
 """Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; a `body`
-takes a wrench (force and moment at the reference point, body axes) and additional mass."""
+takes a wrench (force and moment at the reference point, body axes) and additional mass. `pose`,
+`point` and `bundle` are signals with more structure or less than `signal`, whose elements all have
+the unit of the balance."""
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,7 @@ class Model:
             self.inflows: list[SX] = []
             self._attached: set[str] = set()
             self._vectors: dict[str, SX] = {}
+            self.input_rates: dict[str, SX] = {}
 
     @property
     def t(self) -> SX:
@@ -189,6 +190,15 @@ class Model:
     def input(self, quantity: Quantity) -> SX:
         """Declare an input, held by the master over a communication step."""
         return self._declare(quantity, "input")
+
+    def input_rate(self, symbol: SX, rate: SX) -> None:
+        """Say how an input moves that others of the inputs determine, e.g. an angle by its speed.
+
+        Only the energy test reads it: there inputs count as held unless they have a rate.
+        """
+        rate = ca.SX(rate)
+        for index in range(symbol.numel()):
+            self._root.input_rates[symbol[index].name()] = rate[index]
 
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state; give its `derivative`.
@@ -435,6 +445,9 @@ class _Part(Model):
             raise ModelError(f"part {self.prefix!r}: nothing feeds its input {quantity.name!r}")
         return self._inputs[quantity.name]
 
+    def input_rate(self, symbol: SX, rate: SX) -> None:
+        """Nothing: the whole determines how the part's inputs move."""
+
     def parameter(self, quantity: Quantity) -> SX:
         if quantity.name in self._parameters:
             self.seen_parameters.add(quantity.name)
@@ -473,6 +486,7 @@ class EffectModel:
             of_effect=True,
         )
         self.kind = balance.kind
+        self.unit = balance.unit or "1"
         self.size = int(balance.effort.numel())
 
     @property
@@ -535,15 +549,22 @@ class EffectModel:
         self._balance.inertia = self._balance.inertia + inertia + steiner
 
     def loss(self, power: SX) -> None:
-        """Report loss power [W]: output `P_loss` of the effect and part of the component's."""
-        power = ca.SX(power)
+        """Report loss power [W]: output `P_loss` of the effect and part of the component's.
+
+        The elements of a vector (a balance of several shafts) are added up.
+        """
+        power = _total(power)
         self._model.output(EFFECT_LOSS, power)
         self._model.loss("P_loss", power)
 
     def stored_energy(self, energy: SX) -> None:
         """Add energy [J] that the effect stores."""
-        self._root.stored.append(ca.SX(energy))
+        self._root.stored.append(_total(energy))
 
     def supply(self, power: SX) -> None:
         """Add power [W] that the effect brings in from outside."""
-        self._root.inflows.append(ca.SX(power))
+        self._root.inflows.append(_total(power))
+
+
+def _total(power: SX) -> SX:
+    return ca.sum1(ca.SX(power))
