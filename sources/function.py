@@ -109,6 +109,15 @@ def build_functions(model: Model) -> Functions:
     )
 
 
+def build_input_rates(model: Model) -> ca.Function:
+    """`(t, x, z, u, p) -> du/dt` by the `input_rate`s of the model; 0 for inputs without one."""
+    inputs = model.of_role("input")
+    roles = [model.of_role(role) for role in ("state", "discrete", "input", "parameter")]
+    arguments = [_stack(role) for role in roles]
+    rates = _column([ca.SX(model.input_rates.get(variable.name, 0.0)) for variable in inputs])
+    return ca.Function("f_input_rates", [model.time, *arguments], [rates])
+
+
 def _nonzeros(matrix: Any) -> Any:
     return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
 
@@ -131,6 +140,7 @@ class Oracle:
             model.of_role(role)
             for role in ("state", "discrete", "input", "parameter")
         ]
+        self._input_rates = build_input_rates(model)
 
     def arguments(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> list[Any]:
         """Arguments `(t, x, z, u, p)`: start values, replaced by `values` where given."""
@@ -160,10 +170,14 @@ class Oracle:
     def energy_defect(
         self, values: Mapping[str, float] | None = None, t: float = 0.0
     ) -> tuple[float, float]:
-        """dE/dt - (P_in - P_loss) and the largest of its terms [W], pointwise."""
+        """dE/dt - (P_in - P_loss) and the largest of its terms [W], pointwise.
+
+        Inputs count as held, except those with an `input_rate`.
+        """
         args = self.arguments(values, t)
         xdot, y = self.functions.outputs(*args)
         zeros = [np.zeros_like(item) for item in args]
+        zeros[3] = np.asarray(self._input_rates(*args)).ravel()
         _, dy = self.functions.directional(*args, 1.0, np.asarray(xdot).ravel(), *zeros[2:])
         index = {name: i for i, name in enumerate(self.output_names)}
         rate = float(dy[index["E_stored"]])

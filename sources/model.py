@@ -541,7 +541,7 @@ class EffectModel:
         self._balance.effort = self._balance.effort + effort
 
     def add_mass(self, mass: SX, position: SX, inertia: SX) -> None:
-        """Add a rigid mass to a `body`: mass [kg], position (3) [m], inertia about its centre (3x3)."""
+        """Add a rigid mass [kg] at a position (3) [m], with its inertia about its centre (3x3)."""
         position = ca.SX(position)
         self._balance.mass = self._balance.mass + mass
         self._balance.first_moment = self._balance.first_moment + mass * position
@@ -567,4 +567,4 @@ class EffectModel:
 
 
 def _total(power: SX) -> SX:
-    return ca.sum1(ca.SX(power))
+    return ca.sum1(ca.vec(ca.SX(power)))
