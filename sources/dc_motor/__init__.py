@@ -33,7 +33,9 @@ T_FV = Quantity("T_fv", "s", "speed loop, filter time of the derivative", start=
 KP_I = Quantity("Kp_i", "V/A", "current loop, proportional gain", start=0.19, minimum=0.0)
 KI_I = Quantity("Ki_i", "V/(A.s)", "current loop, integral gain", start=94.0, minimum=0.0)
 KD_I = Quantity("Kd_i", "V.s/A", "current loop, derivative gain", minimum=0.0)
-T_FI = Quantity("T_fi", "s", "current loop, filter time of the derivative", start=1e-4, minimum=1e-6)
+T_FI = Quantity(
+    "T_fi", "s", "current loop, filter time of the derivative", start=1e-4, minimum=1e-6
+)
 T_REF = Quantity(
     "T_ref",
     "s",

@@ -6,7 +6,6 @@ from ..model import SX, Model
 from . import B_M, I_MEASURED, K_T, L_A, R_A, SHAFT, TAU, I, U
 
 
-
 def sensors(m: Model, current: SX, speed: SX, command: SX) -> tuple[SX, SX, SX]:
     """What the loops see of current, speed and command, with the effects on these signals."""
     sensed_current = current + m.balance("current_sensor", "signal", unit="A", value=current).effort

@@ -20,11 +20,11 @@ from ..quantity import Quantity
 TAU_C = Quantity(
     "tau_c", "N.m", "Coulomb friction torque, 0 = absent", start=0.5, minimum=0.0, strength=True
 )
-W_0 = Quantity(
-    "w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6
-)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
 
-EFFECT = Effect("coulomb", "Coulomb friction of a shaft.", ("rotation",), TAU_C, source="Armstrong 1991")
+EFFECT = Effect(
+    "coulomb", "Coulomb friction of a shaft.", ("rotation",), TAU_C, source="Armstrong 1991"
+)
 
 
 def law(e: EffectModel) -> None:
@@ -33,4 +33,4 @@ def law(e: EffectModel) -> None:
     velocity = e.signal("velocity")
     torque = -tau_c * ca.tanh(velocity / w_0)
     e.add(torque)
-    e.loss(-torque * velocity)
+    e.loss(-ca.dot(torque, velocity))

@@ -16,9 +16,7 @@ def rotation(m: Model, gravity: Callable[[SX], tuple[SX, SX]] | None = None) -> 
     weight, height = gravity(angle) if gravity else (0.0, 0.0)
     flange = m.balance("flange", "rotation", velocity=speed, angle=angle, load=torque)
     m.derivative(angle, speed)
-    m.derivative(
-        speed, (torque + weight - friction * speed + flange.effort) / (inertia + added)
-    )
+    m.derivative(speed, (torque + weight - friction * speed + flange.effort) / (inertia + added))
     m.output(W, speed)
     m.output(PHI, angle)
     m.port(FLANGE, torque, speed)

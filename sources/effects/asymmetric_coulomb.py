@@ -1,0 +1,54 @@
+"""Coulomb friction that differs between the two directions of rotation.
+
+    f = -f_c (1 + a s) s,   s = tanh(v / v_0),   P_loss = f_c (1 + a s) s v
+
+Friction is f_c (1 + a) forward and f_c (1 - a) backward; a = 1 is friction forward only.
+
+Not modelled: stiction; the asymmetry of viscous friction.
+
+Source: Janot, Gautier, Brunot, Data set and reference models of EMPS, Workshop on Nonlinear System
+Identification Benchmarks, 2019 (offset between the directions).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+TAU_C = Quantity(
+    "tau_c",
+    "N.m",
+    "Coulomb friction torque, mean of both directions, 0 = absent",
+    start=0.3,
+    minimum=0.0,
+    strength=True,
+)
+ASYMMETRY = Quantity(
+    "a",
+    "1",
+    "half the difference of the directions over the mean, positive: more forward",
+    start=1.0,
+    minimum=-1.0,
+    maximum=1.0,
+)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
+
+EFFECT = Effect(
+    "asymmetric_coulomb",
+    "Coulomb friction of a shaft that depends on the direction.",
+    ("rotation",),
+    TAU_C,
+    source="Janot 2019",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the friction torque."""
+    velocity = e.signal("velocity")
+    sign = ca.tanh(velocity / e.parameter(W_0))
+    torque = -e.parameter(TAU_C) * (1 + e.parameter(ASYMMETRY) * sign) * sign
+    e.add(torque)
+    e.loss(-ca.dot(torque, velocity))

@@ -1,0 +1,43 @@
+"""Cogging: the magnets' preference for some angles, without current.
+
+    f = -f_c sin(n theta + psi),   E = f_c (1 - cos(n theta + psi)) / n
+
+Conservative; n counts cycles per revolution of the shaft it is attached to, so it need not be
+an integer when that is the slow side of a gearbox.
+
+Not modelled: harmonics of the ripple.
+
+Source: Hanselman, Brushless Permanent Magnet Motor Design, 2006, ch. 4.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.angle import shaft_angle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+AMPLITUDE = Quantity(
+    "tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True
+)
+CYCLES = Quantity("n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1)
+PHASE = Quantity("psi", "rad", "phase at angle 0")
+
+EFFECT = Effect(
+    "cogging",
+    "Torque of a shaft that repeats with its angle.",
+    ("rotation",),
+    AMPLITUDE,
+    source="Hanselman 2006",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the torque."""
+    amplitude, cycles, phase = e.parameter(AMPLITUDE), e.parameter(CYCLES), e.parameter(PHASE)
+    argument = cycles * shaft_angle(e, "velocity") + phase
+    e.add(-amplitude * ca.sin(argument))
+    e.stored_energy(amplitude * (1 - ca.cos(argument)) / cycles)
+    e.loss(0)

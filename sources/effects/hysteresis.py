@@ -1,0 +1,46 @@
+"""Hysteresis of a spring: inner friction that depends on the path of its deflection.
+
+    f = -t_h z,   x_h z' = x' (1 - a |z|) where x' z > 0,   x_h z' = x' elsewhere
+    E = t_h x_h z^2 / 2,   P_loss = t_h a z^2 |x'|
+
+a as in `laws/bristle.py`. The spring is stiffer by t_h / x_h for small motions and holds up to t_h.
+
+Not modelled: dependence on load.
+
+Source: Dhaouadi, Ghorbel, Gandhi, A new dynamic model of hysteresis in harmonic drives, IEEE Trans.
+Industrial Electronics 50(6), 2003; the elasto-plastic law of Dupont et al. 2002 replaces theirs.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.bristle import bristle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+TAU_H = Quantity(
+    "tau_h", "N.m", "half width of the loop, 0 = absent", start=0.5, minimum=0.0, strength=True
+)
+LENGTH = Quantity("x_h", "rad", "deflection over which the loop turns", start=5e-4, minimum=1e-9)
+DEFLECTION = Quantity("z", "1", "state of the inner friction, -1 to 1")
+
+EFFECT = Effect(
+    "hysteresis",
+    "Inner friction of a spring.",
+    ("compliance",),
+    TAU_H,
+    source="Dhaouadi 2003",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the torque."""
+    rate, width, length = e.signal("rate"), e.parameter(TAU_H), e.parameter(LENGTH)
+    z = e.state(DEFLECTION)
+    change, slides = bristle(rate, z, ca.SX(1), length)
+    e.derivative(z, change)
+    e.add(-width * z)
+    e.stored_energy(width * length * z**2 / 2)
+    e.loss(width * slides * z**2 * ca.fabs(rate))

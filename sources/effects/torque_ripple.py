@@ -1,0 +1,41 @@
+"""Torque constant that varies with the angle: commutation ripple.
+
+    k = K (1 + r cos(n theta + psi))
+
+Torque and back-EMF use the same k, so their powers stay equal.
+
+Not modelled: harmonics of the ripple, phase currents.
+
+Source: Hanselman, Brushless Permanent Magnet Motor Design, 2006, ch. 8.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.angle import shaft_angle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+RIPPLE = Quantity(
+    "r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True
+)
+CYCLES = Quantity("n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1)
+PHASE = Quantity("psi", "rad", "phase at angle 0")
+
+EFFECT = Effect(
+    "torque_ripple",
+    "Torque constant that repeats with the angle.",
+    ("coefficient",),
+    RIPPLE,
+    needs=("speed",),
+    source="Hanselman 2006",
+    unit="N.m/A",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the variation of the constant."""
+    argument = e.parameter(CYCLES) * shaft_angle(e, "speed") + e.parameter(PHASE)
+    e.add(e.parameter(RIPPLE) * e.signal("value") * ca.cos(argument))

@@ -1,0 +1,41 @@
+"""Unbalance: a weight that is eccentric on a horizontal shaft.
+
+    f = -m_u sin(theta + psi),   E = m_u (1 - cos(theta + psi))
+
+Conservative. The inertia of the weight is counted by the load.
+
+Not modelled: centrifugal force on the bearings.
+
+Source: weight times lever arm.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.angle import shaft_angle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+MOMENT = Quantity(
+    "m_u", "N.m", "weight times its distance from the axis, 0 = absent", start=0.2, strength=True
+)
+PHASE = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0")
+
+EFFECT = Effect(
+    "unbalance",
+    "Eccentric weight on a horizontal shaft.",
+    ("rotation",),
+    MOMENT,
+    source="weight times lever arm",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the moment of the weight."""
+    moment = e.parameter(MOMENT)
+    argument = shaft_angle(e, "velocity") + e.parameter(PHASE)
+    e.add(-moment * ca.sin(argument))
+    e.stored_energy(moment * (1 - ca.cos(argument)))
+    e.loss(0)

@@ -1,0 +1,32 @@
+"""Viscous friction on top of what a component declares.
+
+    f = -b v,   P_loss = b v^2
+
+Not modelled: dependence on temperature (`temperature_drift`) or load.
+
+Source: Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+DAMPING = Quantity(
+    "b", "N.m.s/rad", "additional viscous friction, 0 = absent", start=0.05, strength=True
+)
+
+EFFECT = Effect(
+    "viscous", "Viscous friction of a shaft.", ("rotation",), DAMPING, source="Armstrong 1991"
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the friction torque."""
+    velocity = e.signal("velocity")
+    torque = -e.parameter(DAMPING) * velocity
+    e.add(torque)
+    e.loss(-ca.dot(torque, velocity))

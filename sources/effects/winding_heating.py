@@ -1,0 +1,52 @@
+"""Winding that heats up with its losses and so gains resistance.
+
+    R = R_0 (1 + alpha r_th p),   t_th p' = R i^2 - p,   temperature rise = r_th p
+    f = -(R - R_0) i,   P_loss = (R - R_0) i^2
+
+p is the copper loss behind the thermal time constant; `R_0` is the resistance at the temperature at
+which `p = 0`.
+
+Not modelled: iron and friction losses as heat sources, weaker magnets, a housing with a second time
+constant.
+
+Source: thermal model of first order, Leonhard, Control of Electrical Drives, 2001, ch. 4.
+"""
+
+from __future__ import annotations
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+R_TH = Quantity(
+    "r_th",
+    "K/W",
+    "thermal resistance of the winding to ambient, 0 = absent",
+    start=1.5,
+    minimum=0.0,
+    strength=True,
+)
+T_TH = Quantity("t_th", "s", "thermal time constant", start=60.0, minimum=1e-3)
+ALPHA = Quantity("alpha", "1/K", "temperature coefficient of resistance, copper", start=0.00393)
+HEAT = Quantity("p", "W", "copper loss behind the thermal time constant", nominal=10.0)
+RISE = Quantity("rise", "K", "temperature rise of the winding")
+
+EFFECT = Effect(
+    "winding_heating",
+    "Resistance of a winding that rises with its temperature.",
+    ("winding",),
+    R_TH,
+    needs=("resistance",),
+    source="Leonhard 2001",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the voltage across the additional resistance."""
+    current, resistance = e.signal("current"), e.signal("resistance")
+    heat = e.state(HEAT)
+    rise = e.output(RISE, e.parameter(R_TH) * heat)
+    added = resistance * e.parameter(ALPHA) * rise
+    e.derivative(heat, ((resistance + added) * current**2 - heat) / e.parameter(T_TH))
+    e.add(-added * current)
+    e.loss(added * current**2)

@@ -1,0 +1,17 @@
+"""The angle over which a periodic effect repeats."""
+
+from __future__ import annotations
+
+from ..model import SX, EffectModel
+from ..quantity import Quantity
+
+THETA = Quantity("theta", "rad", "angle of the shaft, integrated from its speed")
+
+
+def shaft_angle(e: EffectModel, speed: str) -> SX:
+    """The balance's own angle, or the integral of its signal `speed` where it offers none."""
+    if e.offers("angle"):
+        return e.signal("angle")
+    theta = e.state(THETA)
+    e.derivative(theta, e.signal(speed))
+    return theta
