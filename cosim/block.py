@@ -124,7 +124,7 @@ def check_values(where: str, variables: Sequence[Variable], value: Any) -> Vecto
         raise ValueRangeError(f"{where}: {name} takes {count} values, but {numbers.size} are given")
     bounds = [variable for variable in variables for _ in range(variable.size)]
     for variable, number in zip(bounds, numbers.tolist(), strict=True):
-        unit = f" {variable.symbol}" if variable.symbol else ""
+        unit = f" {variable.symbol}" if variable.symbol not in ("", "1") else ""
         if not math.isfinite(number):
             raise ValueRangeError(f"{where}: {variable.name} = {number} is not finite")
         low = -math.inf if variable.minimum is None else variable.minimum

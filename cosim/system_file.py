@@ -1,0 +1,120 @@
+"""Systems as TOML files, before their FMUs are opened."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError, ScenarioError
+from .provider import Provider
+from .system import System
+
+
+@dataclass(frozen=True)
+class SystemFile:
+    """A system as written in TOML, before its FMUs are opened.
+
+    Attributes:
+        path: the file, for error texts and relative .fmu paths.
+        name, text: of the system.
+        instances: name -> variant or path of an .fmu.
+        parameters: full name -> value.
+        connections: (source, target).
+    """
+
+    path: Path
+    name: str
+    text: str
+    instances: dict[str, str]
+    parameters: dict[str, Any]
+    connections: tuple[tuple[str, str], ...]
+
+    def build(
+        self, provider: Provider | None, parameters: Mapping[str, Any] | None = None
+    ) -> System:
+        """Open the FMUs and connect them.
+
+        Args:
+            provider: where variants come from.
+            parameters: full name -> value; replace those of the file.
+        """
+        system = System(self.name, provider, self.text)
+        for name, reference in self.instances.items():
+            system.add(name, reference, base=self.path.parent)
+        for source, target in self.connections:
+            system.connect(source, target)
+        for name, value in {**self.parameters, **(parameters or {})}.items():
+            system.set(name, value)
+        return system
+
+
+def read_system(path: Path | str) -> SystemFile:
+    """Read a system from TOML (docs/scenarios.md has the schema).
+
+    Raises:
+        ScenarioError: not TOML, or a wrong key or value.
+    """
+    path = Path(path)
+    table = read_toml(path)
+    unknown = set(table) - {"name", "description", "instances", "connections", "parameters"}
+    if unknown:
+        raise ScenarioError(
+            f"{path}: unknown key {', '.join(sorted(unknown))}; a system has name, description, "
+            "instances, connections and parameters"
+        )
+    instances = table.get("instances", {})
+    if not isinstance(instances, dict) or not instances:
+        raise ScenarioError(f'{path}: [instances] with name = "variant" is missing')
+    for name, reference in instances.items():
+        if not isinstance(reference, str):
+            raise ScenarioError(
+                f"{path}: instance {name!r} must be a variant or the path of an .fmu, "
+                f"not {reference!r}"
+            )
+    return SystemFile(
+        path,
+        table.get("name", path.stem),
+        table.get("description", ""),
+        dict(instances),
+        flatten(table.get("parameters", {})),
+        tuple(_arrow(path, line) for line in table.get("connections", [])),
+    )
+
+
+def _arrow(path: Path, line: Any) -> tuple[str, str]:
+    parts = [part.strip() for part in line.split("->")] if isinstance(line, str) else []
+    if len(parts) != 2 or not all(parts):
+        raise ScenarioError(
+            f'{path}: {line!r} is not a connection; write "instance.output -> instance.input"'
+        )
+    return parts[0], parts[1]
+
+
+def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
+    """`{"gearbox": {"ratio": 3}}` and `{"gearbox.ratio": 3}` alike as `{"gearbox.ratio": 3}`."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            flat.update({f"{key}.{name}": item for name, item in flatten(value).items()})
+        else:
+            flat[key] = value
+    return flat
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises:
+        ScenarioError: missing or not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ScenarioError(f"{path}: there is no such file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: is not TOML ({error})") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
