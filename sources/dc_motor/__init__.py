@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-W_REF = Quantity("w_ref", "rad/s", "set speed of the motor")
-W = Quantity("w", "rad/s", "speed of the shaft, given by what the motor drives")
+W_REF = Quantity("w_ref", "rad/s", "set speed of the motor", nominal=100.0)
+W = Quantity("w", "rad/s", "speed of the shaft, given by what the motor drives", nominal=100.0)
 TAU = Quantity("tau", "N.m", "torque on the driven side, positive accelerates it")
 I = Quantity("i", "A", "winding current, positive drives forward")  # noqa: E741
 U = Quantity("u", "V", "terminal voltage that the amplifier sets, mean over its PWM period")

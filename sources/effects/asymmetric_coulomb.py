@@ -51,4 +51,4 @@ def law(e: EffectModel) -> None:
     sign = ca.tanh(velocity / e.parameter(W_0))
     torque = -e.parameter(TAU_C) * (1 + e.parameter(ASYMMETRY) * sign) * sign
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

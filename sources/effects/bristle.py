@@ -19,6 +19,7 @@ import casadi as ca
 
 from ..effect import Effect
 from ..laws.bristle import bristle
+from ..laws.signal_effect import sized
 from ..model import EffectModel
 from ..quantity import Quantity
 
@@ -44,7 +45,7 @@ def law(e: EffectModel) -> None:
     """Add the friction torque."""
     velocity, tau_c, length = e.signal("velocity"), e.parameter(TAU_C), e.parameter(LENGTH)
     height = 1 + e.parameter(EXCESS) * ca.exp(-((velocity / e.parameter(W_S)) ** 2))
-    z = e.state(DEFLECTION)
+    z = e.state(sized(e, DEFLECTION))
     rate, slides = bristle(velocity, z, height, length)
     e.derivative(z, rate)
     damping = e.parameter(DAMPING) * (1 - slides) * velocity / length

@@ -33,4 +33,4 @@ def law(e: EffectModel) -> None:
     velocity = e.signal("velocity")
     torque = -tau_c * ca.tanh(velocity / w_0)
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

@@ -17,6 +17,7 @@ import casadi as ca
 
 from ..effect import Effect
 from ..laws.bristle import bristle
+from ..laws.signal_effect import sized
 from ..model import EffectModel
 from ..quantity import Quantity
 
@@ -38,7 +39,7 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the torque."""
     rate, width, length = e.signal("rate"), e.parameter(TAU_H), e.parameter(LENGTH)
-    z = e.state(DEFLECTION)
+    z = e.state(sized(e, DEFLECTION))
     change, slides = bristle(rate, z, ca.SX(1), length)
     e.derivative(z, change)
     e.add(-width * z)

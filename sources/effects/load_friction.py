@@ -39,4 +39,4 @@ def law(e: EffectModel) -> None:
     velocity, load = e.signal("velocity"), e.signal("load")
     torque = -e.parameter(MU) * ca.fabs(load) * ca.tanh(velocity / e.parameter(W_0))
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

@@ -33,4 +33,4 @@ def law(e: EffectModel) -> None:
     velocity = e.signal("velocity")
     torque = -e.parameter(DRAG) * velocity * ca.fabs(velocity)
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

@@ -45,4 +45,4 @@ def law(e: EffectModel) -> None:
     decay = ca.exp(-((velocity / e.parameter(W_S)) ** 2))
     torque = -e.parameter(EXCESS) * decay * ca.tanh(velocity / e.parameter(W_0))
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

@@ -14,6 +14,7 @@ load and temperature effects in robot joints, IROS 2010, reduced to one state.
 from __future__ import annotations
 
 from ..effect import Effect
+from ..laws.signal_effect import sized
 from ..model import EffectModel
 from ..quantity import Quantity
 
@@ -39,7 +40,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity, warmth = e.signal("velocity"), e.state(WARMTH)
+    velocity, warmth = e.signal("velocity"), e.state(sized(e, WARMTH))
     target = velocity**2 / (velocity**2 + e.parameter(W_N) ** 2)
     e.derivative(warmth, (target - warmth) / e.parameter(WARM_UP))
     torque = -e.parameter(COLD) * (1 - warmth) * velocity

@@ -9,8 +9,6 @@ Source: Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2.
 
 from __future__ import annotations
 
-import casadi as ca
-
 from ..effect import Effect
 from ..model import EffectModel
 from ..quantity import Quantity
@@ -29,4 +27,4 @@ def law(e: EffectModel) -> None:
     velocity = e.signal("velocity")
     torque = -e.parameter(DAMPING) * velocity
     e.add(torque)
-    e.loss(-ca.dot(torque, velocity))
+    e.loss(-torque * velocity)

@@ -15,6 +15,7 @@ Source: thermal model of first order, Leonhard, Control of Electrical Drives, 20
 from __future__ import annotations
 
 from ..effect import Effect
+from ..laws.signal_effect import sized
 from ..model import EffectModel
 from ..quantity import Quantity
 
@@ -44,8 +45,8 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the voltage across the additional resistance."""
     current, resistance = e.signal("current"), e.signal("resistance")
-    heat = e.state(HEAT)
-    rise = e.output(RISE, e.parameter(R_TH) * heat)
+    heat = e.state(sized(e, HEAT))
+    rise = e.output(sized(e, RISE), e.parameter(R_TH) * heat)
     added = resistance * e.parameter(ALPHA) * rise
     e.derivative(heat, ((resistance + added) * current**2 - heat) / e.parameter(T_TH))
     e.add(-added * current)

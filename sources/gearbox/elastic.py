@@ -40,7 +40,9 @@ SIGNED = Quantity(
     minimum=0.0,
     maximum=1.0,
 )
-TWIST = Quantity("twist", "rad", "twist, angle of the rotor over the ratio less that of the load")
+TWIST = Quantity(
+    "twist", "rad", "twist, angle of the rotor over the ratio less that of the load", nominal=1e-3
+)
 ROTOR_SPEED = Quantity("rotor_speed", "rad/s", "state: speed of the rotor", nominal=100.0)
 SMALLEST_ROTOR = 1e-9
 

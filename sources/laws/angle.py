@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..model import SX, EffectModel
 from ..quantity import Quantity
+from .signal_effect import sized
 
 THETA = Quantity("theta", "rad", "angle of the shaft, integrated from its speed")
 
@@ -12,6 +13,6 @@ def shaft_angle(e: EffectModel, speed: str) -> SX:
     """The balance's own angle, or the integral of its signal `speed` where it offers none."""
     if e.offers("angle"):
         return e.signal("angle")
-    theta = e.state(THETA)
+    theta = e.state(sized(e, THETA))
     e.derivative(theta, e.signal(speed))
     return theta
