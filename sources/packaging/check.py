@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 from fmpy.model_description import ModelDescription, ValidationError, read_model_description
 
@@ -25,6 +26,9 @@ def check(path: Path) -> list[str]:
                 return [f"{path.name}: the file {broken} in the archive is damaged"]
             names = set(archive.namelist())
             ours = json.loads(archive.read(_ENTRY)) if _ENTRY in names else None
+            text = archive.read("modelDescription.xml")
+    except KeyError:
+        return [f"{path.name}: the archive has no modelDescription.xml"]
     except (OSError, zipfile.BadZipFile) as error:
         return [f"{path.name}: not a readable .fmu archive ({error})"]
     try:
@@ -33,12 +37,12 @@ def check(path: Path) -> list[str]:
         return [f"{path.name}: {problem}" for problem in error.problems]
     except Exception as error:  # fmpy raises plain Exception for XML that it cannot read
         return [f"{path.name}: {error}"]
-    problems = _problems_of_ours(model, ours, names) if ours is not None else []
+    problems = _problems_of_ours(model, ET.fromstring(text), ours, names) if ours else []
     return [f"{path.name}: {problem}" for problem in problems]
 
 
 def _problems_of_ours(
-    model: ModelDescription, ours: dict[str, object], names: set[str]
+    model: ModelDescription, root: ET.Element, ours: dict[str, object], names: set[str]
 ) -> list[str]:
     problems = []
     for variable in model.modelVariables:
@@ -47,16 +51,18 @@ def _problems_of_ours(
         if not variable.description:
             problems.append(f"variable {variable.name!r} has no description")
     python = any(name.startswith("resources/slavemodule") for name in names)
-    interfaces = [model.coSimulation] if python else [model.coSimulation, model.modelExchange]
-    for interface, title in zip(interfaces, ("co-simulation", "model exchange"), strict=False):
+    three = root.get("fmiVersion", "").startswith("3")
+    wanted = [f"canGetAndSetFMU{'S' if three else 's'}tate"]
+    wanted.append(f"canSerializeFMU{'S' if three else 's'}tate")
+    if not python:
+        wanted.append("providesDirectionalDerivative" + "s" * three)
+    for title in ("CoSimulation",) if python else ("CoSimulation", "ModelExchange"):
+        interface = root.find(title)
         if interface is None:
             problems.append(f"{title} is missing")
             continue
-        wanted = ["canGetAndSetFMUstate", "canSerializeFMUstate"]
-        if not python:
-            wanted.append("providesDirectionalDerivative")
         problems += [
-            f"{title}: {flag} is not declared" for flag in wanted if not getattr(interface, flag)
+            f"{title}: {flag} is not declared" for flag in wanted if interface.get(flag) != "true"
         ]
     problems += [
         f"output {unknown.variable.name!r} declares no dependencies"

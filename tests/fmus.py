@@ -1,0 +1,127 @@
+"""FMUs for tests: built once per variant, driven through fmpy alone."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Slave
+
+from sources.packaging.build import build
+
+OUT = Path(__file__).parent.parent / "fmus"
+_HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
+
+
+@lru_cache(maxsize=None)
+def fmu(name: str, kind: str = "native", fmi: int = 2) -> Path:
+    return build(name, out=OUT, kind=kind, fmi=fmi)  # type: ignore[arg-type]
+
+
+@lru_cache(maxsize=None)
+def _unpacked(path: Path) -> tuple[Any, Path]:
+    holder = tempfile.TemporaryDirectory(prefix="cosim-test-", ignore_cleanup_errors=True)
+    _HOLDERS.append(holder)  # removed when the interpreter ends
+    folder = Path(holder.name)
+    fmpy.extract(str(path), str(folder))
+    return fmpy.read_model_description(str(path), validate=False), folder
+
+
+class Slave:
+    """A co-simulation instance with values by name; `messages` holds what it logged."""
+
+    def __init__(
+        self,
+        path: Path,
+        values: Mapping[str, float] | None = None,
+        *,
+        start: float = 0.0,
+        initialize: bool = True,
+        token: str | None = None,
+    ) -> None:
+        self.description, folder = _unpacked(path)
+        self.version = 3 if self.description.fmiVersion.startswith("3") else 2
+        self.messages: list[str] = []
+        arguments = {
+            "guid": token or self.description.guid,
+            "unzipDirectory": str(folder),
+            "modelIdentifier": self.description.coSimulation.modelIdentifier,
+            "instanceName": "x",
+        }
+        self.vr = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.start = start
+        if self.version == 2:
+
+            def log(
+                _environment: Any, _name: Any, _status: Any, _category: Any, text: bytes
+            ) -> None:
+                self.messages.append(text.decode())
+
+            self._callbacks = fmi2CallbackFunctions()
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
+            self.fmu = FMU2Slave(**arguments)
+            self.fmu.instantiate(callbacks=self._callbacks)
+        else:
+            self.fmu = FMU3Slave(**arguments)
+            self.fmu.instantiate()
+        if initialize:
+            self.initialize(values)
+
+    def initialize(self, values: Mapping[str, float] | None = None) -> None:
+        if self.version == 2:
+            self.fmu.setupExperiment(startTime=self.start)
+            self.set(values or {})
+            self.fmu.enterInitializationMode()
+        else:
+            self.set(values or {})
+            self.fmu.enterInitializationMode(startTime=self.start)
+        self.fmu.exitInitializationMode()
+
+    def set(self, values: Mapping[str, float]) -> None:
+        real = {k: v for k, v in values.items() if k != "solver.method"}
+        references, numbers = [self.vr[k] for k in real], [float(v) for v in real.values()]
+        if self.version == 2:
+            if real:
+                self.fmu.setReal(references, numbers)
+            if "solver.method" in values:
+                self.fmu.setInteger([self.vr["solver.method"]], [int(values["solver.method"])])
+        else:
+            if real:
+                self.fmu.setFloat64(references, numbers)
+            if "solver.method" in values:
+                self.fmu.setInt64([self.vr["solver.method"]], [int(values["solver.method"])])
+
+    def get(self, names: Iterable[str]) -> np.ndarray:
+        references = [self.vr[name] for name in names]
+        if not references:
+            return np.zeros(0)
+        read: Callable[[list[int]], list[float]] = (
+            self.fmu.getReal if self.version == 2 else self.fmu.getFloat64
+        )
+        return np.array(read(references))
+
+    def step(self, t: float, h: float) -> None:
+        self.fmu.doStep(t, h)
+
+    def names(self, causality: str) -> list[str]:
+        return [
+            v.name
+            for v in self.description.modelVariables
+            if v.causality == causality and v.type in ("Real", "Float64")
+        ]
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+    def __enter__(self) -> Slave:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fmu.freeInstance()

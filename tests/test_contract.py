@@ -1,0 +1,281 @@
+"""What every FMU of the catalogue promises, checked over all of them through fmpy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sources.function import Oracle
+from sources.packaging import catalog
+from sources.packaging.check import check
+from sources.variant import build_model
+from tests.fmus import Slave, fmu
+
+NAMES = catalog.names()
+PLAIN = [name for name in NAMES if "+" not in name]
+WITH_EFFECT = [name for name in NAMES if "+" in name]
+H = 1e-3
+
+
+def exercise(slave: Slave, seed: int) -> dict[str, float]:
+    """Inputs of their nominal magnitude, off the symmetric points where errors hide."""
+    rng = np.random.default_rng(seed)
+    return {
+        v.name: float(v.start) + rng.uniform(0.2, 0.8) * ((v.nominal and float(v.nominal)) or 0.1)
+        for v in slave.description.modelVariables
+        if v.causality == "input"
+    }
+
+
+def run(slave: Slave, steps: int = 12, *, first: int = 0, seed: int = 1) -> np.ndarray:
+    """Outputs over communication steps, inputs changing on the way."""
+    outputs = slave.names("output")
+    rows = []
+    for k in range(first, first + steps):
+        slave.set(exercise(slave, seed + k // 5))
+        slave.step(k * H, H)
+        rows.append(slave.get(outputs))
+    return np.array(rows)
+
+
+@pytest.fixture(params=["native", "python"])
+def kind(request: pytest.FixtureRequest) -> Iterator[str]:
+    yield request.param
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_check_finds_no_problem(name: str, kind: str) -> None:
+    assert check(fmu(name, kind)) == []
+    if kind == "native":
+        assert check(fmu(name, kind, 3)) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_native_is_python(name: str) -> None:
+    # same operations in the same order, same C library: not one bit may differ
+    with Slave(fmu(name)) as native, Slave(fmu(name, "python")) as python:
+        np.testing.assert_array_equal(run(native), run(python))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fmi_3_is_fmi_2(name: str) -> None:
+    with Slave(fmu(name)) as two, Slave(fmu(name, fmi=3)) as three:
+        np.testing.assert_array_equal(run(two), run(three))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reset_is_fresh_and_instances_are_independent(name: str, kind: str) -> None:
+    path = fmu(name, kind)
+    with Slave(path) as one, Slave(path) as other:
+        expected = run(one)
+        run(other, seed=7)
+        one.fmu.reset()
+        one.initialize()
+        run(other, first=12, seed=9)
+        np.testing.assert_array_equal(run(one), expected)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_saved_state_restores_exactly(name: str, kind: str) -> None:
+    path = fmu(name, kind)
+    with Slave(path) as slave, Slave(path) as other:
+        run(slave, 6)
+        state = slave.fmu.getFMUState()
+        expected = run(slave, 6, first=6)
+        slave.fmu.setFMUState(state)
+        np.testing.assert_array_equal(run(slave, 6, first=6), expected)
+        saved = slave.fmu.serializeFMUState(state)
+        run(other, 3)
+        other.fmu.setFMUState(other.fmu.deSerializeFMUstate(saved))
+        np.testing.assert_array_equal(run(other, 6, first=6), expected)
+        slave.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_directional_derivatives_are_difference_quotients(name: str) -> None:
+    """Along a random direction of inputs, states and parameters at once.
+
+    A central difference errs by truncation (sharp laws) or by rounding, depending on its
+    step, so the best of six steps counts. 1e-6 of the largest terms is what the best step reaches
+    with margin (rounding 1e-16 over a step of 1e-6, times cancellation); a wrong formula errs by 1.
+    """
+    oracle = Oracle(build_model(name))
+    rng = np.random.default_rng(3)
+    with Slave(fmu(name)) as slave:
+        values = exercise(slave, 3)
+        point = oracle.arguments(values, 0.1)
+        seeds = [np.zeros(1), *(rng.normal(size=a.size) * (np.abs(a) + 0.1) for a in point[1:])]
+        exact = _flat(oracle.functions.directional(*point, *seeds))
+        size = np.abs(exact) + np.abs(_flat(oracle.functions.outputs(*point))) + 1e-6
+        best = np.full(exact.size, np.inf)
+        for step in np.logspace(-3, -8, 6):
+            plus, minus = (
+                _flat(
+                    oracle.functions.outputs(
+                        *(a + sign * step * d for a, d in zip(point, seeds, strict=True))
+                    )
+                )
+                for sign in (1, -1)
+            )
+            best = np.minimum(best, np.abs(exact - (plus - minus) / (2 * step)) / size)
+        np.testing.assert_array_less(best, 1e-6)
+        # and the FMU gives what the oracle gives
+        inputs, outputs = slave.names("input"), slave.names("output")
+        if inputs and outputs:
+            slave.set(values)
+            direction = rng.normal(size=len(inputs))
+            got = slave.fmu.getDirectionalDerivative(
+                [slave.vr[n] for n in outputs], [slave.vr[n] for n in inputs], list(direction)
+            )
+            start = oracle.arguments(values)
+            seeds = [np.zeros_like(np.atleast_1d(a)) for a in start]
+            seeds[3] = direction
+            _, expected = oracle.functions.directional(*start, *seeds)
+            # the same operations; only the C library's transcendental functions may round apart
+            np.testing.assert_allclose(got, np.asarray(expected).ravel(), rtol=1e-12, atol=1e-300)
+
+
+def _flat(results: object) -> np.ndarray:
+    return np.concatenate([np.asarray(r).ravel() for r in results])  # type: ignore[attr-defined]
+
+
+def _random_point(oracle: Oracle, slave: Slave, seed: int) -> dict[str, float]:
+    rng = np.random.default_rng(seed)
+    values: dict[str, float] = exercise(slave, seed)
+    for variable in oracle.model.of_role("state") + oracle.model.of_role("discrete"):
+        magnitude = variable.quantity.nominal or 0.1
+        values[variable.name] = variable.start + 0.3 * magnitude * float(rng.normal())
+    return values
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if build_model(n).component.energy])
+def test_energy_balance_closes(name: str) -> None:
+    """dE/dt = P_in - P_loss at random states; an identity, so only rounding may remain."""
+    oracle = Oracle(build_model(name))
+    with Slave(fmu(name)) as slave:
+        for seed in range(20):
+            defect, largest = oracle.energy_defect(_random_point(oracle, slave, seed))
+            # 1e-9 of the largest single term inside: sums of hundreds of terms that cancel
+            assert abs(defect) <= 1e-9 * max(largest, 1e-6), (seed, defect, largest)
+
+
+@pytest.mark.parametrize("name", WITH_EFFECT)
+def test_strength_0_is_absence(name: str) -> None:
+    model = build_model(name)
+    strengths = [v.name for v in model.of_role("parameter") if v.of_effect and v.quantity.strength]
+    assert strengths, "an effect without a strength"
+    absent = dict.fromkeys(strengths, 0.0)
+    with Slave(fmu(name), absent) as null, Slave(fmu(name.split("+")[0])) as base:
+        shared = base.names("output")
+        full, plain = run(null), run(base)
+        columns = [null.names("output").index(output) for output in shared]
+        np.testing.assert_array_equal(full[:, columns], plain)
+
+
+@pytest.mark.parametrize("name", WITH_EFFECT)
+def test_effect_has_an_effect(name: str) -> None:
+    """The negative twin of `strength 0`: with its default strength something moves."""
+    model = build_model(name)
+    oracle = Oracle(model)
+    strengths = [v for v in model.of_role("parameter") if v.of_effect and v.quantity.strength]
+    with Slave(fmu(name)) as slave:
+        moved = 0.0
+        for seed in range(8):
+            point: dict[str, float] = _random_point(oracle, slave, seed)
+            on: Mapping[str, float] = {**point, **{v.name: v.start for v in strengths}}
+            off: Mapping[str, float] = {**point, **dict.fromkeys((v.name for v in strengths), 0.0)}
+            t = 0.01 * seed
+            for values in (oracle.outputs, oracle.derivatives):
+                a, b = values(on, t), values(off, t)
+                moved = max(moved, *(abs(a[k] - b[k]) for k in a), 0.0)
+            for update in oracle.functions.updates:
+                a, b = (np.asarray(update(*oracle.arguments(v, t))) for v in (on, off))
+                moved = max(moved, float(np.abs(a - b).max(initial=0.0)))
+        assert moved > 0.0
+
+
+def _at_20_ms(name: str, cuts: list[float], shrink: float = 1.0) -> np.ndarray:
+    path = fmu(name)
+    with Slave(path, initialize=False) as slave:
+        values = {}
+        if "solver.step" in slave.vr:
+            step = build_model(name).solver.step
+            values["solver.step"] = min(step, cuts[1] - cuts[0]) * shrink
+        slave.initialize(values)
+        slave.set(exercise(slave, 5))
+        for left, right in pairwise(cuts):
+            slave.step(left, right - left)
+        return slave.get(slave.names("output"))
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_result_does_not_depend_on_how_an_interval_is_cut(name: str) -> None:
+    """Inputs held: 20 ms in one piece, in equal and in unequal pieces.
+
+    Cuts that do not fall on internal steps change those and with them the solver's error. So the
+    measure is that error, estimated by halving the internal step: pieces may differ by at most four
+    times as much (plus rounding). A tick lost or doubled at a cut, or a state not carried over,
+    shows as more.
+    """
+    whole = _at_20_ms(name, [0.0, 0.02])
+    error = np.abs(whole - _at_20_ms(name, [0.0, 0.02], 0.5))
+    largest = np.abs(whole).max(initial=0.0)
+    for cuts in ([0.0, 0.01, 0.02], [0.0, 0.0037, 0.0041, 0.0163, 0.02]):
+        difference = np.abs(_at_20_ms(name, cuts) - whole)
+        bound = 4 * error + 1e-9 * (np.abs(whole) + largest) + 1e-15
+        np.testing.assert_array_less(difference, bound)
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_nan_is_refused_by_name(name: str, kind: str) -> None:
+    with Slave(fmu(name, kind)) as slave:
+        inputs = slave.names("input")
+        if not inputs:
+            inputs = slave.names("parameter")
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.set({inputs[0]: float("nan")})
+        text = " ".join(slave.messages)
+        assert inputs[0] in text and "time" in text and "nan" in text
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_parameter_out_of_bounds_is_refused(name: str, kind: str) -> None:
+    with Slave(fmu(name, kind), initialize=False) as slave:
+        bounded = [
+            v
+            for v in slave.description.modelVariables
+            if v.causality == "parameter" and v.min is not None and v.type == "Real"
+        ]
+        if not bounded:
+            assert not build_model(name).of_role("state")
+            return
+        variable = bounded[0]
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.set({variable.name: float(variable.min) - 1.0})
+        assert any(variable.name in text and "outside" in text for text in slave.messages)
+
+
+@pytest.mark.parametrize("name", PLAIN[:1])
+def test_wrong_token_is_refused(name: str) -> None:
+    with pytest.raises(Exception, match="instantiate"):
+        Slave(fmu(name), token="{00000000-0000-0000-0000-000000000000}")
+
+
+@pytest.mark.parametrize("name", PLAIN[:3])
+def test_zero_length_calls_are_legal(name: str) -> None:
+    with Slave(fmu(name)) as slave:
+        library = slave.fmu
+        for function in (
+            library.fmi2GetReal,
+            library.fmi2SetReal,
+            library.fmi2GetInteger,
+            library.fmi2SetInteger,
+            library.fmi2GetBoolean,
+            library.fmi2SetBoolean,
+            library.fmi2GetString,
+            library.fmi2SetString,
+        ):
+            function(library.component, None, 0, None)
