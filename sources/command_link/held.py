@@ -1,0 +1,31 @@
+"""Commands are read at a fixed rate and held in between.
+
+    v_d(t) = v_set(k T)   for   k T <= t < (k + 1) T,   and so on for the others
+
+Not modelled: latency, jitter.
+
+Source: rig sheet mobile_manipulator: commands at 100 Hz, held.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..model import Model
+from ..quantity import Quantity
+from . import commands, deliver
+
+LEVEL = 1
+T = Quantity("T", "s", "period of the commands", 0.01, minimum=1e-6, variability="fixed")
+HELD = Quantity("held", "1", "command v_d, w_d, xd_d, yd_d, phi_d (SI) at the last tick", size=5)
+STARTED = Quantity("started", "1", "1 once the first command is read")
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    now = commands(m)
+    clock = m.clock("command", m.parameter(T))
+    held, started = m.discrete(HELD), m.discrete(STARTED)
+    m.update(clock, held, now)
+    m.update(clock, started, ca.SX(1.0))
+    deliver(m, ca.if_else(started > 0, held, now))

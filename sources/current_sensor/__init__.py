@@ -1,0 +1,33 @@
+"""Sensor of an armature current."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..component import Component, Solver
+from ..model import Model
+from ..quantity import Quantity
+
+SX = Any
+
+I = Quantity("i", "A", "current, positive drives forward")  # noqa: E741 - the field's symbol
+I_MEAS = Quantity("i_meas", "A", "measured current")
+BANDWIDTH = Quantity("bandwidth", "Hz", "corner frequency", 2000.0, minimum=1e-3)
+I_F = Quantity("i_f", "A", "current after the sensor's low pass")
+
+COMPONENT = Component(
+    "current_sensor",
+    "Sensor of an armature current.",
+    device="mir250",
+    source="digital twin paper, current sensor (first order, 2 kHz)",
+    energy=False,
+)
+SOLVER = Solver("rodas3", step=5e-5)
+
+
+def low_pass(m: Model, current: SX) -> SX:
+    """The current behind a first-order low pass."""
+    filtered = m.state(I_F)
+    m.derivative(filtered, 2.0 * math.pi * m.parameter(BANDWIDTH) * (current - filtered))
+    return filtered

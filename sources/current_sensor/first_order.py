@@ -1,0 +1,25 @@
+"""Sensor with a first-order low pass.
+
+    i_meas' = 2 pi f (i - i_meas)
+
+f = 2 kHz gives a time constant of 79.6 us.
+
+Not modelled: sampling, resolution (effect `quantization`).
+
+Source: digital twin paper, current sensor block.
+"""
+
+from __future__ import annotations
+
+from ..model import Model
+from . import I_MEAS, SOLVER, I, low_pass
+
+LEVEL = 1
+__all__ = ["SOLVER", "equations"]
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    current = low_pass(m, m.input(I))
+    current += m.balance("current", "signal", unit="A", value=current).effort
+    m.output(I_MEAS, current)

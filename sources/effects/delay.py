@@ -1,0 +1,58 @@
+"""Transport delay: the signal arrives some time later.
+
+    y(t) = v(t - t_d)
+
+The past is sampled on a grid of `period`, or t_d / 62 where that is longer, and interpolated
+linearly; at the grid points the delayed signal is exact. Before the start the signal is taken as
+constant. A signal that is held over a communication step is delayed as it is held.
+
+Not modelled: jitter, lost or reordered messages.
+
+Source: textbook; for the latency of a robot's command interface see the digital twin paper.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.history import NEVER, History
+from ..model import EffectModel
+from ..quantity import Quantity
+
+SAMPLES = 64
+T_D = Quantity(
+    "t_d",
+    "s",
+    "delay, 0 = absent",
+    start=0.03,
+    minimum=0.0,
+    maximum=100.0,
+    strength=True,
+    variability="fixed",
+)
+PERIOD = Quantity(
+    "period",
+    "s",
+    "shortest distance of the samples of the past",
+    start=1e-3,
+    minimum=1e-6,
+    variability="fixed",
+)
+
+EFFECT = Effect(
+    "delay",
+    "Transport delay of a signal.",
+    ("signal", "bundle", "pose", "point"),
+    T_D,
+    source="textbook",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Replace the signal by its past."""
+    t_d, period = e.parameter(T_D), e.parameter(PERIOD)
+    value = e.signal("value")
+    grid = ca.if_else(t_d > 0, ca.fmax(period, t_d / (SAMPLES - 2)), NEVER)
+    past = History(e, "past", value, unit=e.unit, period=grid, slots=SAMPLES)
+    e.add(ca.if_else(t_d > 0, past.at(t_d) - value, 0.0))

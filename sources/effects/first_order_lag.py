@@ -1,0 +1,59 @@
+"""First-order lag of a signal.
+
+    t_lag y' = v - y
+
+It starts settled: the state is y less the signal's value at the first tick of a 1 s clock (at once
+if the run starts at t = 0). A lag that is short against the step of an explicit solver
+(t_lag < solver.step / 2.7) is unstable there; the signal components use an implicit one.
+
+Not modelled: higher order.
+
+Source: textbook.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.history import NEVER
+from ..laws.signal_effect import in_unit, sized
+from ..model import EffectModel
+from ..quantity import Quantity
+
+T_LAG = Quantity(
+    "t_lag",
+    "s",
+    "time constant, 0 = absent",
+    start=0.02,
+    minimum=0.0,
+    strength=True,
+    variability="fixed",
+)
+CHANGE = Quantity("change", "1", "lagged change of the signal since the start")
+ORIGIN = Quantity("origin", "1", "value of the signal at the start")
+STARTED = Quantity("started", "1", "1 once the start value is taken")
+
+EFFECT = Effect(
+    "first_order_lag",
+    "First-order lag of a signal.",
+    ("signal", "bundle", "pose", "point"),
+    T_LAG,
+    source="textbook",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Replace the signal by its lagged copy."""
+    t_lag = e.parameter(T_LAG)
+    value = e.signal("value")
+    change = e.state(in_unit(e, sized(e, CHANGE)))
+    origin = e.discrete(in_unit(e, sized(e, ORIGIN)))
+    started = e.discrete(STARTED)
+    clock = e.clock("start", ca.if_else(t_lag > 0, 1.0, NEVER))
+    e.update(clock, origin, ca.if_else(started > 0, origin, value))
+    e.update(clock, started, ca.SX(1.0))
+    active = ca.logic_and(t_lag > 0, started > 0)
+    rate = (value - origin - change) / ca.if_else(t_lag > 0, t_lag, 1.0)
+    e.derivative(change, ca.if_else(active, rate, 0.0))
+    e.add(ca.if_else(active, origin + change - value, 0.0))

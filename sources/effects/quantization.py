@@ -1,0 +1,31 @@
+"""Finite resolution of a signal: rounding to the nearest step.
+
+    y = q floor(v / q + 1/2)
+
+Not modelled: missing codes, limits of the range.
+
+Source: textbook.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.signal_effect import in_unit
+from ..model import EffectModel
+from ..quantity import Quantity
+
+STEP = Quantity("step", "1", "resolution, 0 = absent", start=0.01, minimum=0.0, strength=True)
+
+EFFECT = Effect(
+    "quantization", "Finite resolution of a signal.", ("signal", "point"), STEP, source="textbook"
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the rounding."""
+    step = e.parameter(in_unit(e, STEP))
+    value = e.signal("value")
+    divisor = ca.if_else(step > 0, step, 1.0)
+    e.add(ca.if_else(step > 0, step * ca.floor(value / divisor + 0.5) - value, 0.0))

@@ -1,0 +1,49 @@
+"""Sample and hold: the signal is read at a fixed rate and kept in between.
+
+    y(t) = v(k t_s)   for   k t_s <= t < (k + 1) t_s
+
+Not modelled: jitter of the sampling.
+
+Source: textbook.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.history import NEVER
+from ..laws.signal_effect import in_unit, sized
+from ..model import EffectModel
+from ..quantity import Quantity
+
+T_S = Quantity(
+    "t_s",
+    "s",
+    "sample period, 0 = absent",
+    start=0.01,
+    minimum=0.0,
+    strength=True,
+    variability="fixed",
+)
+HELD = Quantity("held", "1", "value at the last sample")
+STARTED = Quantity("started", "1", "1 once the first sample is taken")
+
+EFFECT = Effect(
+    "sample_hold",
+    "Sample and hold of a signal.",
+    ("signal", "bundle", "pose", "point"),
+    T_S,
+    source="textbook",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Replace the signal by its last sample."""
+    t_s = e.parameter(T_S)
+    value = e.signal("value")
+    held, started = e.discrete(in_unit(e, sized(e, HELD))), e.discrete(STARTED)
+    clock = e.clock("sample", ca.if_else(t_s > 0, t_s, NEVER))
+    e.update(clock, held, value)
+    e.update(clock, started, ca.SX(1.0))
+    e.add(ca.if_else(ca.logic_and(t_s > 0, started > 0), held - value, 0.0))

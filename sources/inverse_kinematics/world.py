@@ -1,0 +1,28 @@
+"""Motor set speeds from the set speeds in world axes and the set heading.
+
+    w_r_ref = (N / r) (cos(phi_d) xd_d + sin(phi_d) yd_d + a w_d)
+    w_l_ref = (N / r) (cos(phi_d) xd_d + sin(phi_d) yd_d - a w_d),   a = track / 2
+
+The set heading is used, not the measured one, so a heading error does not feed back. The sideways
+part -sin(phi_d) xd_d + cos(phi_d) yd_d of the command is lost.
+
+Not modelled: limits; the controller's r and track need not be the true ones.
+
+Source: digital twin paper, Eq 1.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..model import Model
+from . import PHI_D, V_D, W_D, XD_D, YD_D, motor_speeds
+
+LEVEL = 1
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    m.input(V_D)
+    w_d, xd_d, yd_d, phi_d = m.input(W_D), m.input(XD_D), m.input(YD_D), m.input(PHI_D)
+    motor_speeds(m, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d, w_d)

@@ -1,0 +1,45 @@
+"""Speeds commanded in world axes together with a heading, the input of the paper's Eq 1.
+
+    chi' = kappa(t) s(t) + turn(t) + w_set,   phi_d = chi - crab,   w_d = chi'
+    xd_d = s cos(chi) + v_set cos(phi_d),   yd_d = s sin(chi) + v_set sin(phi_d)
+    v_d = cos(phi_d) xd_d + sin(phi_d) yd_d
+
+chi is the course, the direction of the path; `crab` is the angle by which the heading is commanded
+to lag behind it. A base that cannot move sideways loses the part s sin(crab) of the command.
+
+Not modelled: limits of the robot.
+
+Source: digital twin paper, trajectory block and Eq 1.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..model import Model
+from ..quantity import Quantity
+from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D, profile
+
+LEVEL = 1
+CRAB = Quantity("crab", "rad", "angle from the set heading to the course, positive to the left")
+__all__ = ["SOLVER", "equations"]
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    v_set, w_set = m.input(V_SET), m.input(W_SET)
+    now, crab = profile(m), m.parameter(CRAB)
+    speed = now.speed
+    speed += m.balance("speed", "signal", unit="m/s", value=speed).effort
+    w_d = now.curvature * now.speed + now.turn + w_set
+    w_d += m.balance("yaw_rate", "signal", unit="rad/s", value=w_d).effort
+    phi_d = m.state(HEADING)
+    m.derivative(phi_d, w_d)
+    course = phi_d + crab
+    xd_d = speed * ca.cos(course) + v_set * ca.cos(phi_d)
+    yd_d = speed * ca.sin(course) + v_set * ca.sin(phi_d)
+    m.output(V_D, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d)
+    m.output(W_D, w_d)
+    m.output(XD_D, xd_d)
+    m.output(YD_D, yd_d)
+    m.output(PHI_D, phi_d)
