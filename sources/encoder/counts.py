@@ -18,6 +18,7 @@ Source: rig sheets motor_bench, crawler, mobile_manipulator (count difference ov
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import casadi as ca
 
@@ -27,6 +28,7 @@ from ..model import Model
 from ..quantity import Quantity
 from . import PHI, PHI_MEAS, W_MEAS, W
 
+SX = Any
 LEVEL = 1
 SOLVER = Solver("rk4", step=1e-3)
 SAMPLES = 10  # of the angle per window
@@ -57,7 +59,7 @@ def equations(m: Model) -> None:
         m, "angle", theta, unit="rad", period=window / SAMPLES, slots=SAMPLES + 2, slope=w
     )
 
-    def counts(angle: ca.SX) -> ca.SX:
+    def counts(angle: SX) -> SX:
         return ca.floor(angle / count + phase)
 
     speed = count * (counts(theta) - counts(past.at(window))) / window

@@ -1,0 +1,22 @@
+"""Exact positions of the markers.
+
+    [x_m; y_m]_k = R(phi_frame) ([x; y] + R(phi) [x_b; y_b]_k) + [x_frame; y_frame]
+
+Not modelled: noise, perspective, height of the markers.
+
+Source: rigid-body geometry; crawler paper (markers M1 to M5).
+"""
+
+from __future__ import annotations
+
+from ..model import Model
+from . import X_M, Y_M, markers
+
+LEVEL = 0
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    x, y = markers(m)
+    m.output(X_M, x)
+    m.output(Y_M, y)
