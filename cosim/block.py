@@ -35,12 +35,14 @@ class Part:
         references: value references.
         buffer: the values as C sees them; for `Float64` a view of the block's values.
         slots: positions of these values in the block.
+        arguments: what a get or set call takes after the instance.
     """
 
     type: str
     references: NDArray[np.uint32]
     buffer: NDArray[Any]
     slots: slice | NDArray[np.intp]
+    arguments: tuple[Any, ...]
 
 
 class Block:
@@ -81,17 +83,19 @@ class Block:
                 if whole and type_ == "Float64"
                 else np.zeros(len(slots), dtype=DTYPES[type_])
             )
+            numbers = np.array(references, dtype=np.uint32)
             yield Part(
                 type_,
-                np.array(references, dtype=np.uint32),
+                numbers,
                 buffer,
                 slice(0, offset) if whole else np.array(slots, dtype=np.intp),
+                self._instance.binding.values_arguments(numbers, buffer),
             )
 
     def get(self) -> Vector:
         """Fetch the values from the FMU."""
         for part in self.parts:
-            self._instance.call_values("GET", part)
+            self._instance.get_part(part)
             if part.buffer is not self.values:
                 self.values[part.slots] = part.buffer
         return self.values
@@ -103,7 +107,7 @@ class Block:
         for part in self.parts:
             if part.buffer is not self.values:
                 part.buffer[:] = self.values[part.slots]
-            self._instance.call_values("SET", part)
+            self._instance.set_part(part)
 
 
 def check_values(where: str, variables: Sequence[Variable], value: Any) -> Vector:

@@ -112,6 +112,8 @@ class Instance:
         for name, signature in self.binding.OPTIONAL.items():
             if hasattr(library, name):
                 self._functions[name] = self._prototype(library, name, signature)
+        self._step = self._functions[f"fmi{self.binding.version}DoStep"]
+        self._step_arguments = self.binding.step_arguments()
         self._key = logs.new_key()
         address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
@@ -190,17 +192,21 @@ class Instance:
         if status > 1:
             raise self.failure(what, status)
 
-    def call_values(self, direction: str, part: Part) -> None:
-        """One get or set call of the values of a block's part."""
-        name = getattr(self.binding, direction)[part.type]
-        if not part.references.size:
-            return
-        self._call(
-            f"{'setting' if direction == 'SET' else 'getting'} "
-            f"{self._names(part.references, part.type)}",
-            name,
-            *self.binding.values_arguments(part.references, part.buffer),
-        )
+    def get_part(self, part: Part) -> None:
+        """One get call for the values of a block's part."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
+        if status > 1:
+            raise self.failure(f"getting {self._names(part.references, part.type)}", status)
+
+    def set_part(self, part: Part) -> None:
+        """One set call for the values of a block's part."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
+        if status > 1:
+            raise self.failure(f"setting {self._names(part.references, part.type)}", status)
 
     def _names(self, references: NDArray[np.uint32], type_: str) -> str:
         wanted = {int(reference) for reference in references}
@@ -262,19 +268,12 @@ class Instance:
 
     def step(self, time: float, size: float) -> None:
         """Go from `time` to `time + size`."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
-        self._call(
-            f"a step of {size:.9g} s",
-            f"fmi{self.binding.version}DoStep",
-            time,
-            size,
-            *self.binding.step_arguments(),
-        )
-        self.check_stopped()
-        self.time = time + size
-
-    def check_stopped(self) -> None:
-        """Raise if the FMU asked for the end of the simulation in its last step."""
+        status = self._step(self.address, time, size, *self._step_arguments)
+        if status > 1:
+            raise self.failure(f"a step of {size:.9g} s", status)
         if self.binding.stopped():
             messages = logs.take(self._key)
             raise FmuCallError(
@@ -282,6 +281,7 @@ class Instance:
                 + _tail(messages),
                 messages,
             )
+        self.time = time + size
 
     def terminate(self) -> None:
         """End the run; values can still be read."""

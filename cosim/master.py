@@ -236,6 +236,7 @@ class _Run:
         self.bond_energy = [0.0] * len(self.layout.bonds)
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.index = 0
+        self.instants: list[float] = times.tolist()
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -314,7 +315,7 @@ class _Run:
             case Op.GET:
                 self.outputs[a].get()
             case Op.STEP:
-                self.instances[a].step(float(self.times[self.index]), self.master.step)
+                self.instances[a].step(self.instants[self.index], self.master.step)
             case Op.COPY:
                 values[layout.copy_target[a:b]] = (
                     values[layout.copy_source[a:b]] * layout.copy_gain[a:b]
