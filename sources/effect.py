@@ -45,6 +45,7 @@ KINDS: dict[str, Kind] = {
             angle="angle of the shaft [rad]",
             load="torque transmitted through the shaft [N.m]",
             normal="normal force that presses the friction partners together [N]",
+            radius="radius of the wheel on the shaft [m]",
         ),
     ),
     "translation": Kind(

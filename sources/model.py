@@ -65,6 +65,8 @@ class Balance:
     """The sum of an equation that effects may add to.
 
     Attributes:
+        group: name shared with the like balances of parts that share parameters
+            (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
         effort: what the attached effects add (scalar or vector SX; 0 without effects).
         mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
             rotational inertia about the reference point (3x3) [kg.m2]; only of kind `body`.
@@ -75,6 +77,7 @@ class Balance:
     unit: str
     signals: dict[str, SX]
     effort: SX
+    group: str = ""
     mass: SX = 0.0
     first_moment: SX = None
     inertia: SX = None
@@ -109,6 +112,7 @@ class Model:
         values: Mapping[str, Any] | None = None,
         attachments: tuple[Attachment, ...] = (),
         slots: Mapping[str, str] | None = None,
+        device: str = "",
         prefix: str = "",
         parent: Model | None = None,
         of_effect: bool = False,
@@ -119,6 +123,7 @@ class Model:
         self.prefix = prefix
         self.values = dict(values or {})
         self.slots = dict(slots or {})
+        self.device = device
         self.solver = Solver()
         self._root: Model = parent._root if parent else self
         if parent is None:
@@ -132,7 +137,7 @@ class Model:
             self.stored: list[SX] = []
             self.losses: list[tuple[str, SX]] = []
             self.inflows: list[SX] = []
-            self._attached: set[str] = set()
+            self._attached: dict[str, str] = {}  # spelling of an attachment -> balance or group
             self._vectors: dict[str, SX] = {}
             self.input_rates: dict[str, SX] = {}
 
@@ -207,6 +212,13 @@ class Model:
         local (a wheel) before what couples everything (the body).
         """
         return self._declare(quantity, "state")
+
+    def eliminate_last(self, *states: SX) -> None:
+        """Move states behind all others declared so far, e.g. a body's behind its wheels'."""
+        for state in states:
+            for index in range(state.numel()):
+                name = state[index].name()
+                self._root.variables[name] = self._root.variables.pop(name)
 
     def discrete(self, quantity: Quantity) -> SX:
         """Declare a value that only an `update` of a clock changes."""
@@ -297,21 +309,28 @@ class Model:
             effort = ca.SX.zeros(expressions[declared.flow].numel())
         else:
             effort = ca.SX.zeros(expressions["value"].numel())
-        balance = Balance(full, kind, unit or declared.effort_unit, expressions, effort)
+        balance = Balance(
+            full, kind, unit or declared.effort_unit, expressions, effort, self._group(name)
+        )
         balance.first_moment = ca.SX.zeros(3)
         balance.inertia = ca.SX.zeros(3, 3)
         root.balances[full] = balance
         for attachment in root.attachments:
-            if attachment.spelling in root._attached or not self._fits(attachment, balance):
-                continue
-            root._attached.add(attachment.spelling)
-            attachment.law(EffectModel(self, attachment, balance))
+            place = root._attached.get(attachment.spelling, "")
+            if not place and self._fits(attachment, balance):
+                place = full if attachment.balance == full else balance.group
+                root._attached[attachment.spelling] = place
+            if place in (full, balance.group):
+                attachment.law(EffectModel(self, attachment, balance, grouped=place != full))
         return balance
+
+    def _group(self, name: str) -> str:
+        return self._full(name)
 
     def _fits(self, attachment: Attachment, balance: Balance) -> bool:
         effect = attachment.effect
         if attachment.balance:
-            if attachment.balance != balance.name:
+            if attachment.balance not in (balance.name, balance.group):
                 return False
             if balance.kind not in effect.kinds:
                 raise ModelError(
@@ -381,9 +400,10 @@ class Model:
         where = f"{self.component.name}/{self.fidelity}"
         for attachment in self.attachments:
             if attachment.spelling not in self._attached:
-                offered = (
-                    ", ".join(f"{b.name} ({b.kind})" for b in self.balances.values()) or "none"
-                )
+                offers = {
+                    place: b.kind for b in self.balances.values() for place in (b.group, b.name)
+                }
+                offered = ", ".join(f"{b} ({kind})" for b, kind in offers.items()) or "none"
                 raise ModelError(
                     f"effect {attachment.spelling!r} fits no balance of {where}: it acts on "
                     f"{', '.join(attachment.effect.kinds)}"
@@ -430,7 +450,9 @@ class _Part(Model):
         shared: str,
     ) -> None:
         prefix = parent._full(name)
-        super().__init__(component, fidelity, values=values, prefix=prefix, parent=parent)
+        super().__init__(
+            component, fidelity, values=values, device=parent.device, prefix=prefix, parent=parent
+        )
         self._inputs = {key: ca.SX(value) for key, value in inputs.items()}
         self._parameters = {key: ca.SX(value) for key, value in parameters.items()}
         self._shared = parent._full(shared) if shared else prefix
@@ -444,6 +466,9 @@ class _Part(Model):
         if quantity.name not in self._inputs:
             raise ModelError(f"part {self.prefix!r}: nothing feeds its input {quantity.name!r}")
         return self._inputs[quantity.name]
+
+    def _group(self, name: str) -> str:
+        return f"{self._shared}.{name}"
 
     def input_rate(self, symbol: SX, rate: SX) -> None:
         """Nothing: the whole determines how the part's inputs move."""
@@ -470,24 +495,29 @@ class EffectModel:
     """What an effect's law sees: the balance it acts on and its own quantities.
 
     Names are prefixed with the effect's name (`coulomb.tau_c`), or with balance and effect where
-    the variant names the balance (`flange_b.coulomb.tau_c`).
+    the variant names the balance (`flange_b.coulomb.tau_c`). An effect on a group of balances has
+    one set of parameters (`caster.swivel.coulomb.tau_c`) and the rest once per balance.
     """
 
-    def __init__(self, model: Model, attachment: Attachment, balance: Balance) -> None:
+    def __init__(
+        self, model: Model, attachment: Attachment, balance: Balance, *, grouped: bool = False
+    ) -> None:
         self._root = model._root
         self._balance = balance
+        self._grouped = grouped
         name = attachment.effect.name
-        self._prefix = f"{balance.name}.{name}" if attachment.balance else name
-        self._model = Model(
-            model.component,
-            model.fidelity,
-            prefix=self._prefix,
-            parent=self._root,
-            of_effect=True,
-        )
+        own = f"{attachment.balance}.{name}" if attachment.balance else name
+        self._prefix = f"{balance.name}.{name}" if grouped else own
+        self._model = self._declaring(model, self._prefix)
+        self._parameters = self._declaring(model, own)
         self.kind = balance.kind
         self.unit = balance.unit or "1"
         self.size = int(balance.effort.numel())
+
+    def _declaring(self, model: Model, prefix: str) -> Model:
+        return Model(
+            model.component, model.fidelity, prefix=prefix, parent=self._root, of_effect=True
+        )
 
     @property
     def t(self) -> SX:
@@ -504,7 +534,10 @@ class EffectModel:
 
     def parameter(self, quantity: Quantity) -> SX:
         """Declare a parameter of the effect."""
-        return self._model.parameter(quantity)
+        known = self._root._vectors.get(self._parameters._full(quantity.name))
+        if self._grouped and known is not None:
+            return known
+        return self._parameters.parameter(quantity)
 
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state of the effect."""

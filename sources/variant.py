@@ -233,13 +233,14 @@ def build_model(name: Name | str) -> Model:
         values={key: origin.value for key, origin in origins.items()},
         attachments=tuple(attachments),
         slots={**offered, **dict(name.slots)},
+        device=name.device or component.device,
     )
     model.solver = solver
     equations(model)
     model.finish()
     for key, origin in origins.items():
         declared = next(
-            (v.quantity for v in model.variables.values() if v.quantity.name == key), None
+            (v.quantity for n, v in model.variables.items() if n.partition("[")[0] == key), None
         )
         if declared is not None and parse(declared.unit).exponents != parse(origin.unit).exponents:
             raise ValueError(
