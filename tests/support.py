@@ -12,7 +12,7 @@ from sources.function import Oracle
 from sources.model import Model
 from sources.variant import build_model
 
-EARLY = 1e-7  # a tick is due from this part of its period before its time on, as in an FMU
+EARLY = 1e-7  # part of a period by which k * period and k * dt may differ and still be one instant
 
 
 class Stepper:
@@ -67,16 +67,18 @@ class Stepper:
         k4 = f(t + h, x + h * k3, z, u, p)
         return ca.Function("rk4", [t, h, x, z, u, p], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
 
-    def _run_ticks(self) -> float:
-        """Execute the clocks that are due; return the time of the next tick."""
-        following = math.inf
+    def _run_ticks(self) -> None:
+        """Execute the clocks that are due."""
         for k, period in enumerate(self.periods):
             if self._tick[k] * period <= self.t + EARLY * period:
                 update = self.oracle.functions.updates[k]
                 self.z = np.asarray(update(self.t, self.x, self.z, self.u, self.p)).ravel()
                 self._tick[k] += 1
-            following = min(following, self._tick[k] * period - EARLY * period)
-        return following
+
+    def _next_tick(self, end: float) -> float:
+        """Time of the next tick that lies clearly before `end`, else `end`."""
+        times = self._tick * self.periods
+        return min([end, *times[times < end - EARLY * self.periods]])
 
     def _integrate(self, end: float) -> None:
         if self.x.size and end > self.t:
@@ -100,12 +102,10 @@ class Stepper:
         """One communication step with held inputs (others stay); the outputs after it."""
         self.set(inputs or {})
         end = self.t + dt
-        while True:
-            following = self._run_ticks()
-            if following >= end:
-                self._integrate(end)
-                return self.outputs()
-            self._integrate(following)
+        while self.t < end:
+            self._run_ticks()
+            self._integrate(self._next_tick(end))
+        return self.outputs()
 
     def outputs(self) -> dict[str, float]:
         """Outputs at the present time, from the present inputs."""
