@@ -198,7 +198,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
         if status > 1:
-            raise self.failure(f"getting {self._names(part.references, part.type)}", status)
+            raise self.failed_access(True, part, status)
 
     def set_part(self, part: Part) -> None:
         """One set call for the values of a block's part."""
@@ -206,7 +206,12 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
         if status > 1:
-            raise self.failure(f"setting {self._names(part.references, part.type)}", status)
+            raise self.failed_access(False, part, status)
+
+    def failed_access(self, getting: bool, part: Part, status: int) -> FmuCallError:
+        """The error for a get or set call that returned `status`."""
+        verb = "getting" if getting else "setting"
+        return self.failure(f"{verb} {self._names(part.references, part.type)}", status)
 
     def _names(self, references: NDArray[np.uint32], type_: str) -> str:
         wanted = {int(reference) for reference in references}
@@ -272,16 +277,20 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
         status = self._step(self.address, time, size, *self._step_arguments)
-        if status > 1:
-            raise self.failure(f"a step of {size:.9g} s", status)
-        if self.binding.stopped():
-            messages = logs.take(self._key)
-            raise FmuCallError(
-                f"{self.label}: the FMU asked to end the simulation after t = {self.time:.9g} s"
-                + _tail(messages),
-                messages,
-            )
+        if status > 1 or self.binding.stopped():
+            raise self.failed_step(size, status)
         self.time = time + size
+
+    def failed_step(self, size: float, status: int) -> FmuCallError:
+        """The error for a step that returned `status` or asked to end the simulation."""
+        if 1 < status < 5:
+            return self.failure(f"a step of {size:.9g} s", status)
+        messages = logs.take(self._key)
+        return FmuCallError(
+            f"{self.label}: the FMU asked to end the simulation after t = {self.time:.9g} s"
+            + _tail(messages),
+            messages,
+        )
 
     def terminate(self) -> None:
         """End the run; values can still be read."""

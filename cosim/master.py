@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import kernel
 from .algorithms import compile_plan
 from .block import DTYPES, Block
 from .errors import (
@@ -52,6 +53,8 @@ class Master:
         algorithm: name of a module in `algorithms`.
         step: communication step [s].
         tolerance: relative tolerance handed to the FMUs, None for their own.
+        executor: `c` (compiled), `python` (the reference), or `auto` (compiled if this machine
+            has the library).
         scenario: name that recordings carry.
     """
 
@@ -60,6 +63,7 @@ class Master:
     step: float = 1e-3
     tolerance: float | None = None
     scenario: str = ""
+    executor: str = "auto"
 
     def run(
         self,
@@ -233,7 +237,7 @@ class _Run:
                 blocks.append(Block(instance, variables, view))
         self.rows = np.empty(((times.size - 1) // every + 1, len(observed)))
         self.row = 0
-        self.bond_energy = [0.0] * len(self.layout.bonds)
+        self.bond_energy = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.index = 0
         self.instants: list[float] = times.tolist()
@@ -242,16 +246,14 @@ class _Run:
 
     def execute(self, count: int, progress: Callable[[float], None] | None) -> Recording:
         self.initialize()
-        step = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.step]
         final = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.final]
         shown = max(count // 100, 1)
         try:
-            for self.index in range(count):
-                for op, a, b in step:
-                    self.do(op, a, b)
-                if progress is not None and self.index % shown == 0:
+            advance = self.compiled() or self.interpreted()
+            while self.index < count:
+                advance(min(self.index + shown, count))
+                if progress is not None:
                     progress(self.index / count)
-            self.index = count
             for op, a, b in final:
                 self.do(op, a, b)
         except FmuCallError as error:
@@ -263,6 +265,55 @@ class _Run:
         if progress is not None:
             progress(1.0)
         return self.recording("")
+
+    def interpreted(self) -> Callable[[int], None]:
+        """The executor in Python: communication steps up to an index."""
+        step = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.step]
+
+        def advance(last: int) -> None:
+            for self.index in range(self.index, last):  # noqa: B020 - continues where it stood
+                for op, a, b in step:
+                    self.do(op, a, b)
+            self.index = last
+
+        return advance
+
+    def compiled(self) -> Callable[[int], None] | None:
+        """The compiled executor, None if it is not wanted or not there."""
+        wanted = self.master.executor
+        if wanted not in ("auto", "c", "python"):
+            raise ValueRangeError(f"executor {wanted!r}: must be auto, c or python")
+        if wanted == "python" or (wanted == "auto" and kernel.find() is None):
+            return None
+        try:
+            bound = kernel.Kernel(
+                self.plan, self.instances, self.outputs, self.inputs, self.values, self.times,
+                self.master.step, self.external, self.rows, self.bond_energy, self.every,
+            )  # fmt: skip
+        except FileNotFoundError as error:
+            raise ValueRangeError(
+                f"executor 'c': this machine has no {error}; 'cosim fmus build' compiles it"
+            ) from None
+
+        def advance(last: int) -> None:
+            status = bound.advance(last)
+            self.index, self.row = int(bound.run.index), int(bound.run.row)
+            if status:
+                self.fail(bound, status)
+
+        return advance
+
+    def fail(self, bound: kernel.Kernel, status: int) -> None:
+        """Raise what the executor in Python would have raised."""
+        code, index, call = bound.failed()
+        if Op(code) is Op.RECORD:
+            self.record()
+        if Op(code) is Op.STEP:
+            instance = self.instances[index]
+            instance.time = self.instants[self.index]
+            raise instance.failed_step(self.master.step, status)
+        instance, part = bound.part(call)
+        raise instance.failed_access(Op(code) is Op.GET, part, status)
 
     def initialize(self) -> None:
         """Initialize all instances together: exchange connected values until nothing changes."""

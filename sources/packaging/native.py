@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -147,13 +149,28 @@ def compiler_version() -> str:
 
 
 def compile_library(source: str, identifier: str, platform: str) -> bytes:
-    """Compile a variant for one platform; cached by the content of all C files.
+    """Compile a variant for one platform.
+
+    Raises:
+        CompilerError: with the compiler's message.
+    """
+    files = {path.name: path.read_text(encoding="utf-8") for path in C_SOURCES.glob("*.c")}
+    return compile_c({**files, "model.c": source}, "all.c", identifier, platform)
+
+
+def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) -> bytes:
+    """Compile a shared library for one platform; cached by the content of its files.
+
+    Args:
+        files: C files by name; `main` is compiled and includes the others.
+        main: the translation unit.
+        identifier: name of the library without suffix.
+        platform: key of `PLATFORMS`.
 
     Raises:
         CompilerError: with the compiler's message.
     """
     target = PLATFORMS[platform]
-    fixed = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_SOURCES.glob("*.c"))}
     flags = [
         *("-target", target.target, "-std=c99", "-O2", "-shared", "-fPIC", "-s", "-g0"),
         # no fused multiply-add: every platform and the Python twin round alike
@@ -163,25 +180,25 @@ def compile_library(source: str, identifier: str, platform: str) -> bytes:
         flags.append(f"-Wl,-install_name,@rpath/{identifier}.dylib")
     elif "windows" not in target.target:
         flags.append(f"-Wl,-soname,{identifier}.so")
-    content = "\0".join([source, *fixed.values(), *flags, identifier, compiler_version()])
-    key = hashlib.sha256(content.encode()).hexdigest()
+    content = [f"{name}\0{files[name]}" for name in sorted(files)]
+    text = "\0".join([*content, *flags, main, identifier, compiler_version()])
+    key = hashlib.sha256(text.encode()).hexdigest()
     cached = cache_folder("libraries") / f"{key}{target.suffix}"
     if cached.exists():
         return cached.read_bytes()
-    folder = cache_folder("compile") / f"{key[:16]}-{os.getpid()}"
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix=key[:16], dir=cache_folder("compile")))
     try:
-        for name, text in {**fixed, "model.c": source}.items():
+        for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
         output = folder / f"{identifier}{target.suffix}"
-        command = [sys.executable, "-m", "ziglang", "cc", *flags, "-o", output.name, "all.c"]
+        command = [sys.executable, "-m", "ziglang", "cc", *flags, "-o", output.name, main]
         if "windows" not in target.target:
             command.append("-lm")
-        zig = cache_folder("zig")
+        zig = str(cache_folder("zig"))
         result = subprocess.run(
             command,
             cwd=folder,
-            env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(zig)},
+            env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig},
             capture_output=True,
             text=True,
             check=False,
@@ -193,8 +210,6 @@ def compile_library(source: str, identifier: str, platform: str) -> bytes:
             )
         library = output.read_bytes()
     finally:
-        for path in folder.iterdir():
-            path.unlink()
-        folder.rmdir()
+        shutil.rmtree(folder, ignore_errors=True)
     write_atomically(cached, library)
     return library
