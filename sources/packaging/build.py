@@ -72,6 +72,7 @@ def component_json(variant: Variant) -> bytes:
         "balances": [
             {"name": balance.name, "kind": balance.kind} for balance in model.balances.values()
         ],
+        "slots": model.slots,
         "strengths": [
             variable.name
             for variable in model.of_role("parameter")
