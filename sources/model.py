@@ -564,8 +564,13 @@ class EffectModel:
         return self._model.output(quantity, expression)
 
     def add(self, effort: SX) -> None:
-        """Add an effort to the balance (6 elements, force and moment, for kind `body`)."""
+        """Add an effort to the balance (6 elements, force and moment, for kind `body`).
+
+        One element counts for every shaft, winding or signal of a balance of several.
+        """
         effort = ca.SX(effort)
+        if effort.numel() == 1 and self.kind != "body":
+            effort = ca.repmat(effort, self.size, 1)
         if effort.numel() != self.size:
             raise ModelError(
                 f"effect {self._prefix!r} adds {effort.numel()} elements to balance "
