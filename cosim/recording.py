@@ -131,7 +131,7 @@ class Recording:
         columns = [self.time, *self.values.T]
         schema = pa.schema(fields, metadata={_META: json.dumps(self._meta()).encode()})
         with atomic(path) as temporary:
-            pq.write_table(pa.Table.from_arrays([pa.array(c) for c in columns], schema), temporary)
+            pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
         return path
 
     def plot(

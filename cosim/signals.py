@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import ValueRangeError
 
 Vector = NDArray[np.float64]
-CLOCK = 1e-9
-"""Times closer than this [s] are the same: sample times in logs and k * h differ by rounding."""
+CLOCK = 1e-3
+"""Fraction of a sample interval within which two times are the same: logs keep sample times rounded
+(often to 32 bits), so a sample may seem to come just after the communication point it belongs to."""
 
 
 class Signal(Protocol):
@@ -123,17 +124,19 @@ class Table:
         Raises:
             ValueRangeError: outside the table (without `extend`).
         """
+        intervals = np.diff(self.times)
+        clock = CLOCK * float(np.median(intervals)) if intervals.size else 0.0
         if not self.extend and times.size:
             first, last = self.times[0], self.times[-1]
-            margin = float(np.max(np.diff(self.times))) if self.times.size > 1 else 0.0
-            if times[0] < first - margin - CLOCK or times[-1] > last + margin + CLOCK:
+            margin = clock + (float(np.max(intervals)) if intervals.size else 0.0)
+            if times[0] < first - margin or times[-1] > last + margin:
                 raise ValueRangeError(
                     f"{self.text}: covers {first:.9g} s to {last:.9g} s, but the run needs "
                     f"{times[0]:.9g} s to {times[-1]:.9g} s; shorten the run or extend the table"
                 )
         if self.interpolation == "linear":
             return np.interp(times, self.times, self.values)
-        index = np.searchsorted(self.times, times + CLOCK, side="right") - 1
+        index = np.searchsorted(self.times, times + clock, side="right") - 1
         return self.values[np.maximum(index, 0)]
 
 

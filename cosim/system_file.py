@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, ScenarioError
+from .errors import ScenarioError
+from .files import flatten, read_toml
 from .provider import Provider
 from .system import System
 
@@ -91,30 +91,3 @@ def _arrow(path: Path, line: Any) -> tuple[str, str]:
             f'{path}: {line!r} is not a connection; write "instance.output -> instance.input"'
         )
     return parts[0], parts[1]
-
-
-def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
-    """`{"gearbox": {"ratio": 3}}` and `{"gearbox.ratio": 3}` alike as `{"gearbox.ratio": 3}`."""
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            flat.update({f"{key}.{name}": item for name, item in flatten(value).items()})
-        else:
-            flat[key] = value
-    return flat
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises:
-        ScenarioError: missing or not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ScenarioError(f"{path}: there is no such file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: is not TOML ({error})") from error
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error

@@ -1,0 +1,429 @@
+"""The command line; the only module that knows the sources of the components.
+
+Results go to stdout (one JSON value with `--json`), messages and progress to stderr. Exit codes:
+0 done, 1 the work failed, 2 wrong usage or input.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from . import algorithms, library, scenario
+from .archive import cache_folder, open_fmu
+from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
+from .provider import FolderProvider, Provider
+from .runner import Result, run
+
+app = typer.Typer(
+    help="Robot subsystems as FMUs, run together and compared with measurements.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+)
+fmus_app = typer.Typer(
+    help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
+)
+app.add_typer(fmus_app, name="fmus")
+
+
+class Kind(StrEnum):
+    """Kinds of FMUs that can be built."""
+
+    native = "native"
+    python = "python"
+
+
+class Platform(StrEnum):
+    """Platforms that FMUs can be built for."""
+
+    host = "host"
+    all = "all"
+
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to stdout.")]
+
+
+# -- the sources -----------------------------------------------------------------------------------
+
+
+def _sources(module: str) -> ModuleType:
+    """A module of the components' sources.
+
+    Raises:
+        VariantError: they, CasADi or the compiler are not installed.
+    """
+    root = library.import_root()
+    if root is not None and str(root) not in sys.path:
+        sys.path.append(str(root))
+    try:
+        return importlib.import_module(f"{library.sources_package()}.{module}")
+    except ModuleNotFoundError as error:
+        raise VariantError(
+            f"building FMUs needs {error.name}, which is not installed: "
+            "pip install 'cosim[build]', or use FMUs that are built already"
+        ) from error
+
+
+@contextmanager
+def _bad_names() -> Iterator[None]:
+    """Errors of the sources as ours: bad names and models are wrong input, the rest failed."""
+    try:
+        yield
+    except ValueError as error:  # UnknownVariantError, ModelError and wrong combinations
+        raise VariantError(str(error)) from error
+    except RuntimeError as error:  # the C compiler
+        raise CosimError(str(error)) from error
+
+
+class Builder:
+    """Provider that builds variants from the sources (once; they are cached)."""
+
+    def __init__(self, out: Path | None = None) -> None:
+        self.out = out or cache_folder() / "fmus"
+        self._build = _sources("packaging.build").build
+
+    def path(self, variant: str) -> Path:
+        """Path of the variant's FMU, built if it is not there."""
+        with _bad_names():
+            return Path(self._build(variant, out=self.out))
+
+
+class Installed:
+    """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
+
+    def __init__(self) -> None:
+        self._folder = FolderProvider(library.fmus())
+
+    def path(self, variant: str) -> Path:
+        """Path of the variant's FMU."""
+        try:
+            return self._folder.path(variant)
+        except VariantError as missing:
+            try:
+                return Builder().path(variant)
+            except VariantError as error:
+                raise error from missing
+
+
+def default_provider() -> Provider:
+    """Where variants come from if nobody says otherwise."""
+    return Builder() if library.in_checkout() else Installed()
+
+
+# -- fmus ------------------------------------------------------------------------------------------
+
+
+def _describe_file(path: Path) -> dict[str, Any]:
+    """What `fmus list` says, from an FMU instead of the sources."""
+    description = open_fmu(path).description
+
+    def listed(causality: Any) -> list[dict[str, str]]:
+        return [
+            {"name": v.name, "unit": v.symbol, "description": v.text}
+            for v in description.of(causality)
+        ]
+
+    return {
+        "variant": description.extra.get("variant", description.name),
+        "component": description.extra.get("component", ""),
+        "fidelity": description.extra.get("fidelity", ""),
+        "effects": description.extra.get("effects", []),
+        "inputs": listed("input"),
+        "outputs": listed("output"),
+        "parameters": listed("parameter"),
+        "states": [],
+        "description": description.text,
+    }
+
+
+@fmus_app.command("list")
+def fmus_list(
+    component: Annotated[str, typer.Argument(help="Only variants of this component.")] = "",
+    as_json: AsJson = False,
+) -> None:
+    """List the component catalogue.
+
+    Example: `cosim fmus list gearbox`
+    """
+    try:
+        catalog = _sources("packaging.catalog")
+        with _bad_names():
+            names = [name for name in catalog.names() if _is_of(name, component)]
+            entries = [catalog.describe(name) for name in names]
+    except VariantError:
+        if library.in_checkout():
+            raise
+        found = [_describe_file(path) for path in sorted(library.fmus().rglob("*.fmu"))]
+        entries = [entry for entry in found if _is_of(entry["variant"], component)]
+    if component and not entries:
+        raise VariantError(f"no variant of a component {component!r}; see 'cosim fmus list'")
+    if as_json:
+        _print_json(entries)
+        return
+    table = Table("variant", "inputs", "outputs", "parameters", "description")
+    for entry in entries:
+        counts = [str(len(entry[key])) for key in ("inputs", "outputs", "parameters")]
+        table.add_row(entry["variant"], *counts, entry["description"])
+    Console().print(table)
+
+
+def _is_of(variant: str, component: str) -> bool:
+    return not component or variant.partition("/")[0].partition(".")[0] == component
+
+
+@fmus_app.command("build")
+def fmus_build(
+    variants: Annotated[
+        list[str] | None,
+        typer.Argument(help="E.g. gearbox/elastic+backlash [all]."),
+    ] = None,
+    fmi: Annotated[int, typer.Option(help="FMI version.", min=2, max=3)] = 2,
+    kind: Annotated[Kind, typer.Option(help="C code, or the Python twin.")] = Kind.native,
+    platform: Annotated[
+        Platform, typer.Option(help="This machine, or all five platforms.")
+    ] = Platform.host,
+    out: Annotated[Path | None, typer.Option(help="Folder; below it fmi2, fmi3, python.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Build FMUs of variants.
+
+    Example: `cosim fmus build gearbox/elastic+backlash --fmi 3 --out fmus`
+    """
+    build = _sources("packaging.build").build
+    folder = out or (library.fmus() if library.in_checkout() else Path("fmus"))
+    with _bad_names():
+        names = list(variants or _sources("packaging.catalog").names())
+        for name in names:  # bad names are found before anything is built
+            _sources("variant").build_model(name)
+    if kind is Kind.python and fmi == 3:
+        raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
+    paths = []
+    for name in names:
+        with _bad_names():
+            path = build(name, out=folder, fmi=fmi, kind=kind.value, platform=platform.value)
+        _say(f"{name}: {path}")
+        paths.append({"variant": name, "file": str(path)})
+    if as_json:
+        _print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
+    else:
+        for item in paths:
+            typer.echo(item["file"])
+
+
+@fmus_app.command("check")
+def fmus_check(
+    files: Annotated[
+        list[Path] | None, typer.Argument(help=".fmu files; those of the library if none is given.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Validate FMUs, ours or anybody's.
+
+    Example: `cosim fmus check gearbox.fmu`
+    """
+    paths = list(files or sorted(library.fmus().rglob("*.fmu")))
+    for path in paths:
+        if not path.is_file():
+            raise FmuFileError(f"{path}: there is no such file")
+    if not paths:
+        raise InputError(f"{library.fmus()}: has no .fmu; build some with 'cosim fmus build'")
+    results = {str(path): _check(path) for path in paths}
+    bad = sum(1 for problems in results.values() if problems)
+    if as_json:
+        _print_json({"checked": len(results), "with_problems": bad, "problems": results})
+    else:
+        for name, problems in results.items():
+            typer.echo(f"{name}: {'ok' if not problems else f'{len(problems)} problem(s)'}")
+            for problem in problems:
+                typer.echo(f"  {problem}")
+    if bad:
+        raise CheckError(f"{bad} of {len(results)} FMUs have problems")
+
+
+def _check(path: Path) -> list[str]:
+    problems: list[str] = []
+    try:
+        open_fmu(path)
+    except FmuFileError as error:
+        return [str(error)]
+    try:
+        problems += _sources("packaging.check").check(path)
+    except VariantError:
+        from fmpy.validation import validate_fmu
+
+        problems += validate_fmu(str(path))
+    return problems
+
+
+# -- scenarios -------------------------------------------------------------------------------------
+
+
+@app.command("scenarios")
+def list_scenarios(as_json: AsJson = False) -> None:
+    """List what can be run.
+
+    Example: `cosim scenarios`
+    """
+    files = scenario.scenario_files()
+    if as_json:
+        _print_json(
+            [
+                {
+                    "scenario": file.name,
+                    "system": file.table.get("system", ""),
+                    "runs": [name for name in file.runs if name],
+                    "description": file.text,
+                }
+                for file in files
+            ]
+        )
+        return
+    table = Table("scenario", "system", "runs", "description")
+    for file in files:
+        runs = [name for name in file.runs if name]
+        shown = ", ".join(runs[:4]) + (f" … ({len(runs)})" if len(runs) > 4 else "")
+        table.add_row(file.name, str(file.table.get("system", "")), shown, file.text)
+    Console().print(table)
+
+
+@app.command("run")
+def run_command(
+    name: Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, folder or .toml file.")],
+    variants: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="INSTANCE=VARIANT", help="E.g. gearbox=elastic+backlash."),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option("--param", metavar="INSTANCE.NAME=VALUE", help="E.g. gearbox.eta=0.8."),
+    ] = None,
+    algorithm: Annotated[
+        str | None, typer.Option(help=f"One of {', '.join(algorithms.names())}.")
+    ] = None,
+    step: Annotated[float | None, typer.Option(help="Communication step [s].")] = None,
+    duration: Annotated[float | None, typer.Option(help="Duration [s].")] = None,
+    fmus: Annotated[
+        Path | None, typer.Option(help="Take variants from this folder instead of building.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for results [out/SCENARIO].")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a scenario, compare it with its reference, plot it.
+
+    Example: `cosim run motor_bench --set gearbox=elastic+backlash --param gearbox.eta=0.8`
+    """
+    changes = dict(_pair(item, "--set", "INSTANCE=VARIANT") for item in variants or [])
+    values = dict(_pair(item, "--param", "INSTANCE.NAME=VALUE") for item in parameters or [])
+    if fmus is not None and not fmus.is_dir():
+        raise InputError(f"--fmus {fmus}: there is no such folder")
+    provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        tasks: dict[str, Any] = {}
+
+        def told(item: str, fraction: float) -> None:
+            if item not in tasks:
+                tasks[item] = progress.add_task(item, total=1.0)
+            progress.update(tasks[item], completed=fraction)
+
+        result = run(
+            name,
+            variants=changes,
+            parameters={key: _number(text) for key, text in values.items()},
+            algorithm=algorithm,
+            step=step,
+            duration=duration,
+            provider=provider,
+            out=out or Path("out") / name.removesuffix(".toml").strip("./"),
+            progress=told,
+        )
+    if as_json:
+        _print_json(result.to_dict())
+    else:
+        _print_result(result)
+    failed = [label for label, check in result.checks.items() if not check.ok]
+    if failed:
+        raise CheckError(
+            f"{len(failed)} of {len(result.checks)} checks failed: {'; '.join(failed)}"
+        )
+
+
+def _pair(text: str, option: str, form: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or not key or not value:
+        raise InputError(f"{option} {text}: write {option} {form}")
+    return key.strip(), value.strip()
+
+
+def _number(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
+
+def _print_result(result: Result) -> None:
+    content, console = result.to_dict(), Console()
+    console.print(
+        f"{content['scenario']}: {content['simulated_s']:g} s simulated in "
+        f"{content['wall_s']:.2f} s, {content['fmu_steps']} FMU-steps, {content['algorithm']} with "
+        f"{content['step']:g} s; the coupling invented {content['energy_residual_J']:.3g} J"
+    )
+    if content["comparison"]:
+        table = Table("compared", "rms", "max", "unit", "with")
+        for key, item in content["comparison"].items():
+            table.add_row(
+                key, f"{item['rms']:.4g}", f"{item['max']:.4g}", item["unit"], item["reference"]
+            )
+        console.print(table)
+    if content["checks"]:
+        table = Table("check", "value", "limit", "", "source")
+        for item in content["checks"]:
+            outcome = "ok" if item["ok"] else "FAILED"
+            table.add_row(
+                item["name"], f"{item['value']:.4g}", str(item["limit"]), outcome, item["source"]
+            )
+        console.print(table)
+    for path in content["files"]:
+        console.print(path, soft_wrap=True)
+
+
+# -- frame -----------------------------------------------------------------------------------------
+
+
+def _say(text: str) -> None:
+    typer.echo(text, err=True)
+
+
+def _print_json(content: Any) -> None:
+    typer.echo(json.dumps(content, indent=2))
+
+
+def main() -> None:
+    """Run the command line; one line on stderr per error, no traceback."""
+    try:
+        app()
+    except CosimError as error:
+        _say(f"error: {error}")
+        for note in getattr(error, "__notes__", ()):
+            _say(note)
+        raise SystemExit(error.exit_code) from None
+    except KeyboardInterrupt:
+        _say("interrupted")
+        raise SystemExit(130) from None

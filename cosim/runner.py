@@ -1,0 +1,274 @@
+"""Runs scenarios: builds the system, runs it, compares, checks, writes files."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import scenario as scenarios
+from .checks import CheckResult, evaluate
+from .comparison import Comparison, compare, convert_reference
+from .errors import StepError, ValueRangeError
+from .files import write_text
+from .master import Master
+from .provider import Provider
+from .recording import Recording
+from .scenario import Scenario
+from .variants import apply
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run of a scenario.
+
+    Attributes:
+        scenario: what was run, with all changes applied.
+        variants: instance -> variant that was used.
+        recording: what was recorded.
+        comparisons: by name.
+        checks: outcomes.
+        wall_s: time that it took, without building FMUs [s].
+        fmu_steps: steps of all FMUs together.
+    """
+
+    scenario: Scenario
+    variants: Mapping[str, str]
+    recording: Recording
+    comparisons: Mapping[str, Comparison]
+    checks: tuple[CheckResult, ...]
+    wall_s: float
+    fmu_steps: int
+
+    def plot(self, path: Path | str | None = None) -> Any:
+        """Plot what the scenario names, else what is compared, else everything."""
+        references = {
+            reference.signal: (
+                reference.times,
+                convert_reference(self.recording, reference),
+                reference.text,
+            )
+            for reference in self.scenario.references.values()
+        }
+        signals = self.scenario.plot or tuple(references) or None
+        return self.recording.plot(signals, path, references)
+
+
+@dataclass(frozen=True)
+class Result:
+    """All runs of a scenario.
+
+    Attributes:
+        name: of the scenario.
+        runs: by run name; one unnamed run ("") for most scenarios.
+        files: what was written.
+    """
+
+    name: str
+    runs: Mapping[str, RunResult]
+    files: tuple[Path, ...] = field(default=())
+
+    @property
+    def recording(self) -> Recording:
+        """The recording of a scenario with one run.
+
+        Raises:
+            ValueRangeError: there are several; take `runs[name].recording`.
+        """
+        if len(self.runs) != 1:
+            raise ValueRangeError(
+                f"{self.name} has {len(self.runs)} runs; take runs[name].recording, name one of "
+                f"{', '.join(self.runs)}"
+            )
+        return next(iter(self.runs.values())).recording
+
+    @property
+    def checks(self) -> dict[str, CheckResult]:
+        """Outcomes of all checks by name (`run: name` where there are several runs)."""
+        return {
+            _prefixed(run, check.name): check
+            for run, result in self.runs.items()
+            for check in result.checks
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `cosim run --json` prints it."""
+        first = next(iter(self.runs.values()))
+        return {
+            "scenario": self.name,
+            "variants": dict(first.variants),
+            "algorithm": first.scenario.algorithm,
+            "step": first.scenario.step,
+            "simulated_s": sum(run.scenario.duration for run in self.runs.values()),
+            "wall_s": sum(run.wall_s for run in self.runs.values()),
+            "fmu_steps": sum(run.fmu_steps for run in self.runs.values()),
+            "energy_residual_J": sum(run.recording.energy_residual for run in self.runs.values()),
+            "comparison": {
+                _prefixed(name, key): {
+                    "unit": item.unit,
+                    "rms": item.rms,
+                    "max": item.max,
+                    "reference": item.reference,
+                }
+                for name, run in self.runs.items()
+                for key, item in run.comparisons.items()
+            },
+            "checks": [{**check.to_dict(), "name": name} for name, check in self.checks.items()],
+            "files": [str(path) for path in self.files],
+        }
+
+
+def _prefixed(run: str, name: str) -> str:
+    return f"{run}: {name}" if run else name
+
+
+def _every(scenario: Scenario) -> int:
+    if scenario.period is None:
+        return 1
+    every = round(scenario.period / scenario.step)
+    if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
+        raise ValueRangeError(
+            f"{scenario.name}: record period {scenario.period:g} s is not a whole number of steps "
+            f"of {scenario.step:g} s"
+        )
+    return every
+
+
+def run_scenario(
+    scenario: Scenario,
+    provider: Provider | None,
+    *,
+    progress: Callable[[float], None] | None = None,
+    base: Path | None = None,
+) -> RunResult:
+    """Run one scenario.
+
+    Args:
+        scenario: what to run.
+        provider: where variants come from.
+        progress: told now and then which fraction is done.
+        base: folder against which .fmu paths among the variants are taken.
+
+    Raises:
+        CosimError: see `errors`; a `StepError` carries the recording up to the failure.
+    """
+    instances = apply(scenario.system.instances, scenario.variants, provider, base)
+    file = replace(scenario.system, instances=instances)
+    system = file.build(provider, scenario.parameters)
+    record = scenario.record
+    if record is not None:
+        wanted = [reference.signal for reference in scenario.references.values()]
+        wanted += [name for check in scenario.checks for name in check.signals]
+        record = tuple(dict.fromkeys([*record, *wanted]))
+    else:
+        extra = [r.signal for r in scenario.references.values()]
+        record = tuple(dict.fromkeys([*system.signals(), *extra]))
+    master = Master(system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name)
+    started = time.perf_counter()
+    recording = master.run(
+        scenario.duration,
+        inputs=scenario.inputs,
+        record=record,
+        every=_every(scenario),
+        start=scenario.start,
+        progress=progress,
+    )
+    wall = time.perf_counter() - started
+    comparisons = {
+        name: compare(recording, reference) for name, reference in scenario.references.items()
+    }
+    return RunResult(
+        scenario=scenario,
+        variants=instances,
+        recording=recording,
+        comparisons=comparisons,
+        checks=tuple(evaluate(check, recording, comparisons) for check in scenario.checks),
+        wall_s=wall,
+        fmu_steps=int(recording.provenance["fmu_steps"]),
+    )
+
+
+def run(
+    name: str,
+    *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    algorithm: str | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+    provider: Provider | None = None,
+    out: Path | str | None = None,
+    folder: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Result:
+    """Run a scenario, all its runs or the one that the name ends with.
+
+    Args:
+        name: `motor_bench`, `crawler_paper/SET1_1`, a folder or a scenario.toml.
+        variants: instance (or component, or slot) -> variant, fidelity, or `+effect`.
+        parameters: `instance.name` -> value.
+        algorithm, step, duration: replace the scenario's.
+        provider: where variants come from; by default they are built from the sources, or taken
+            from the installed FMUs where those are missing.
+        out: folder for recording, plot and result; nothing is written without it.
+        folder: where scenarios are looked for; the library's by default.
+        progress: told run and fraction now and then.
+
+    Raises:
+        CosimError: see `errors`.
+    """
+    if provider is None:
+        from .cli import default_provider  # the only place that knows the sources
+
+        provider = default_provider()
+    file, wanted = scenarios.find(name, folder)
+    chosen = [wanted] if wanted else list(file.runs)
+    results: dict[str, RunResult] = {}
+    files: list[Path] = []
+    for run_name in chosen:
+        item = file.scenario(run_name)
+        item = replace(
+            item,
+            variants={**item.variants, **(variants or {})},
+            parameters={**item.parameters, **(parameters or {})},
+            algorithm=algorithm or item.algorithm,
+            step=step if step is not None else item.step,
+            duration=duration if duration is not None else item.duration,
+        )
+        place = None if out is None else Path(out) / run_name
+        told = None if progress is None else _told(progress, item.name)
+        try:
+            result = run_scenario(item, provider, progress=told, base=Path.cwd())
+        except StepError as error:
+            if place is not None and error.recording is not None:
+                path = error.recording.write_parquet(place / "recording.parquet")
+                error.add_note(f"the recording up to then is in {path}")
+            raise
+        results[run_name] = result
+        if place is not None:
+            files += [
+                result.recording.write_parquet(place / "recording.parquet"),
+                result.recording.write_csv(place / "recording.csv"),
+            ]
+            result.plot(place / "plot.png")
+            files.append(place / "plot.png")
+    single = wanted or (chosen[0] if len(chosen) == 1 else "")
+    runs = {"": next(iter(results.values()))} if len(chosen) == 1 else results
+    final = Result(file.name + (f"/{single}" if single else ""), runs, tuple(files))
+    if out is not None:
+        path = Path(out) / "result.json"
+        final = replace(final, files=(*files, path))
+        write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
+    return final
+
+
+def _told(progress: Callable[[str, float], None], name: str) -> Callable[[float], None]:
+    return lambda fraction: progress(name, fraction)
