@@ -1,0 +1,38 @@
+"""Mount that stands on a tilted surface: gravity leans in the frame that was taken as level.
+
+    g = g_0 turned by -tilt about the horizontal axis (cos heading, sin heading, 0)
+
+With heading 0 a positive tilt raises the side of +y, with heading pi/2 it lowers that of +x.
+
+Not modelled: a mount that gives way under load.
+
+Source: rotation of a vector about an axis (Rodrigues).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+TILT = Quantity("tilt", "rad", "angle from the level, 0 = absent", start=0.01, strength=True)
+HEADING = Quantity("heading", "rad", "direction of the axis of tilt, from the x axis")
+
+EFFECT = Effect(
+    "base_tilt",
+    "Mount on a tilted surface.",
+    ("signal",),
+    TILT,
+    source="rotation about an axis",
+    unit="m/s2",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Turn gravity."""
+    tilt, heading, gravity = e.parameter(TILT), e.parameter(HEADING), e.signal("value")
+    axis = ca.vertcat(ca.cos(heading), ca.sin(heading), 0)
+    across = gravity - axis * ca.dot(axis, gravity)
+    e.add(-ca.cross(axis, gravity) * ca.sin(tilt) - across * (1 - ca.cos(tilt)))

@@ -1,0 +1,33 @@
+"""Encoder whose zero is off: the joint stands beside the angle that the controller believes.
+
+    reading = theta + offset
+
+Not modelled: eccentricity of the encoder's disc.
+
+Source: textbook.
+"""
+
+from __future__ import annotations
+
+from ..effect import Effect
+from ..laws.signal_effect import share
+from ..model import EffectModel
+from ..quantity import Quantity
+
+OFFSET = Quantity(
+    "offset", "rad", "error of the reading, 0 = absent", start=0.005, nominal=0.01, strength=True
+)
+
+EFFECT = Effect(
+    "encoder_offset",
+    "Encoder with a wrong zero.",
+    ("signal",),
+    OFFSET,
+    source="textbook",
+    unit="rad",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the error."""
+    e.add(e.parameter(OFFSET) * share(e))

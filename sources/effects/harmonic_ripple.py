@@ -1,0 +1,44 @@
+"""Torque ripple of a strain-wave gear: two cycles per turn of its wave generator (the motor).
+
+    f = -a sin(2 N theta + psi),   E = a (1 - cos(2 N theta + psi)) / (2 N)
+
+theta is the angle of the joint and N the gear's ratio. Conservative, like cogging seen through the
+gear.
+
+Not modelled: further harmonics, dependence on load, change of the ratio by the same error.
+
+Source: Taghirad and Bélanger, Modeling and parameter identification of harmonic drive systems,
+ASME J. Dyn. Sys. 120(4), 1998.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..laws.angle import shaft_angle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+AMPLITUDE = Quantity(
+    "a", "N.m", "amplitude on the joint, 0 = absent", start=1.0, nominal=1.0, strength=True
+)
+RATIO = Quantity("N", "1", "ratio of the gear", start=101.0, minimum=0.1)
+PHASE = Quantity("psi", "rad", "phase at angle 0")
+
+EFFECT = Effect(
+    "harmonic_ripple",
+    "Torque ripple of a strain-wave gear.",
+    ("rotation",),
+    AMPLITUDE,
+    source="Taghirad and Bélanger 1998",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the torque."""
+    amplitude, cycles = e.parameter(AMPLITUDE), 2 * e.parameter(RATIO)
+    argument = cycles * shaft_angle(e, "velocity") + e.parameter(PHASE)
+    e.add(-amplitude * ca.sin(argument))
+    e.stored_energy(amplitude * (1 - ca.cos(argument)) / cycles)
+    e.loss(0)

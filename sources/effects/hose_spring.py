@@ -1,0 +1,37 @@
+"""Hose or cable along a joint that pulls it back like a spring.
+
+    f = -k (theta - theta_0),   E = k (theta - theta_0)^2 / 2
+
+Not modelled: stiffening near the end of the travel, friction of the hose.
+
+Source: Hooke's law.
+"""
+
+from __future__ import annotations
+
+from ..effect import Effect
+from ..laws.angle import shaft_angle
+from ..model import EffectModel
+from ..quantity import Quantity
+
+STIFFNESS = Quantity(
+    "k", "N.m/rad", "stiffness, 0 = absent", start=2.0, minimum=0.0, nominal=1.0, strength=True
+)
+REST = Quantity("theta_0", "rad", "angle at which the hose hangs free")
+
+EFFECT = Effect(
+    "hose_spring",
+    "Hose that pulls a joint back.",
+    ("rotation",),
+    STIFFNESS,
+    source="Hooke's law",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the torque."""
+    stiffness = e.parameter(STIFFNESS)
+    stretch = shaft_angle(e, "velocity") - e.parameter(REST)
+    e.add(-stiffness * stretch)
+    e.stored_energy(stiffness * stretch**2 / 2)
+    e.loss(0)

@@ -1,0 +1,79 @@
+"""Rigid links behind elastic gears, on a mount at rest.
+
+    (J_hub + J_added) theta'' = tau - K (theta - q) - D (theta' - q')
+    M(q) q'' + C(q, q') q' + g(q) = K (theta - q) + D (theta' - q')
+
+theta is the gear's output as the motor encoder sees it: the outputs `q`, `qd` and the port of the
+joints belong to it, the tool to the links (`q_link`, `qd_link`). Mount as in `rigid`.
+
+Not modelled: hysteresis and stiffening of the gear, elastic links, motion of the mount.
+
+Source: Spong, J. Dyn. Sys. Meas. Control 109, 1987, 310-319.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..model import Model
+from ..quantity import Quantity
+from . import ANGLE, J_ADDED, SPEED, TAU
+from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+
+LEVEL = 4
+SOLVER = Solver("rodas3", 5e-4)  # a link of the wrist on its gear swings at 1 kHz
+K = Quantity(
+    "K",
+    "N.m/rad",
+    "torsional stiffness of the gears",
+    start=(3.1e4, 3.1e4, 3.1e4, 4.7e3, 4.7e3, 4.7e3),
+    minimum=0.0,
+    nominal=1e4,
+    size=6,
+)
+D = Quantity(
+    "D",
+    "N.m.s/rad",
+    "damping of the gears' twist",
+    start=(15.0, 15.0, 15.0, 0.5, 0.5, 0.5),
+    minimum=0.0,
+    nominal=10.0,
+    size=6,
+)
+J_HUB = Quantity(
+    "J_hub", "kg.m2", "inertia of each gear's output hub", start=1e-3, minimum=1e-9, nominal=1e-3
+)
+LINK_ANGLE = Quantity("link_angle", "rad", "state: angles of the links", start=ANGLE.start, size=6)
+LINK_SPEED = Quantity("link_speed", "rad/s", "state: speeds of the links", size=6)
+Q_LINK = Quantity("q_link", "rad", "angles of the links behind the gears", size=6)
+QD_LINK = Quantity("qd_link", "rad/s", "speeds of the links behind the gears", size=6)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mount = at_rest(read_mount(m))
+    tau, added = m.input(TAU), m.input(J_ADDED)
+    stiffness, damping = m.parameter(K), m.parameter(D)
+    theta, q = m.state(ANGLE), m.state(LINK_ANGLE)
+    thetad, qd = m.state(SPEED), m.state(LINK_SPEED)
+    twist, rate = theta - q, thetad - qd
+    hub = added + m.parameter(J_HUB)
+    driving = tau + joint_efforts(m, thetad, theta, tau)
+    gear = m.balance("gear", "compliance", deflection=twist, rate=rate, stiffness=stiffness)
+    through = stiffness * twist + damping * rate - gear.effort
+    arm = links(m, mount, q, qd)
+    dynamics = arm.accelerate(through, ca.SX.zeros(6))
+    m.derivative(theta, thetad)
+    m.derivative(q, qd)
+    m.derivative(thetad, (driving - through) / hub)
+    m.derivative(qd, dynamics.acceleration)
+    output_motion(m, mount, theta, thetad, arm.posture, tau)
+    m.output(Q_LINK, q)
+    m.output(QD_LINK, qd)
+    locked = arm.posture.mass_properties().matrix()
+    output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
+    kinetic, potential = arm.energy()
+    m.stored_energy(kinetic + potential + ca.dot(hub, thetad**2) / 2)
+    m.stored_energy(ca.dot(stiffness, twist**2) / 2)
+    m.loss("gears", ca.dot(damping, rate**2))

@@ -1,0 +1,45 @@
+"""Joints that know nothing of each other: constant inertias, no gravity, exact kinematics.
+
+    q' = qd,   (J_link + J_added) qd' = tau
+    T_06 = product of Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i)
+
+For trying out a controller or a path. The mount's pose moves the tool; nothing acts on the mount.
+
+Not modelled: gravity, coupling of the joints, masses on the mount, payload.
+
+Source: UR5 Denavit-Hartenberg table of Universal Robots.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..laws.rigid_chain import Posture
+from ..model import Model
+from ..quantity import Quantity
+from . import ANGLE, J_ADDED, SPEED, TAU
+from .links import at_rest, chain, joint_efforts, output_motion, output_wrench, read_mount
+
+LEVEL = 0
+J_LINK = Quantity(
+    "J_link",
+    "kg.m2",
+    "inertias of the links as the joints feel them",
+    start=(1.680415, 2.264805, 0.684898, 0.017157, 0.003837, 0.000132),
+    minimum=1e-9,
+    size=6,
+)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mount = read_mount(m)
+    tau, rotor = m.input(TAU), m.input(J_ADDED)
+    inertia = m.parameter(J_LINK) + rotor
+    q, qd = m.state(ANGLE), m.state(SPEED)
+    m.derivative(q, qd)
+    m.derivative(qd, (tau + joint_efforts(m, qd, q, tau)) / inertia)
+    output_motion(m, mount, q, qd, Posture(chain(m), q), tau)
+    zero = ca.SX.zeros(6)
+    output_wrench(m, at_rest(mount), ca.SX.zeros(6, 6), zero, zero)
+    m.stored_energy(ca.dot(inertia, qd**2) / 2)

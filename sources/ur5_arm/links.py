@@ -1,0 +1,181 @@
+"""What the fidelities of the arm share: the mount, the links with their load, and the outputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+
+from ..laws.rigid_chain import Chain, ForwardDynamics, Posture, standard_dh, upper_triangle
+from ..laws.rotation import product, quaternion_rate, rotation_matrix, rotation_vector
+from ..model import SX, Model
+from . import (
+    ARM_BIAS,
+    ARM_INERTIA,
+    GRAVITY,
+    JOINT,
+    MOUNT_ACCELERATION,
+    MOUNT_ANGULAR_ACCELERATION,
+    MOUNT_FORCE,
+    MOUNT_MOMENT,
+    MOUNT_POSITION,
+    MOUNT_QUATERNION,
+    MOUNT_RATE,
+    MOUNT_ROTATION,
+    MOUNT_TRANSLATION,
+    MOUNT_VELOCITY,
+    QD,
+    TOOL_POSITION,
+    TOOL_ROTATION,
+    WRENCH,
+    Q,
+)
+
+
+class Mount(NamedTuple):
+    """Motion of the mount: pose in the world, twist and acceleration in its own axes."""
+
+    position: SX
+    quaternion: SX
+    velocity: SX
+    rate: SX
+    acceleration: SX
+    angular_acceleration: SX
+
+
+def read_mount(m: Model) -> Mount:
+    """Declare the inputs that say how the mount moves."""
+    return Mount(
+        m.input(MOUNT_POSITION),
+        m.input(MOUNT_QUATERNION),
+        m.input(MOUNT_VELOCITY),
+        m.input(MOUNT_RATE),
+        m.input(MOUNT_ACCELERATION),
+        m.input(MOUNT_ANGULAR_ACCELERATION),
+    )
+
+
+def at_rest(mount: Mount) -> Mount:
+    """The same pose without motion."""
+    zero = ca.SX.zeros(3)
+    return Mount(mount.position, mount.quaternion, zero, zero, zero, zero)
+
+
+def move_mount(m: Model, mount: Mount) -> None:
+    """Tell the energy test how the mount's pose and velocity follow from its twist."""
+    m.input_rate(mount.position, rotation_matrix(mount.quaternion) @ mount.velocity)
+    m.input_rate(mount.quaternion, quaternion_rate(mount.quaternion, mount.rate))
+    m.input_rate(mount.velocity, mount.acceleration - ca.cross(mount.rate, mount.velocity))
+    m.input_rate(mount.rate, mount.angular_acceleration)
+
+
+def joint_efforts(m: Model, speed: SX, angle: SX, torque: SX) -> SX:
+    """Open the balances of the joints, all together and one by one; what effects add to them."""
+    together = m.balance("joint", "rotation", velocity=speed, angle=angle, load=torque)
+    single = [
+        m.balance(
+            f"joint_{i + 1}", "rotation", velocity=speed[i], angle=angle[i], load=torque[i]
+        ).effort
+        for i in range(6)
+    ]
+    return together.effort + ca.vertcat(*single)
+
+
+def chain(m: Model) -> Chain:
+    """The links of the device."""
+    return standard_dh(
+        *(m.constant(name) for name in ("d", "a", "alpha", "mass", "centre", "inertia"))
+    )
+
+
+@dataclass(frozen=True)
+class Links:
+    """The links at the present joint angles and speeds on the present mount.
+
+    Attributes:
+        mount: motion of the mount.
+        posture: the chain with what effects add to the tool.
+        qd: joint speeds.
+        gravity: in mount axes.
+        load: wrench of the effects on the flange, in its axes.
+        tool_twist: velocity and angular velocity of the flange, in its axes.
+    """
+
+    mount: Mount
+    posture: Posture
+    qd: SX
+    gravity: SX
+    load: SX
+    tool_twist: SX
+
+    def accelerate(self, torque: SX, rotor: SX) -> ForwardDynamics:
+        """Motion of the joints under their torques; the bias includes gravity."""
+        dynamics = self.posture.forward_dynamics(
+            self.qd,
+            torque,
+            rotor,
+            base_rate=self.mount.rate,
+            base_acceleration=self.mount.acceleration - self.gravity,
+            base_angular_acceleration=self.mount.angular_acceleration,
+            load=self.load,
+        )
+        weight = dynamics.inertia[:, :3] @ self.gravity
+        return replace(dynamics, bias=dynamics.bias - weight)
+
+    def energy(self) -> tuple[SX, SX]:
+        """Kinetic and potential energy; zero height is the world's origin."""
+        rates = self.posture.rates(self.qd, self.mount.rate)
+        velocities = self.posture.velocities(rates, self.mount.velocity, self.mount.rate)
+        whole = self.posture.mass_properties()
+        up = rotation_matrix(self.mount.quaternion).T
+        moment = whole.first_moment + whole.mass * (up @ self.mount.position)
+        return self.posture.kinetic_energy(rates, velocities), -ca.dot(self.gravity, moment)
+
+
+def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
+    """Build the chain of the device and open the balances of gravity and of the tool."""
+    level = ca.vertcat(0, 0, -m.parameter(GRAVITY))
+    tilted = level + m.balance("base", "signal", unit="m/s2", value=level).effort
+    rotation = rotation_matrix(mount.quaternion)
+    gravity = rotation.T @ tilted
+    posture = Posture(chain(m), q)
+    rates = posture.rates(qd, mount.rate)
+    velocities = posture.velocities(rates, mount.velocity, mount.rate)
+    position, turn = posture.flange()
+    velocity, rate = posture.flange_motion(rates, velocities)
+    tool = m.balance(
+        "tool",
+        "body",
+        velocity=velocity,
+        rate=rate,
+        gravity=turn.T @ gravity,
+        position=mount.position + rotation @ position,
+        rotation=rotation @ turn,
+    )
+    posture = posture.carrying(tool.mass, tool.first_moment, tool.inertia)
+    return Links(mount, posture, qd, gravity, tool.effort, ca.vertcat(velocity, rate))
+
+
+def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torque: SX) -> None:
+    """Output joint motion and tool pose and bind the port of the joints.
+
+    `q`, `qd` belong to the gear outputs, `posture` to the links.
+    """
+    position, _ = posture.flange()
+    rotation = rotation_matrix(mount.quaternion)
+    attitude = product(mount.quaternion, posture.flange_quaternion())
+    m.output(Q, q)
+    m.output(QD, qd)
+    m.output(TOOL_POSITION, mount.position + rotation @ position)
+    m.output(TOOL_ROTATION, rotation_vector(attitude))
+    m.port(JOINT, torque, qd)
+
+
+def output_wrench(m: Model, mount: Mount, inertia: SX, bias: SX, wrench: SX) -> None:
+    """Output the wrench and what it consists of; bind the ports of the mount."""
+    m.output(WRENCH, wrench)
+    m.output(ARM_INERTIA, upper_triangle(inertia))
+    m.output(ARM_BIAS, bias)
+    m.port(MOUNT_TRANSLATION, m.output(MOUNT_FORCE, wrench[:3]), mount.velocity)
+    m.port(MOUNT_ROTATION, m.output(MOUNT_MOMENT, wrench[3:]), mount.rate)

@@ -1,0 +1,61 @@
+"""Servo without inner life: stiff springs and dampers between set and actual joint motion.
+
+    tau = k (q_set - q) + d (qd_set - qd)
+    i = tau / (eta N K_t),   u = R i + K_t N qd
+
+Current and voltage are those a lossless hold of this torque would take; nothing limits them. Under
+gravity a joint of a UR5 sags by some tenths of a milliradian.
+
+Not modelled: integral action, limits, dynamics of the winding, friction (attach it as an effect).
+
+Source: textbook.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..model import Model
+from ..quantity import Quantity
+from . import ETA, J_B, J_M, JOINT, K_T, R_A, TAU, I, N, U
+from .gearmotor import effort, output_current, read
+
+LEVEL = 0
+SOLVER = Solver("rk4", 1e-4)
+K = Quantity(
+    "k",
+    "N.m/rad",
+    "stiffness of the hold",
+    start=(2e5, 2e5, 2e5, 2e4, 2e4, 2e4),
+    minimum=0.0,
+    nominal=1e5,
+    size=6,
+)
+D = Quantity(
+    "d",
+    "N.m.s/rad",
+    "damping of the hold",
+    start=(1200.0, 1200.0, 1200.0, 80.0, 80.0, 80.0),
+    minimum=0.0,
+    nominal=1e3,
+    size=6,
+)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    servo = read(m)
+    ratio, constant = m.parameter(N), m.parameter(K_T)
+    hold = m.parameter(K) * (servo.q_set - servo.q) + m.parameter(D) * (servo.qd_set - servo.qd)
+    torque = hold + effort(
+        m, "joint", "rotation", velocity=servo.speed, angle=servo.angle, load=hold
+    )
+    current = hold / (m.parameter(ETA) * ratio * constant)
+    m.output(TAU, torque)
+    m.output(I, current)
+    m.output(U, m.parameter(R_A) * current + constant * ratio * servo.speed)
+    output_current(m, current)
+    m.output(J_B, ratio**2 * m.parameter(J_M))
+    m.port(JOINT, torque, servo.speed)
+    m.supply(ca.dot(hold, servo.speed))

@@ -1,0 +1,51 @@
+"""Continuous PID on the angle error that sets the motor voltage; constant gear efficiency.
+
+    e = q_set - q,   I' = Ki e,   f' = (e - f)/T_f
+    u = sat(Kp e + I + Kd (e - f)/T_f, u_max)
+    L_a i' = u - R_a i - K_t N qd,   tau = N eta K_t i - b qd,   J_b = N^2 J_m
+
+The factor eta multiplies torque in both directions of power flow, as in the paper; on braking it
+gives back power that was never put in. `servo_lossy` repairs that. `qd_set` is not used.
+
+Not modelled: current limit, anti-windup, sampling, elasticity of the gears (`ur5_arm/elastic`).
+
+Source: digital twin paper (UR5 position control and gearmotor blocks).
+"""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+
+from ..component import Solver
+from ..model import SX, Model
+from ..quantity import Quantity
+from . import INTEGRAL, KD, KI, KP, U_MAX
+from .gearmotor import Servo, gear, read, winding
+
+LEVEL = 1
+SOLVER = Solver("rodas3", 1e-4)
+T_F = Quantity(
+    "T_f", "s", "filter time of the derivative", start=1 / (2 * math.pi * 400), minimum=1e-6
+)
+FILTERED = Quantity("filtered", "rad", "state: filtered angle errors", size=6, nominal=0.01)
+
+
+def control(m: Model, servo: Servo) -> SX:
+    """Voltages of the continuous PID."""
+    integral, filtered = m.state(INTEGRAL), m.state(FILTERED)
+    error = servo.q_set - servo.q
+    change = (error - filtered) / m.parameter(T_F)
+    m.derivative(integral, m.parameter(KI) * error)
+    m.derivative(filtered, change)
+    limit = m.parameter(U_MAX)
+    wanted = m.parameter(KP) * error + integral + m.parameter(KD) * change
+    return ca.fmax(-limit, ca.fmin(wanted, limit))
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    servo = read(m)
+    coils = winding(m, servo.speed, control(m, servo))
+    gear(m, servo, coils, lambda eta, power: eta)
