@@ -1,0 +1,197 @@
+"""Rigid body on two tracks whose road wheels press on the floor and slide with Coulomb friction.
+
+Road wheel i of a track lies at (x_i, y_t), y_t = -B/2 (right) or +B/2 (left), x_i equally spaced
+from -a to a. Its ground point slides with u, the floor answers with f:
+
+    u = (v_x - y_t w_z - r w_t,  v_y + x_i w_z),   f = -N_i (mu u_x, mu_lat u_y)/max(|u|, u_0)
+
+(linear below u_0). The loads N_i carry the weight and what effects add, quasi-statically and
+linear in x and y over the road wheels:
+
+    N_i = P/(2n) + x_i T_x/(2 sum x_i^2) + y_t T_y/(2n (B/2)^2)
+    P = m g - F_z,  T_x = m g x_G + M_y,  T_y = m g y_G - M_x
+
+The body obeys planar Newton-Euler equations about O1 (`laws/planar_body.py`), driven by the sum of
+f, rolling resistance -f_r N_i tanh(v_t/v_r) along each track (v_t = v_x - y_t w_z) and effects. The
+tracks have no mass and run at r w_t: the sprockets need tau2 = r sum f_x (right), tau3 (left).
+
+O1 is the middle of the contact rectangle. e2, e3 are the shifts that a two-wheeled model would need
+for the present motion; the rotation centres lie on the line x = x_V = -v_y/w_z.
+
+Not modelled: load transfer by acceleration, suspension, belt tension and slip on the sprocket, soft
+ground, unequal spacing of road wheels, lifting (a road wheel whose load would be negative carries
+none, the others do not take over).
+
+Source: Coulomb friction under a rigid track, e.g. Wong, Theory of Ground Vehicles, ch. 6 (skid
+steering); quasi-static formulas in README.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..laws import planar_body
+from ..laws.planar_frame import rotated
+from ..model import SX, Model
+from ..quantity import Quantity
+from . import E2, E3, SPROCKET_LEFT, SPROCKET_RIGHT, TAU2, TAU3, B, R
+from .pose import (
+    YAW_RATE_FLOOR,
+    Pose,
+    integrate_pose,
+    pose_states,
+    track_speeds,
+    virtual_wheels,
+)
+
+LEVEL = 2
+SOLVER = Solver("rodas3_adaptive", 0.02, 1e-6)
+"""Friction at rest decays within 0.2 ms; only the error-controlled solver steps over it cheaply."""
+
+A = Quantity(
+    "a", "m", "half length of the ground contact, first to last road wheel", start=0.1, minimum=1e-3
+)
+MU = Quantity("mu", "1", "friction coefficient of track on floor", start=0.6, minimum=0.0)
+MASS = Quantity("mass", "kg", "mass of the vehicle", start=20.0, minimum=0.1, nominal=10.0)
+YAW_INERTIA = Quantity(
+    "yaw_inertia", "kg.m2", "yaw inertia about the mass centre", start=0.5, minimum=1e-3
+)
+X_G = Quantity("x_G", "m", "mass centre in front of O1", nominal=0.01)
+Y_G = Quantity("y_G", "m", "mass centre to the left of O1", nominal=0.01)
+Z_G = Quantity("z_G", "m", "height of the mass centre over the floor", start=0.1, nominal=0.1)
+F_R = Quantity("f_r", "1", "rolling resistance coefficient", minimum=0.0, nominal=0.01)
+GRAVITY = Quantity("gravity", "m/s2", "gravity", start=9.81, minimum=0.0)
+U_0 = Quantity(
+    "u_0", "m/s", "sliding speed below which friction is linear", start=1e-3, minimum=1e-6
+)
+V_R = Quantity(
+    "v_r", "m/s", "speed over which the rolling resistance changes sign", start=5e-3, minimum=1e-6
+)
+VEL_X = Quantity("vel_x", "m/s", "speed of O1 along body x, the state behind v", nominal=0.1)
+VEL_Y = Quantity("vel_y", "m/s", "speed of O1 along body y, the state behind v_y", nominal=0.1)
+YAW_RATE = Quantity("yaw_rate", "rad/s", "yaw rate, the state behind w_z", nominal=0.1)
+
+V_Y = Quantity("v_y", "m/s", "speed of O1 along the body y axis")
+X_AXIS = Quantity("x_axis", "m", "distance of the present rotation centres in front of O1")
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    speeds = track_speeds(m)
+    pose = pose_states(m)
+    v_x, v_y, w_z = m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE)
+    r, track, half_length = m.parameter(R), m.parameter(B), m.parameter(A)
+    mass, inertia, mu = m.parameter(MASS), m.parameter(YAW_INERTIA), m.parameter(MU)
+    x_g, y_g, z_g = m.parameter(X_G), m.parameter(Y_G), m.parameter(Z_G)
+    gravity, resistance = m.parameter(GRAVITY), m.parameter(F_R)
+    u_0, v_r = m.parameter(U_0), m.parameter(V_R)
+    count = int(m.constant("road_wheels"))
+
+    # Road wheels: the right track's first, then the left track's.
+    spacing = ca.DM([2 * i / (count - 1) - 1 for i in range(count)])
+    along = ca.vertcat(spacing, spacing) * half_length
+    side = ca.vertcat(-ca.DM.ones(count), ca.DM.ones(count))
+    across = side * track / 2
+    belt = r * ca.vertcat(ca.repmat(speeds.w2, count), ca.repmat(speeds.w3, count))
+
+    load = m.balance("load", "position", value=ca.vertcat(x_g, y_g, z_g))
+    centre = ca.vertcat(x_g, y_g, z_g) + load.effort
+    cos, sin = ca.cos(pose.beta), ca.sin(pose.beta)
+    body = m.balance(
+        "body",
+        "body",
+        velocity=ca.vertcat(v_x, v_y, 0),
+        rate=ca.vertcat(0, 0, w_z),
+        gravity=ca.vertcat(0, 0, -gravity),
+        position=ca.vertcat(pose.x, pose.y, 0),
+        rotation=ca.vertcat(ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)),
+        mass=mass,
+        first_moment=mass * centre,
+    )
+    total = mass + body.mass
+    first = mass * centre + body.first_moment
+    about_origin = inertia + mass * (centre[0] ** 2 + centre[1] ** 2) + body.inertia[2, 2]
+
+    normal = _loads(
+        gravity * total - body.effort[2],
+        gravity * first[0] + body.effort[4],
+        gravity * first[1] - body.effort[3],
+        along,
+        across,
+        count,
+    )
+    forward = v_x - across * w_z
+    slide_x, slide_y = forward - belt, v_y + along * w_z
+    sliding = ca.sqrt(slide_x**2 + slide_y**2 + 1e-24)  # the floor keeps the slope at rest
+    mu_long, mu_lat = _friction(m, mu, side, pose, along, across, sliding)
+    scale = normal / ca.fmax(sliding, u_0)
+    f_x, f_y = -mu_long * scale * slide_x, -mu_lat * scale * slide_y
+    rolling = -resistance * normal * ca.tanh(forward / v_r)
+    pivot = m.balance(
+        "pivot", "pivot", spin=w_z, rolling=ca.sqrt(v_x**2 + 1e-12), normal=ca.sum1(normal)
+    )
+
+    a_x, a_y, w_dot = planar_body.accelerations(
+        total,
+        first[0],
+        first[1],
+        about_origin,
+        ca.sum1(f_x + rolling) + body.effort[0],
+        ca.sum1(f_y) + body.effort[1],
+        ca.dot(along, f_y) - ca.dot(across, f_x + rolling) + body.effort[5] + pivot.effort,
+        w_z,
+    )
+    m.derivative(v_x, a_x + w_z * v_y)
+    m.derivative(v_y, a_y - w_z * v_x)
+    m.derivative(w_z, w_dot)
+    integrate_pose(m, pose, v_x, v_y, w_z)
+    e2, e3 = virtual_wheels(r, track, speeds, v_x, w_z)
+    m.output(E2, e2)
+    m.output(E3, e3)
+    m.output(V_Y, v_y)
+    m.output(X_AXIS, -v_y * w_z / (w_z**2 + YAW_RATE_FLOOR**2))
+
+    pull2, pull3 = r * ca.sum1(f_x[:count]), r * ca.sum1(f_x[count:])
+    right = m.balance("sprocket_right", "rotation", velocity=speeds.w2_in, load=pull2)
+    left = m.balance("sprocket_left", "rotation", velocity=speeds.w3_in, load=pull3)
+    m.port(SPROCKET_RIGHT, m.output(TAU2, pull2 - right.effort), speeds.w2_in)
+    m.port(SPROCKET_LEFT, m.output(TAU3, pull3 - left.effort), speeds.w3_in)
+    # A track that an effect makes run at another speed than its drive takes the difference in
+    # power from where the effect comes from.
+    m.supply(pull2 * (speeds.w2 - speeds.w2_in) + pull3 * (speeds.w3 - speeds.w3_in))
+    m.stored_energy(
+        planar_body.kinetic_energy(total, first[0], first[1], about_origin, v_x, v_y, w_z)
+    )
+    m.loss("sliding", -ca.dot(f_x, slide_x) - ca.dot(f_y, slide_y))
+    m.loss("rolling", -ca.dot(rolling, forward))
+
+
+def _loads(weight: SX, pitch: SX, roll: SX, along: SX, across: SX, count: int) -> SX:
+    """Normal forces of the road wheels, linear in their position, from weight and its moments."""
+    even = weight / (2 * count)
+    slope_x = pitch / ca.sumsqr(along)
+    slope_y = roll / ca.sumsqr(across)
+    return ca.fmax(even + slope_x * along + slope_y * across, 0)
+
+
+def _friction(
+    m: Model, mu: SX, side: SX, pose: Pose, along: SX, across: SX, sliding: SX
+) -> tuple[SX, SX]:
+    """Friction coefficients of the road wheels along and across the tracks, open to effects."""
+    count = along.numel() // 2
+    x, y = rotated(pose.beta, along, across)
+    place = {"x": pose.x + x, "y": pose.y + y, "speed": sliding}
+    value = mu * ca.SX.ones(2 * count)
+    both = m.balance("mu", "coefficient", unit="1", value=value, side=side, **place)
+    value = value + both.effort
+    halves = []
+    for name, part in (("mu_right", slice(0, count)), ("mu_left", slice(count, None))):
+        here = {key: item[part] for key, item in place.items()}
+        balance = m.balance(name, "coefficient", unit="1", value=value[part], **here)
+        halves.append(value[part] + balance.effort)
+    along_track = ca.vertcat(*halves)
+    lateral = m.balance(
+        "mu_lateral", "coefficient", unit="1", value=along_track, longitudinal=along_track, **place
+    )
+    return ca.fmax(along_track, 0), ca.fmax(along_track + lateral.effort, 0)

@@ -1,0 +1,47 @@
+"""Two virtual wheels that roll without slip, `e_right` and `e_left` outside the track centre lines.
+
+    w_z = r (w2 - w3)/(B + e2 + e3)
+    v   = r ((B/2 + e3) w2 + (B/2 + e2) w3)/(B + e2 + e3)
+    x' = v cos beta + x_V w_z sin beta,  y' = v sin beta - x_V w_z cos beta,  beta' = w_z
+
+With e2 = e3 = 0 this is plain differential drive. The virtual wheels stand where the instantaneous
+centres of rotation of the tracks are, on the V-axis, `x_V` in front of the body frame origin.
+
+Not modelled: forces (tau2 and tau3 are 0), the dependence of e2, e3 and x_V on speed, floor and
+load, slip in straight driving, transients.
+
+Source: crawler paper, Eq 18, 19 and 29 (sign corrected, see README).
+"""
+
+from __future__ import annotations
+
+from ..component import Solver
+from ..model import Model
+from ..quantity import Quantity
+from . import X_V, B, R
+from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, two_wheel_motion
+
+LEVEL = 0
+SOLVER = Solver("rk4", 2e-3)
+
+E_RIGHT = Quantity(
+    "e_right",
+    "m",
+    "outward shift of the right virtual wheel, e2",
+    start=0.0395,
+    minimum=-0.04,
+    nominal=0.01,
+)
+E_LEFT = Quantity(
+    "e_left", "m", "outward shift of the left virtual wheel, e3", minimum=-0.04, nominal=0.01
+)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    speeds = track_speeds(m)
+    r, track, x_v = m.parameter(R), m.parameter(B), m.parameter(X_V)
+    e2, e3 = m.parameter(E_RIGHT), m.parameter(E_LEFT)
+    v, w_z = two_wheel_motion(r, track, e2, e3, speeds)
+    integrate_pose(m, pose_states(m), v, -x_v * w_z, w_z)
+    output_kinematic(m, speeds, e2, e3)

@@ -1,0 +1,1 @@
+"""Laws that several components share, as functions of CasADi expressions."""
