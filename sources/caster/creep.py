@@ -1,0 +1,55 @@
+"""Swivelling caster whose wheel creeps in proportion to its force, up to Coulomb's limit.
+
+Motion of fork and wheel as in `fork.py`, friction as in `wheel_contact/creep.py`:
+
+    p_h = -s_h/c_h,  p_n = -s_n/c_n,   f = p / sqrt(1 + |p|^2/(mu N)^2)
+
+Not modelled: dry friction of the swivel (effect `coulomb` on the balance `swivel`), scrub torque
+(effect `pivot_torque`), static excess of mu.
+
+Source: digital twin paper, block CasterWheel; Johnson, Contact Mechanics, 1985, ch. 8 for creep.
+"""
+
+from __future__ import annotations
+
+from ..component import Solver
+from ..laws import contact
+from ..model import SX, Model
+from ..quantity import Quantity
+from .fork import fork
+
+LEVEL = 2
+SOLVER = Solver("rodas3", 1e-3)
+MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
+C_H = Quantity(
+    "c_h", "m/(N.s)", "creep velocity per force, along the wheel", start=1e-6, minimum=1e-12
+)
+C_N = Quantity("c_n", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12)
+REST = Quantity(
+    "rest",
+    "1",
+    "creep coefficients at standstill over the rolling ones",
+    start=1.0,
+    minimum=1e-6,
+)
+V_CREEP = Quantity(
+    "v_creep", "m/s", "rolling speed between standstill and rolling", start=0.02, minimum=1e-6
+)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mu, c_h, c_n = m.parameter(MU), m.parameter(C_H), m.parameter(C_N)
+    rest, v_creep = m.parameter(REST), m.parameter(V_CREEP)
+
+    def friction(s_h: SX, s_n: SX, load: SX, rolling: SX, x: SX, y: SX) -> tuple[SX, SX]:
+        patch = m.balance("mu", "coefficient", unit="1", value=mu, x=x, y=y)
+        return contact.creep(
+            s_h,
+            s_n,
+            contact.creep_coefficient(c_h, rest, rolling, v_creep),
+            contact.creep_coefficient(c_n, rest, rolling, v_creep),
+            (mu + patch.effort) * load,
+        )
+
+    fork(m, friction)

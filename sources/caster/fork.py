@@ -1,0 +1,146 @@
+"""What the swivelling fidelities share: fork and wheel under a given friction law.
+
+With h = (cos psi, sin psi) along the wheel and n across it, trail t, yaw rate W = w_z + psi' of the
+fork, total mass m and first moment c = m_w t + m_f t x_f behind the pivot, inertia J about it:
+
+    s_h = v.h - r w,   s_n = v.n - t W,   (f_h, f_n) by the friction law
+    J_c w' = -r f_h - b_w w - c_rr N r tanh(w/w_rr) + axle
+    T = -t f_n - b_s psi' + swivel + floor
+    J W' = T + c a.n                                 (a: acceleration of the pivot)
+    force on the body at the pivot: f_h h + f_n n + c (W' n - W^2 h) - m a
+    moment on the body: b_s psi' - swivel
+
+a is eliminated. The state is the fork's angular momentum about the pivot, L = J W - c v.n, whose
+rate T + c W v.h holds no acceleration. The force on the body is split into
+
+    f_h h + f_n n + (c/J) T n - c W^2 h + (c^2/J) w_z (v.h) n                 `f_x`, `f_y`
+    -m a + (c^2/J) n (n.v')                                                  `mass`, `relief`
+
+with v' the rates of the velocity components in body axes, of which the body computes the second
+line. The kinetic energy m |v|^2/2 - c W v.n + J W^2/2 counts here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import casadi as ca
+
+from ..laws.contact import rolling_resistance
+from ..model import SX, Model
+from ..quantity import Quantity
+from . import (
+    F_N,
+    F_X,
+    F_Y,
+    F_Z,
+    M_F,
+    M_W,
+    M_Z,
+    MASS,
+    PIVOT_X,
+    PIVOT_Y,
+    PSI,
+    RELIEF,
+    V_X,
+    V_Y,
+    W_Z,
+    X_W,
+    Y_W,
+    YAW,
+    W,
+)
+
+TRAIL = Quantity("trail", "m", "wheel axis behind the swivel axis", start=0.0382, minimum=1e-4)
+R = Quantity("r", "m", "rolling radius", start=0.0625, minimum=1e-3)
+J_C = Quantity("J_c", "kg.m2", "spin inertia of the wheel", start=0.00092, minimum=1e-9)
+J_T = Quantity("J_t", "kg.m2", "yaw inertia of the wheel about its centre", start=5e-4, minimum=0.0)
+J_F = Quantity(
+    "J_f", "kg.m2", "yaw inertia of the fork about its mass centre", start=3e-4, minimum=1e-9
+)
+X_F = Quantity("x_f", "1", "mass centre of the fork behind the swivel axis, in trails")
+B_S = Quantity("b_s", "N.m.s/rad", "viscous damping of the swivel", start=0.05, minimum=0.0)
+B_W = Quantity("b_w", "N.m.s/rad", "viscous friction of the wheel bearing", minimum=0.0)
+C_RR = Quantity("c_rr", "1", "rolling resistance coefficient", minimum=0.0, nominal=0.01)
+W_RR = Quantity(
+    "w_rr",
+    "rad/s",
+    "wheel speed over which the rolling resistance changes sign",
+    start=0.1,
+    minimum=1e-6,
+)
+
+SWIVEL_ANGLE = Quantity("swivel_angle", "rad", "state: swivel angle psi")
+MOMENTUM = Quantity(
+    "momentum", "N.m.s", "state: angular momentum of fork and wheel about the pivot", nominal=1e-3
+)
+SPIN = Quantity("spin", "rad/s", "state: wheel speed")
+
+Friction = Callable[[SX, SX, SX, SX, SX, SX], tuple[SX, SX]]
+"""(s_h, s_n, normal force, r w, x, y) -> forces along the wheel and across it."""
+
+ROLLING_FLOOR = 1e-12
+"""Added to the squared rolling speed [m2/s2], so that its root has a slope at standstill."""
+
+
+def fork(m: Model, friction: Friction) -> None:
+    """Collect the equations of a swivelling caster with the given friction."""
+    v_x, v_y, w_z, load = m.input(V_X), m.input(V_Y), m.input(W_Z), m.input(F_N)
+    x_w, y_w = m.input(X_W), m.input(Y_W)
+    trail, radius, spin_inertia = m.parameter(TRAIL), m.parameter(R), m.parameter(J_C)
+    fork_mass, wheel_mass = m.parameter(M_F), m.parameter(M_W)
+    behind = m.parameter(X_F) * trail
+    swivel_damping, drag = m.parameter(B_S), m.parameter(B_W)
+    c_rr, w_rr = m.parameter(C_RR), m.parameter(W_RR)
+    spin, angle, momentum = m.state(SPIN), m.state(SWIVEL_ANGLE), m.state(MOMENTUM)
+
+    mass = fork_mass + wheel_mass
+    moment = wheel_mass * trail + fork_mass * behind
+    inertia = m.parameter(J_T) + m.parameter(J_F) + wheel_mass * trail**2 + fork_mass * behind**2
+    ratio = moment / inertia
+    h_x, h_y = ca.cos(angle), ca.sin(angle)
+    ahead, aside = h_x * v_x + h_y * v_y, h_x * v_y - h_y * v_x
+    rate = momentum / inertia + ratio * aside
+    swing = rate - w_z
+
+    s_h, s_n = ahead - radius * spin, aside - trail * rate
+    f_h, f_n = friction(s_h, s_n, load, radius * spin, x_w, y_w)
+    m.loss("slip", -(f_h * s_h + f_n * s_n))
+    resistance = rolling_resistance(c_rr, load, radius, spin, w_rr)
+    m.loss("rolling", resistance * spin)
+    m.loss("swivel", swivel_damping * swing**2)
+    m.loss("bearing", drag * spin**2)
+
+    swivel = m.balance("swivel", "rotation", velocity=swing, angle=angle, normal=load)
+    axle = m.balance("axle", "rotation", velocity=spin, normal=load, radius=radius)
+    floor = m.balance(
+        "floor",
+        "pivot",
+        spin=rate,
+        rolling=ca.sqrt((radius * spin) ** 2 + ROLLING_FLOOR),
+        normal=load,
+    )
+    hinge = swivel.effort - swivel_damping * swing
+    torque = hinge + floor.effort - trail * f_n
+    m.derivative(spin, (axle.effort - radius * f_h - drag * spin - resistance) / spin_inertia)
+    m.derivative(angle, swing)
+    m.derivative(momentum, torque + moment * rate * ahead)
+
+    relief = ratio * moment
+    along = f_h - moment * rate**2
+    across = f_n + ratio * torque + relief * w_z * ahead
+    f_x = m.output(F_X, along * h_x - across * h_y)
+    f_y = m.output(F_Y, along * h_y + across * h_x)
+    m.output(F_Z, load)
+    m_z = m.output(M_Z, -hinge)
+    m.output(PSI, angle)
+    m.output(W, spin)
+    m.output(MASS, mass)
+    m.output(RELIEF, ca.vertcat(relief * h_y * h_y, -relief * h_x * h_y, relief * h_x * h_x))
+    m.stored_energy(
+        (mass * (v_x**2 + v_y**2) - relief * aside**2 + momentum**2 / inertia) / 2
+        + spin_inertia * spin**2 / 2
+    )
+    m.port(PIVOT_X, f_x, v_x)
+    m.port(PIVOT_Y, f_y, v_y)
+    m.port(YAW, m_z, w_z)

@@ -1,0 +1,53 @@
+"""Frictionless point that carries weight.
+
+    f_x = f_y = 0,   m_z = 0
+
+Not modelled: swivel, rolling and friction of the caster; its mass is carried at the pivot.
+
+Source: the support of a planar base model, e.g. Siciliano et al., Robotics, 2009, ch. 11.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..model import Model
+from . import (
+    F_N,
+    F_X,
+    F_Y,
+    F_Z,
+    M_F,
+    M_W,
+    M_Z,
+    MASS,
+    PIVOT_X,
+    PIVOT_Y,
+    PSI,
+    RELIEF,
+    V_X,
+    V_Y,
+    W_Z,
+    X_W,
+    Y_W,
+    YAW,
+    W,
+)
+
+LEVEL = 0
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    v_x, v_y, w_z, f_n = m.input(V_X), m.input(V_Y), m.input(W_Z), m.input(F_N)
+    m.input(X_W)
+    m.input(Y_W)
+    mass = m.output(MASS, m.parameter(M_F) + m.parameter(M_W))
+    m.output(RELIEF, ca.SX.zeros(3))
+    for quantity in (F_X, F_Y, M_Z, PSI, W):
+        m.output(quantity, 0)
+    m.output(F_Z, f_n)
+    m.stored_energy(mass * (v_x**2 + v_y**2) / 2)
+    m.port(PIVOT_X, 0, v_x)
+    m.port(PIVOT_Y, 0, v_y)
+    m.port(YAW, 0, w_z)

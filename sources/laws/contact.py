@@ -1,0 +1,67 @@
+"""A wheel on a flat floor: normal force, friction with and without creep, rolling resistance.
+
+Source: spring-damper with a smooth onset and stick-slip friction as in MathWorks' Spatial Contact
+Force block, whose blending formulas are not published: those here are C1 and ours. Creep: Johnson,
+Contact Mechanics, 1985, ch. 8.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+SX = Any
+
+FORCE_FLOOR = 1e-6
+"""Friction limit [N] below which creep friction becomes viscous: keeps a lifted wheel regular."""
+
+
+def normal_force(depth: SX, rate: SX, k: SX, b: SX, width: SX) -> tuple[SX, SX, SX]:
+    """Normal force, elastic energy and loss power of a floor that is penetrated by `depth`.
+
+    f = max(0, s (k d + b d')),  s = x^2 (3 - 2 x),  x = d/width limited to 0 ... 1
+    """
+    x = ca.fmax(0, ca.fmin(depth / width, 1))
+    onset = x * x * (3 - 2 * x)
+    elastic = onset * k * depth
+    force = ca.fmax(0, elastic + onset * b * rate)
+    rise = width**2 * x**4 * (3 / 4 - 2 / 5 * x)  # integral of s d over the transition
+    beyond = ca.fmax(depth, width)
+    energy = k * (rise + (beyond * beyond - width**2) / 2)
+    return force, energy, (force - elastic) * rate
+
+
+def stick_slip(s_x: SX, s_y: SX, f_n: SX, mu_s: SX, mu_d: SX, v_c: SX) -> tuple[SX, SX]:
+    """Friction force against the slip velocity s, v = |s|:
+
+    mu(v) = mu_s (v/v_c) (3 - (v/v_c)^2)/2                          for v <= v_c
+          = mu_d + (mu_s - mu_d) exp(-((v/v_c - 1)/2)^2)            for v > v_c
+    """
+    square = (s_x * s_x + s_y * s_y) / (v_c * v_c)
+    v = ca.sqrt(ca.fmax(square, 1))
+    sliding = mu_d + (mu_s - mu_d) * ca.exp(-(((v - 1) / 2) ** 2))
+    gain = -f_n * sliding * (3 - ca.fmin(square, 1)) / (2 * v_c * v)
+    return gain * s_x, gain * s_y
+
+
+def creep(s_x: SX, s_y: SX, c_x: SX, c_y: SX, limit: SX) -> tuple[SX, SX]:
+    """Friction that creeps in proportion to its force and cannot exceed a limit.
+
+    p_i = -s_i/c_i,   f_i = p_i / sqrt(1 + |p|^2/limit^2)
+    """
+    p_x, p_y = -s_x / c_x, -s_y / c_y
+    bound = ca.fmax(limit, FORCE_FLOOR)
+    scale = bound / ca.sqrt(bound * bound + p_x * p_x + p_y * p_y)
+    return scale * p_x, scale * p_y
+
+
+def creep_coefficient(coefficient: SX, rest: SX, speed: SX, transition: SX) -> SX:
+    """Creep coefficient of a wheel that rolls at `speed`: `rest` times it at standstill."""
+    square = speed * speed
+    return coefficient * (rest + (1 - rest) * square / (square + transition * transition))
+
+
+def rolling_resistance(coefficient: SX, f_n: SX, radius: SX, w: SX, w_0: SX) -> SX:
+    """Moment against rolling, `c f_n r tanh(w/w_0)`."""
+    return coefficient * f_n * radius * ca.tanh(w / w_0)

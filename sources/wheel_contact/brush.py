@@ -1,0 +1,74 @@
+"""Bristles between wheel and floor: friction that truly sticks, and side slip while rolling.
+
+    z' = s - a(|z|/z_max) |s| z/z_max - kappa |r w| z,   z_max = mu(|s|) f_n/k_t
+    f = -k_t z - d_t max(0, 1 - |z|/z_max) s,   mu(v) = mu_d + (mu_s - mu_d) exp(-(v/v_s)^2)
+    E = k_t |z|^2/2,  P_loss = k_t z.(s - z') + d_t max(0, 1 - |z|/z_max) |s|^2
+
+z is the deflection along the wheel's plane and across, in metres; `a` rises smoothly from 0 at 0.7
+to 1 at 1. Standing, a force below the limit deflects the bristles and moves nothing more. Rolling
+carries deflected bristles out of the patch (kappa, about 1.2 over its length): a side force F then
+needs the slip kappa |r w| F/k_t, the cornering stiffness is k_t/kappa.
+
+Not modelled: distribution over the patch, self-aligning moment, dependence of k_t on load.
+
+Source: Canudas de Wit et al., Vehicle System Dynamics 39(3), 2003 (average lumped LuGre tyre);
+Velenis et al., Vehicle System Dynamics 43(1), 2005 (two directions); Dupont et al., IEEE Trans.
+Automatic Control 47(5), 2002 (the elastic range below 0.7).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..laws.bristle import STICK
+from ..model import SX, Model
+from ..quantity import Quantity
+from .stick_slip import MU_D, MU_S
+from .wheel import ROLLING_FLOOR, Contact, wheel
+
+LEVEL = 4
+SOLVER = Solver("rodas3", 1e-3)
+V_S = Quantity(
+    "v_s", "m/s", "slip velocity over which static friction falls", start=0.02, minimum=1e-6
+)
+K_T = Quantity(
+    "k_t", "N/m", "tangential stiffness of tread and floor", start=2e5, minimum=1.0, nominal=1e5
+)
+D_T = Quantity("d_t", "N.s/m", "tangential damping while stuck", start=300.0, minimum=0.0)
+KAPPA = Quantity(
+    "kappa", "1/m", "share of the deflection lost per distance rolled", start=40.0, minimum=0.0
+)
+Z_X = Quantity("z_x", "m", "deflection of the bristles along the wheel", nominal=1e-4)
+Z_Y = Quantity("z_y", "m", "deflection of the bristles across the wheel", nominal=1e-4)
+
+SMALL = 1e-24
+"""Added to squared lengths and speeds (SI), so that roots have slopes at 0."""
+LOAD_FLOOR = 1.0
+"""Normal force [N] below which bristles slide as under this one: a lifted wheel lets go."""
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mu_s, mu_d, v_s = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_S)
+    stiffness, damping, kappa = m.parameter(K_T), m.parameter(D_T), m.parameter(KAPPA)
+    z_x, z_y = m.state(Z_X), m.state(Z_Y)
+
+    def friction(c: Contact) -> tuple[SX, SX]:
+        patch = m.balance("mu", "coefficient", unit="1", value=mu_s, x=c.x, y=c.y)
+        square = c.s_x**2 + c.s_y**2
+        mu = (mu_d + (mu_s - mu_d) * ca.exp(-square / v_s**2)) * (1 + patch.effort / mu_s)
+        largest = mu * ca.fmax(c.f_n, LOAD_FLOOR) / stiffness
+        used = ca.sqrt(z_x**2 + z_y**2 + SMALL) / largest
+        x = ca.fmax(0, ca.fmin((used - STICK) / (1 - STICK), 1))
+        sliding = x**2 * (3 - 2 * x) * ca.sqrt(square + SMALL) / largest
+        decay = sliding + kappa * ca.sqrt(c.rolling**2 + ROLLING_FLOOR)
+        m.derivative(z_x, c.s_x - decay * z_x)
+        m.derivative(z_y, c.s_y - decay * z_y)
+        stuck = damping * ca.fmax(0, 1 - used)
+        deflection = z_x**2 + z_y**2
+        m.stored_energy(stiffness * deflection / 2)
+        m.loss("slip", stiffness * decay * deflection + stuck * square)
+        return -stiffness * z_x - stuck * c.s_x, -stiffness * z_y - stuck * c.s_y
+
+    wheel(m, friction, elastic=True)

@@ -1,0 +1,47 @@
+"""Smooth stick-slip friction under a given normal load.
+
+    mu(v) = mu_s (v/v_c) (3 - (v/v_c)^2)/2                          for v <= v_c
+          = mu_d + (mu_s - mu_d) exp(-((v/v_c - 1)/2)^2)            for v > v_c
+    f = -mu(v) f_n s/v,   v = |s|
+
+Below v_c it creeps: a side force F on wheels that carry N drifts at F v_c/(1.5 mu_s N). v_c of a
+few mm/s bends the path of a base visibly; take v_c <= 2 mm/s or `brush`.
+
+Not modelled: true standstill under load (`brush`), dependence of mu on load.
+
+Source: digital twin paper (Spatial Contact Force with static and dynamic coefficient and critical
+velocity); the blending is ours, MathWorks does not publish its own.
+"""
+
+from __future__ import annotations
+
+from ..component import Solver
+from ..laws import contact
+from ..model import SX, Model
+from ..quantity import Quantity
+from .wheel import Contact, Friction, wheel
+
+LEVEL = 2
+SOLVER = Solver("rodas3", 1e-3)
+MU_S = Quantity("mu_s", "1", "static friction coefficient", start=0.7, minimum=1e-6)
+MU_D = Quantity("mu_d", "1", "dynamic friction coefficient", start=0.5, minimum=0.0)
+V_C = Quantity(
+    "v_c", "m/s", "critical velocity, where friction is largest", start=0.002, minimum=1e-6
+)
+
+
+def stick_slip(m: Model) -> Friction:
+    """The friction law with its parameters; effects act on `mu`, and on mu_d in proportion."""
+    mu_s, mu_d, v_c = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_C)
+
+    def friction(c: Contact) -> tuple[SX, SX]:
+        patch = m.balance("mu", "coefficient", unit="1", value=mu_s, x=c.x, y=c.y)
+        share = 1 + patch.effort / mu_s
+        return contact.stick_slip(c.s_x, c.s_y, c.f_n * share, mu_s, mu_d, v_c)
+
+    return friction
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    wheel(m, stick_slip(m))
