@@ -13,8 +13,10 @@ from html import escape
 from pathlib import Path
 from typing import Literal
 
+import casadi as ca
+
 from ..function import Functions, build_functions
-from ..model import Model
+from ..model import Model, ModelError
 from ..variant import Name, build_model, fidelities, parse_name
 from . import description, native, python
 from .archive import pack
@@ -40,9 +42,18 @@ def collect(name: str) -> Variant:
 
     Raises:
         UnknownVariantError, ModelError: see `variant.build_model`.
+        ModelError: the period of a sample clock is not fixed.
     """
     parsed = parse_name(name)
     model = build_model(parsed)
+    fixed = {v.name for v in model.of_role("parameter") if v.quantity.variability == "fixed"}
+    for clock in model.clocks:
+        varying = {symbol.name() for symbol in ca.symvar(clock.period)} - fixed
+        if varying:
+            raise ModelError(
+                f"{parsed}: the period of clock {clock.name!r} depends on "
+                f"{', '.join(sorted(varying))}; it may depend on fixed parameters only"
+            )
     return Variant(parsed, model, build_functions(model), layout(model))
 
 

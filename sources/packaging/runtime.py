@@ -106,6 +106,9 @@ def _fmax(a: float, b: float) -> float:
     return a if a >= b or b != b else b
 
 
+SLACK = 1e-7  # part of its period by which a tick may be early
+
+
 class Slave(Fmi2Slave):  # type: ignore[misc]
     """The variables in one list; a value reference is an index into it."""
 
@@ -120,6 +123,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.IZ = self.IP + NP
         self.IS = self.IZ + NZ
         self.v = list(START)
+        self.period = [0.0] * NC
         self.tick = [0.0] * NC
         self.next = [0.0] * NC
         self.h = 0.0
@@ -134,12 +138,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def exit_initialization_mode(self) -> None:
         """Start the sample clocks."""
-        for k, period in enumerate(self._periods()):
+        if NC:
+            f_periods(self.v[self.IP : self.IZ], self.period)
+        for k, period in enumerate(self.period):
             if not period > 0.0:
                 raise ValueError(
                     f"{MODEL}: sample clock {k} has period {period:g} s; it must be positive"
                 )
-            self.tick[k] = float(_math.ceil(self.v[0] / period - 1e-7))
+            self.tick[k] = float(_math.ceil(self.v[0] / period - SLACK))
             self.next[k] = self.tick[k] * period
         self._refresh()
         self._check(self.IXD, NX)
@@ -149,6 +155,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def get_real(self, vrs: Any) -> list[float]:
         """Values by value reference."""
         self._refresh()
+        for vr in vrs:
+            if not _math.isfinite(self.v[vr]):
+                self._check(vr, 1)
         return [self.v[vr] for vr in vrs]
 
     def set_real(self, vrs: Any, values: Any) -> None:
@@ -190,6 +199,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
             "v": list(self.v),
+            "period": list(self.period),
             "tick": list(self.tick),
             "next": list(self.next),
             "h": self.h,
@@ -197,7 +207,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self.v, self.tick, self.next = list(state["v"]), list(state["tick"]), list(state["next"])
+        self.v, self.period = list(state["v"]), list(state["period"])
+        self.tick, self.next = list(state["tick"]), list(state["next"])
         self.h, self.initialized = state["h"], state["initialized"]
         self.stale = True
 
@@ -211,11 +222,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         v[0] = current_time
         end = current_time + step_size
         while True:
-            following = self._run_ticks()
-            last = not following < end
-            self._integrate(end if last else following)
-            if last:
-                self._check(self.IZ, NZ)
+            self._run_ticks()
+            following = self._next_tick(end)
+            self._integrate(following)
+            self._check(self.IZ, NZ)
+            if following == end:
                 return True
 
     # -- model ----------------------------------------------------------------------------------
@@ -242,16 +253,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                     f"at time {self.v[0]:.9g} s"
                 )
 
-    def _periods(self) -> list[float]:
-        result = [0.0] * NC
-        if NC:
-            f_periods(self.v[self.IP : self.IZ], result)
-        return result
-
-    def _run_ticks(self) -> float:
-        v, following = self.v, _math.inf
-        for k, period in enumerate(self._periods()):
-            if self.next[k] <= v[0] + 1e-7 * period:
+    def _run_ticks(self) -> None:
+        v = self.v
+        for k, period in enumerate(self.period):
+            if self.next[k] <= v[0] + SLACK * period:
                 z, u, p = self._slices()
                 result = [0.0] * NZ
                 UPDATES[k]([v[0]], v[self.IX : self.IXD], z, u, p, result)
@@ -259,9 +264,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 self.tick[k] += 1
                 self.next[k] = self.tick[k] * period
                 self.stale = True
-            if self.next[k] - 1e-7 * period < following:
-                following = self.next[k] - 1e-7 * period
-        return following
+
+    def _next_tick(self, end: float) -> float:
+        first = end
+        for following, period in zip(self.next, self.period, strict=True):
+            if following < end - SLACK * period and following < first:
+                first = following
+        return first
 
     # -- solvers ----------------------------------------------------------------------------------
 

@@ -29,11 +29,12 @@ enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
 typedef struct {
   double v[NV];
-  double tick[NC + 1];  /* index of the next tick of each clock */
-  double next[NC + 1];  /* its time */
-  double h;             /* last accepted step of an error-controlled solver, 0: none yet */
+  double period[NC + 1]; /* of each sample clock; depends on fixed parameters only */
+  double tick[NC + 1];   /* index of the next tick of each clock */
+  double next[NC + 1];   /* its time */
+  double h;              /* last accepted step of an error-controlled solver, 0: none yet */
   int32_t mode;
-  int32_t stale;        /* outputs and derivatives must be evaluated again */
+  int32_t stale;         /* outputs and derivatives must be evaluated again */
 } Memory;
 
 typedef struct {
@@ -47,14 +48,23 @@ typedef struct {
   void (*log3)(void *, int, const char *, const char *);
 } Instance;
 
+/* Log a message and return its status. FMI 2 takes the text as a format: no % may be left in it. */
 static int report(Instance *c, int status, const char *format, ...) {
-  char text[512];
+  char text[512], escaped[1024];
   va_list arguments;
   va_start(arguments, format);
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  const char *category = status == ERROR ? "logStatusError" : "logStatusWarning";
-  if (c->version == 2 && c->log2) c->log2(c->environment, c->name, status, category, text);
+  const char *category = status == ERROR ? "logStatusError" : "logStatusDiscard";
+  if (c->version == 2 && c->log2) {
+    char *to = escaped;
+    for (const char *from = text; *from; from++) {
+      *to++ = *from;
+      if (*from == '%') *to++ = '%';
+    }
+    *to = 0;
+    c->log2(c->environment, c->name, status, category, escaped);
+  }
   if (c->version == 3 && c->log3) c->log3(c->environment, status, category, text);
   return status;
 }
@@ -124,9 +134,10 @@ static void release(Instance *c) {
 static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
   for (size_t i = 0; i < n; i++) {
     uint32_t k = vr[i];
-    if (k >= NV) return report(c, ERROR, "%s: there is no variable with value reference %u", MODEL, k);
+    if (k >= NV || k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
     if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh(c);
     values[i] = c->m.v[k];
+    if (!isfinite(values[i])) return check_finite(c, k, 1);
   }
   return OK;
 }
@@ -166,6 +177,7 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
       c->m.stale = 1;
       continue;
     }
+    if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
     int status = set_value(c, k, values[i]);
     if (status != OK) return status;
   }
@@ -174,53 +186,54 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
 
 /* -- sample clocks ----------------------------------------------------------------------------- */
 
-static void periods(const double *v, double *period) {
-#if NC
-  const double *arg[] = {v + IP};
-  double *res[] = {period};
-  f_periods(arg, res, 0, 0, 0);
-#else
-  (void)v;
-  (void)period;
-#endif
-}
+/* Ticks lie at k*T. One within 1e-7 T of the end of a step belongs to the next step, at whose beginning
+   it is due, so that rounding of k*H and k*T cannot split one instant into two. */
+#define SLACK 1e-7
 
 static int start_clocks(Instance *c) {
-  double period[NC + 1];
-  periods(c->m.v, period);
-  for (int k = 0; k < NC; k++) {
-    if (!(period[k] > 0))
-      return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, period[k]);
-    c->m.tick[k] = ceil(c->m.v[0] / period[k] - 1e-7);
-    c->m.next[k] = c->m.tick[k] * period[k];
-  }
-  return OK;
-}
-
-/* Execute the clocks that are due at the present time; returns the time of the next tick. A tick is
-   due from 1e-7 of its period before its time on, so that rounding of k*H and k*T cannot split one
-   instant into two. */
-static double run_ticks(Instance *c) {
-  double next = INFINITY;
 #if NC
-  double *v = c->m.v, period[NC + 1], z[NZ + 1];
-  periods(v, period);
+  Memory *m = &c->m;
+  const double *arg[] = {m->v + IP};
+  double *res[] = {m->period};
+  f_periods(arg, res, 0, 0, 0);
   for (int k = 0; k < NC; k++) {
-    if (c->m.next[k] <= v[0] + 1e-7 * period[k]) {
-      const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
-      double *res[] = {z};
-      UPDATES[k](arg, res, 0, 0, 0);
-      memcpy(v + IZ, z, NZ * sizeof *z);
-      c->m.tick[k] += 1;
-      c->m.next[k] = c->m.tick[k] * period[k];
-      c->m.stale = 1;
-    }
-    if (c->m.next[k] - 1e-7 * period[k] < next) next = c->m.next[k] - 1e-7 * period[k];
+    if (!(m->period[k] > 0))
+      return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, m->period[k]);
+    m->tick[k] = ceil(m->v[0] / m->period[k] - SLACK);
+    m->next[k] = m->tick[k] * m->period[k];
   }
 #else
   (void)c;
 #endif
-  return next;
+  return OK;
+}
+
+/* Execute the clocks that are due at the present time, in order of declaration. */
+static void run_ticks(Instance *c) {
+#if NC
+  Memory *m = &c->m;
+  double *v = m->v, z[NZ + 1];
+  for (int k = 0; k < NC; k++) {
+    if (!(m->next[k] <= v[0] + SLACK * m->period[k])) continue;
+    const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
+    double *res[] = {z};
+    UPDATES[k](arg, res, 0, 0, 0);
+    memcpy(v + IZ, z, NZ * sizeof *z);
+    m->tick[k] += 1;
+    m->next[k] = m->tick[k] * m->period[k];
+    m->stale = 1;
+  }
+#else
+  (void)c;
+#endif
+}
+
+/* Time of the first tick that lies clearly before `end`, else `end`. */
+static double next_tick(const Instance *c, double end) {
+  double first = end;
+  for (int k = 0; k < NC; k++)
+    if (c->m.next[k] < end - SLACK * c->m.period[k] && c->m.next[k] < first) first = c->m.next[k];
+  return first;
 }
 
 /* -- solvers ----------------------------------------------------------------------------------- */
@@ -359,22 +372,27 @@ static int integrate(Instance *c, double t1) {
 
 static int do_step(Instance *c, double t, double h) {
   double *v = c->m.v;
-  if (c->m.mode != STEPPING) return report(c, ERROR, "%s: doStep before the end of initialization", MODEL);
+  if (c->m.mode != STEPPING)
+    return report(c, ERROR, "%s: doStep at %.9g s, but the FMU %s", MODEL, t,
+                  c->m.mode < EVENT ? "is not initialized" : c->m.mode == FAILED ? "has failed before"
+                  : c->m.mode == TERMINATED ? "is terminated" : "is not in step mode");
   if (!(h > 0) || !isfinite(h)) return report(c, ERROR, "%s: communication step %g s at time %.9g s", MODEL, h, t);
   if (!(fabs(t - v[0]) <= 1e-9 * (1 + fabs(t))))
     return report(c, ERROR, "%s: doStep starts at %.9g s but the FMU is at %.9g s", MODEL, t, v[0]);
   v[0] = t;
   const double t1 = t + h;
-  for (;;) {
-    const double next = run_ticks(c);
-    const int last = !(next < t1);
-    const int status = integrate(c, last ? t1 : next);
+  double next;
+  do {
+    run_ticks(c);
+    next = next_tick(c, t1);
+    int status = integrate(c, next);
+    if (status == OK) status = check_finite(c, IZ, NZ);
     if (status != OK) {
       c->m.mode = FAILED;
       return status;
     }
-    if (last) return check_finite(c, IZ, NZ);
-  }
+  } while (next < t1);
+  return OK;
 }
 
 /* -- modes --------------------------------------------------------------------------------------- */

@@ -172,7 +172,8 @@ EXPORT fmi2Status fmi2EnterEventMode(Instance *c) {
 }
 
 EXPORT fmi2Status fmi2NewDiscreteStates(Instance *c, fmi2EventInfo *info) {
-  const double next = run_ticks(c);
+  run_ticks(c);
+  const double next = next_tick(c, INFINITY);
   memset(info, 0, sizeof *info);
   info->nextEventTimeDefined = isfinite(next);
   info->nextEventTime = isfinite(next) ? next : 0;
