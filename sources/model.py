@@ -97,6 +97,27 @@ class Attachment:
         return f"{self.effect.name}@{self.balance}" if self.balance else self.effect.name
 
 
+def misfit(effect: Effect, balance: Balance) -> str:
+    """Why an effect cannot act on a balance, "" if it can."""
+    if balance.kind not in effect.kinds:
+        return (
+            f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
+            f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
+        )
+    if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
+        return (
+            f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
+            f"is in {balance.unit or '1'}"
+        )
+    lacking = [need for need in effect.needs if need not in balance.signals]
+    if lacking:
+        return (
+            f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
+            f"{balance.name!r} does not offer"
+        )
+    return ""
+
+
 class Model:
     """Collector of the equations of a variant.
 
@@ -137,6 +158,7 @@ class Model:
             self.stored: list[SX] = []
             self.losses: list[tuple[str, SX]] = []
             self.inflows: list[SX] = []
+            self.baked: set[str] = set()
             self._attached: dict[str, str] = {}  # spelling of an attachment -> balance or group
             self._vectors: dict[str, SX] = {}
             self.input_rates: dict[str, SX] = {}
@@ -177,9 +199,16 @@ class Model:
         root._vectors[full] = symbol
         return symbol
 
-    def parameter(self, quantity: Quantity) -> SX:
-        """Declare a parameter; its start value is the device's, else the declaration's."""
-        return self._declare(quantity, "parameter")
+    def parameter(self, quantity: Quantity, *, shared: str = "") -> SX:
+        """Declare a parameter; its start value is the device's, else the declaration's.
+
+        With `shared`, declare one of parts to come that share it under this prefix (see `part`).
+        """
+        prefix, self.prefix = self.prefix, self._full(shared) if shared else self.prefix
+        try:
+            return self._declare(quantity, "parameter")
+        finally:
+            self.prefix = prefix
 
     def constant(self, name: str) -> Any:
         """A number (or list) of the device file that is baked into the code.
@@ -190,6 +219,7 @@ class Model:
             raise ModelError(
                 f"{self.component.name}/{self.fidelity}: the device file has no value {name!r}"
             )
+        self._root.baked.add(name)
         return self.values[name]
 
     def input(self, quantity: Quantity) -> SX:
@@ -328,31 +358,13 @@ class Model:
         return self._full(name)
 
     def _fits(self, attachment: Attachment, balance: Balance) -> bool:
-        effect = attachment.effect
-        if attachment.balance:
-            if attachment.balance not in (balance.name, balance.group):
-                return False
-            if balance.kind not in effect.kinds:
-                raise ModelError(
-                    f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
-                    f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
-                )
-        elif balance.kind not in effect.kinds:
+        named = attachment.balance
+        if named and named not in (balance.name, balance.group):
             return False
-        if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
-            if attachment.balance:
-                raise ModelError(
-                    f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
-                    f"is in {balance.unit or '1'}"
-                )
-            return False
-        lacking = [need for need in effect.needs if need not in balance.signals]
-        if lacking and attachment.balance:
-            raise ModelError(
-                f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
-                f"{balance.name!r} does not offer"
-            )
-        return not lacking
+        reason = misfit(attachment.effect, balance)
+        if reason and named:
+            raise ModelError(reason)
+        return not reason
 
     # -- composition -----------------------------------------------------------------------------
 
@@ -473,16 +485,16 @@ class _Part(Model):
     def input_rate(self, symbol: SX, rate: SX) -> None:
         """Nothing: the whole determines how the part's inputs move."""
 
-    def parameter(self, quantity: Quantity) -> SX:
+    def parameter(self, quantity: Quantity, *, shared: str = "") -> SX:
         if quantity.name in self._parameters:
             self.seen_parameters.add(quantity.name)
             return self._parameters[quantity.name]
-        shared = f"{self._shared}.{quantity.name}"
-        if shared in self._root._vectors:
-            return self._root._vectors[shared]
+        full = f"{self._shared}.{shared}.{quantity.name}" if shared else f"{self._shared}.{quantity.name}"
+        if full in self._root._vectors:
+            return self._root._vectors[full]
         prefix, self.prefix = self.prefix, self._shared
         try:
-            return super().parameter(quantity)
+            return super().parameter(quantity, shared=shared)
         finally:
             self.prefix = prefix
 

@@ -6,40 +6,43 @@ import inspect
 from functools import lru_cache
 from typing import Any
 
-from ..model import ModelError
+from ..model import Model, misfit
 from ..variant import build_model, components, devices, effects, fidelities, parse_name
+
+
+@lru_cache(maxsize=None)
+def _plain(component: str) -> dict[str, Model]:
+    return {name: build_model(f"{component}/{name}") for name in fidelities(component)}
 
 
 @lru_cache(maxsize=1)
 def names() -> tuple[str, ...]:
     """Canonical names of all catalogued variants.
 
-    Every fidelity of every component; every fidelity of further devices whose constants are baked
-    in; and for each component its highest fidelity with each single effect that fits one of its
-    balances.
+    Every fidelity of every component, for the other devices too where their values are baked into
+    the code (elsewhere they only change start values); and every effect once per component, on the
+    highest fidelity that has a balance for it. Any other combination can be built by its name.
     """
     found: list[str] = []
     for component, declared in components().items():
-        plain = list(fidelities(component))
-        found += [f"{component}/{fidelity}" for fidelity in plain]
+        models = _plain(component)
+        found += [f"{component}/{fidelity}" for fidelity in models]
         for device in devices(component):
             if device != declared.device:
-                found += [f"{component}.{device}/{fidelity}" for fidelity in plain]
-        for effect in effects():
-            for fidelity in reversed(plain):
-                name = f"{component}/{fidelity}+{effect}"
-                if _fits(name):
-                    found.append(name)
-                    break
+                found += [
+                    f"{component}.{device}/{fidelity}"
+                    for fidelity, model in models.items()
+                    if model.baked
+                ]
+        for effect, module in effects().items():
+            fitting = [
+                fidelity
+                for fidelity, model in models.items()
+                if any(not misfit(module.EFFECT, b) for b in model.balances.values())
+            ]
+            if fitting:
+                found.append(f"{component}/{fitting[-1]}+{effect}")
     return tuple(found)
-
-
-def _fits(name: str) -> bool:
-    try:
-        build_model(name)
-    except ModelError:
-        return False
-    return True
 
 
 def describe(name: str) -> dict[str, Any]:
