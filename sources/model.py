@@ -489,7 +489,7 @@ class _Part(Model):
         if quantity.name in self._parameters:
             self.seen_parameters.add(quantity.name)
             return self._parameters[quantity.name]
-        full = f"{self._shared}.{shared}.{quantity.name}" if shared else f"{self._shared}.{quantity.name}"
+        full = ".".join(filter(None, (self._shared, shared, quantity.name)))
         if full in self._root._vectors:
             return self._root._vectors[full]
         prefix, self.prefix = self.prefix, self._shared
