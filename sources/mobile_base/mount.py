@@ -1,0 +1,123 @@
+"""Interface of the base to an arm: the arm's inertia comes in, the mount's motion goes out.
+
+The mount applies the wrench [F; M] = Lambda [a; alpha] + p to the arm (body axes, at the mount
+point), with the arm's inertia Lambda and bias p, gravity included; the base feels its negative.
+Base and arm thus move together without iteration, though they are separate components.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..laws.planar_frame import rotated
+from ..laws.symmetric import unpack
+from ..model import SX, Model
+from . import (
+    ARM_BIAS,
+    ARM_INERTIA,
+    MOUNT_ACCELERATION,
+    MOUNT_ANGULAR_ACCELERATION,
+    MOUNT_POSITION,
+    MOUNT_QUATERNION,
+    MOUNT_RATE,
+    MOUNT_VELOCITY,
+    MOUNT_X,
+    MOUNT_Y,
+    MOUNT_Z,
+)
+
+
+@dataclass(frozen=True)
+class Mount:
+    """What the arm asks of the base.
+
+    Attributes:
+        x, y: position in front of and to the left of O [m].
+        height: above the floor [m].
+        inertia: Lambda (6x6).
+        bias: p (6).
+    """
+
+    x: SX
+    y: SX
+    height: SX
+    inertia: SX
+    bias: SX
+
+    @property
+    def weight(self) -> SX:
+        """Weight of the arm, as far as its bias is its weight [N]."""
+        return self.bias[2]
+
+    @property
+    def weight_moment(self) -> SX:
+        """Weight times horizontal position of the arm's mass centre from O (3) [N.m]."""
+        return ca.vertcat(
+            self.x * self.bias[2] - self.bias[4], self.y * self.bias[2] + self.bias[3], 0
+        )
+
+
+def read_mount(m: Model) -> Mount:
+    """Declare the inputs of the arm and the place of its mount."""
+    inertia = unpack(m.input(ARM_INERTIA), 6)
+    bias = m.input(ARM_BIAS)
+    return Mount(m.parameter(MOUNT_X), m.parameter(MOUNT_Y), m.parameter(MOUNT_Z), inertia, bias)
+
+
+def write_motion(
+    m: Model,
+    position: SX,
+    quaternion: SX,
+    velocity: SX,
+    rate: SX,
+    acceleration: SX,
+    angular: SX,
+) -> None:
+    """Declare the outputs for the arm."""
+    m.output(MOUNT_POSITION, position)
+    m.output(MOUNT_QUATERNION, quaternion)
+    m.output(MOUNT_VELOCITY, velocity)
+    m.output(MOUNT_RATE, rate)
+    m.output(MOUNT_ACCELERATION, acceleration)
+    m.output(MOUNT_ANGULAR_ACCELERATION, angular)
+
+
+def write_planar_motion(
+    m: Model,
+    mount: Mount,
+    pose: tuple[SX, SX, SX],
+    twist: tuple[SX, SX, SX],
+    accelerations: tuple[SX, SX, SX],
+) -> tuple[SX, SX]:
+    """Declare the outputs for the arm of a base that moves in the plane.
+
+    Args:
+        m: the model.
+        mount: the mount.
+        pose: x, y, heading of O.
+        twist: velocity of O in body axes and yaw rate.
+        accelerations: acceleration of O (second derivative of the position) in body axes and yaw
+            acceleration.
+
+    Returns:
+        The velocity of the mount, body axes.
+    """
+    x, y, phi = pose
+    v_x, v_y, w = twist
+    a_x, a_y, alpha = accelerations
+    d_x, d_y = rotated(phi, mount.x, mount.y)
+    v_mx, v_my = v_x - w * mount.y, v_y + w * mount.x
+    write_motion(
+        m,
+        ca.vertcat(x + d_x, y + d_y, mount.height),
+        ca.vertcat(ca.cos(phi / 2), 0, 0, ca.sin(phi / 2)),
+        ca.vertcat(v_mx, v_my, 0),
+        ca.vertcat(0, 0, w),
+        ca.vertcat(
+            a_x - alpha * mount.y - w**2 * mount.x, a_y + alpha * mount.x - w**2 * mount.y, 0
+        ),
+        ca.vertcat(0, 0, alpha),
+    )
+    return v_mx, v_my

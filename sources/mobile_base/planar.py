@@ -1,0 +1,186 @@
+"""Body that moves in the plane on two drive wheels and four casters under quasi-static loads.
+
+Newton-Euler equations about O in body axes, with a = (v_x' - w v_y, v_y' + w v_x):
+
+    m a_x - s_y w' - s_x w^2 = sum f_x + arm + effects
+    m a_y + s_x w' - s_y w^2 = sum f_y + arm + effects
+    J w' + s_x a_y - s_y a_x = sum (p x f + m_z) + arm + effects
+
+solved together with the arm's inertia and what the swinging casters take off the mass
+(`mount.py`, `../caster/fork.py`). The loads carry the weight and the arm's bias and are linear in
+the plane; drive wheels have a preload F_0 and the stiffness k relative to a caster:
+
+    N_drive = F_0 + k (A + C y),   N_caster = A + B x + C y
+    A = (P - 2 F_0)/(4 + 2 k),   B = M_y/(4 x_c^2),   C = -M_x/(4 y_c^2 + 2 k (track/2)^2)
+
+Not modelled: load transfer by acceleration, tilt, bounce (`six_dof`); a wheel whose load would be
+negative carries none, the others do not take over.
+
+Source: digital twin paper, MiR250 model, reduced to the plane; Newton-Euler equations.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..laws import planar_body
+from ..laws.symmetric import solve
+from ..model import SX, Balance, Model
+from ..quantity import Quantity
+from . import (
+    PHI,
+    POSE_PHI,
+    POSE_X,
+    POSE_Y,
+    W_Z,
+    V,
+    X,
+    Y,
+    Z,
+)
+from .body import (
+    CABINET_I_ZZ,
+    CABINET_MASS,
+    COM_X,
+    COM_Y,
+    DRIVE_INERTIA,
+    DRIVE_MASS,
+    GRAVITY,
+    I_ZZ,
+    MASS,
+    V_Y,
+    VEL_X,
+    VEL_Y,
+    YAW_RATE,
+)
+from .mount import Mount, read_mount, write_planar_motion
+from .wheels import Drive, Places, add_wheels, read_caster_mass, read_places, write_wheels
+
+LEVEL = 1
+SOLVER = Solver("rodas3", 1e-3)
+SLOTS = {"wheel_contact": "stick_slip", "caster": "swivel"}
+PRELOAD = Quantity(
+    "preload", "N", "load of a drive wheel that does not depend on the weight", minimum=0.0
+)
+SHARE = Quantity(
+    "share",
+    "1",
+    "stiffness of a drive wheel's suspension over that of a caster",
+    start=1.0,
+    minimum=0.0,
+)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
+    mass, com_x, com_y = m.parameter(MASS), m.parameter(COM_X), m.parameter(COM_Y)
+    cabinet, drive_mass = m.parameter(CABINET_MASS), m.parameter(DRIVE_MASS)
+    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
+    v_x, v_y, w = m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE)
+
+    # without the casters, which count their own kinetic energy
+    own = mass + cabinet + 2 * drive_mass
+    s_x, s_y = mass * com_x, mass * com_y
+    yaw = (
+        m.parameter(I_ZZ)
+        + mass * (com_x**2 + com_y**2)
+        + m.parameter(CABINET_I_ZZ)
+        + 2 * (m.parameter(DRIVE_INERTIA) + drive_mass * places.half_track**2)
+    )
+    carried = 4 * caster_mass
+    cos, sin = ca.cos(phi), ca.sin(phi)
+    body = m.balance(
+        "body",
+        "body",
+        velocity=ca.vertcat(v_x, v_y, 0),
+        rate=ca.vertcat(0, 0, w),
+        gravity=ca.vertcat(0, 0, -GRAVITY),
+        position=ca.vertcat(x, y, places.radius),
+        rotation=ca.vertcat(ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)),
+        mass=own + carried + mount.weight / GRAVITY,
+        first_moment=ca.vertcat(s_x, s_y, 0) + mount.weight_moment / GRAVITY,
+    )
+    own += body.mass
+    s_x, s_y = s_x + body.first_moment[0], s_y + body.first_moment[1]
+    yaw += body.inertia[2, 2]
+
+    loads = _loads(m, mount, places, own + carried, s_x, s_y, body)
+    drives = (Drive(loads[0], places.radius), Drive(loads[1], places.radius))
+    wheels = add_wheels(m, places, (x, y, phi), (v_x, v_y, w), drives, loads[2:])
+    m.eliminate_last(x, y, phi, v_x, v_y, w)
+
+    total = own + carried
+    inertia = yaw + carried * (places.x**2 + places.y**2)
+    rigid = ca.vertcat(
+        ca.horzcat(total, 0, -s_y), ca.horzcat(0, total, s_x), ca.horzcat(-s_y, s_x, inertia)
+    )
+    # velocity components change by v' = a - w x v: their part of what the forks take off
+    turning = wheels.relief @ ca.vertcat(w * v_y, -w * v_x, 0)
+    # rates of O and body to the mount's: [a_m; alpha] = reach [a; alpha] - w^2 (r, 0)
+    reach = ca.SX.eye(3)
+    reach[0, 2], reach[1, 2] = -mount.y, mount.x
+    arm = mount.inertia[[0, 1, 5], [0, 1, 5]]
+    arm_bias = mount.bias[[0, 1, 5]] - w**2 * arm @ ca.vertcat(mount.x, mount.y, 0)
+    force = (
+        ca.vertcat(
+            wheels.force_x + body.effort[0] + s_x * w**2,
+            wheels.force_y + body.effort[1] + s_y * w**2,
+            wheels.moment + body.effort[5],
+        )
+        + turning
+        - reach.T @ arm_bias
+    )
+    a = solve(rigid + reach.T @ arm @ reach - wheels.relief, force)
+    m.derivative(v_x, a[0] + w * v_y)
+    m.derivative(v_y, a[1] - w * v_x)
+    m.derivative(w, a[2])
+    m.derivative(x, cos * v_x - sin * v_y)
+    m.derivative(y, sin * v_x + cos * v_y)
+    m.derivative(phi, w)
+
+    write_wheels(m, wheels, loads)
+    for quantity, value in (
+        (X, x),
+        (Y, y),
+        (PHI, phi),
+        (Z, places.radius),
+        (V, v_x),
+        (V_Y, v_y),
+        (W_Z, w),
+    ):
+        m.output(quantity, value)
+    v_mx, v_my = write_planar_motion(m, mount, (x, y, phi), (v_x, v_y, w), (a[0], a[1], a[2]))
+    m.stored_energy(planar_body.kinetic_energy(own, s_x, s_y, yaw, v_x, v_y, w))
+    wrench = arm @ (reach @ a) + arm_bias
+    m.supply(-(wrench[0] * v_mx + wrench[1] * v_my + wrench[2] * w))
+
+
+def _loads(
+    m: Model, mount: Mount, places: Places, mass: SX, s_x: SX, s_y: SX, body: Balance
+) -> list[SX]:
+    """Wheel loads left, right, and of the casters."""
+    preload, share = m.parameter(PRELOAD), m.parameter(SHARE)
+    f, n = body.effort[:3], body.effort[3:]
+    force, moment = mount.bias[:3], mount.bias[3:]
+    weight = GRAVITY * mass - f[2] + force[2]
+    height = mount.height
+    m_x = (
+        n[0]
+        - places.radius * f[1]
+        - GRAVITY * s_y
+        - (moment[0] + mount.y * force[2] - height * force[1])
+    )
+    m_y = (
+        n[1]
+        + places.radius * f[0]
+        + GRAVITY * s_x
+        - (moment[1] + height * force[0] - mount.x * force[2])
+    )
+    level = (weight - 2 * preload) / (4 + 2 * share)
+    pitch = m_y / (4 * places.x**2)
+    roll = -m_x / (4 * places.y**2 + 2 * share * places.half_track**2)
+    drives = [preload + share * (level + roll * y) for y in (places.half_track, -places.half_track)]
+    casters = [level + pitch * x + roll * y for x, y in places.casters]
+    return [ca.fmax(0, load) for load in (*drives, *casters)]
