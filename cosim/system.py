@@ -12,6 +12,7 @@ Everything is checked when it is said: names, causality, units, bounds, double d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -159,8 +160,21 @@ class System:
             check_values(f"{self.name}: {member.name}", variables, value)
         member.parameters[name.partition(".")[2]] = value
 
-    def connect(self, source: str, target: str) -> None:
+    def connect(
+        self,
+        source: str,
+        target: str,
+        *,
+        factor: float = 1.0,
+        offset: float = 0.0,
+        convert: bool = True,
+    ) -> None:
         """Connect an output to an input; `q` connects all of `q[1]` ... `q[n]`.
+
+        Args:
+            source, target: `instance.variable`.
+            factor, offset: target = factor * (source in the target's unit) + offset.
+            convert: False passes the number on without looking at units.
 
         Raises:
             UnknownNameError: no such instance or variable.
@@ -184,14 +198,25 @@ class System:
                 f"{what}: {source} has {len(outputs)} elements, {target} has {len(inputs)}"
             )
         found = [
-            self._wire(what, (out, f"{giver.name}.{out_name}"), (into, f"{taker.name}.{into_name}"))
+            self._wire(
+                what,
+                (out, f"{giver.name}.{out_name}"),
+                (into, f"{taker.name}.{into_name}"),
+                (factor, offset),
+                convert,
+            )
             for (out, out_name), (into, into_name) in zip(outputs, inputs, strict=True)
         ]
         self.connections += found
         self._drivers.update({wire.target: wire.source for wire in found})
 
     def _wire(
-        self, what: str, source: tuple[Variable, str], target: tuple[Variable, str]
+        self,
+        what: str,
+        source: tuple[Variable, str],
+        target: tuple[Variable, str],
+        transformation: tuple[float, float],
+        convert: bool,
     ) -> Connection:
         if target[1] in self._drivers:
             raise ConnectError(
@@ -207,13 +232,16 @@ class System:
         out, into = source[0], target[0]
         if out.type.startswith("Boolean") != into.type.startswith("Boolean"):
             raise ConnectError(f"{what}: types {out.type} and {into.type} do not fit")
-        gain, offset = 1.0, 0.0
-        if out.unit is not None and into.unit is not None:
+        factor, offset = transformation
+        if not (math.isfinite(factor) and math.isfinite(offset)):
+            raise ConnectError(f"{what}: factor {factor} and offset {offset} must be finite")
+        if convert and out.unit is not None and into.unit is not None:
             try:
-                gain, offset = conversion(out.unit, into.unit)
+                gain, shift = conversion(out.unit, into.unit)
             except UnitError as error:
                 raise UnitError(f"{what}: unit {error}") from error
-        return Connection(source[1], target[1], gain, offset)
+            factor, offset = factor * gain, factor * shift + offset
+        return Connection(source[1], target[1], factor, offset)
 
     # -- looking up ------------------------------------------------------------------------------
 
