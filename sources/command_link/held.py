@@ -28,4 +28,4 @@ def equations(m: Model) -> None:
     held, started = m.discrete(HELD), m.discrete(STARTED)
     m.update(clock, held, now)
     m.update(clock, started, ca.SX(1.0))
-    deliver(m, ca.if_else(started > 0, held, now))
+    deliver(m, ca.if_else(started > 0.5, held, now))

@@ -59,7 +59,7 @@ class History:
         m.update(
             clock,
             samples,
-            ca.if_else(self.started > 0, ca.vertcat(*shifted), ca.vertcat(*initial)),
+            ca.if_else(self.started > 0.5, ca.vertcat(*shifted), ca.vertcat(*initial)),
         )
         m.update(clock, self.since, m.t)
         m.update(clock, self.started, ca.SX(1.0))
@@ -79,4 +79,4 @@ class History:
         share = ca.fmin(1.0, ca.fmax(0.0, -age) / ca.fmax(elapsed, 1e-12))
         recent = newest + share * (self._value - newest)
         recorded = ca.if_else(age < 0.0, recent, past)
-        return ca.if_else(self.started > 0, recorded, self._value - self._slope * delay)
+        return ca.if_else(self.started > 0.5, recorded, self._value - self._slope * delay)

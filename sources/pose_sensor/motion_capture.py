@@ -65,8 +65,8 @@ def equations(m: Model) -> None:
     state, started = m.discrete(RANDOM), m.discrete(STARTED)
     random = Random(state, m.parameter(seed_quantity("pose_sensor")))
     normals, lot = random.normals(4), random.uniform()
-    lost = ca.if_else(seen > 0, m.parameter(P_LOSE), 1.0 - m.parameter(P_FIND))
-    sees = ca.logic_or(lot >= lost, started < 1)
+    lost = ca.if_else(seen > 0.5, m.parameter(P_LOSE), 1.0 - m.parameter(P_FIND))
+    sees = ca.logic_or(lot >= lost, started < 0.5)
 
     clock = m.clock("sample", m.parameter(T))
     m.update(clock, drawn, normals)
@@ -75,7 +75,7 @@ def equations(m: Model) -> None:
     m.update(clock, state, random.state)
     m.update(clock, started, ca.SX(1.0))
 
-    kept = ca.logic_and(started > 0, ca.logic_or(m.parameter(HELD) > 0.5, seen < 1))
+    kept = ca.logic_and(started > 0.5, ca.logic_or(m.parameter(HELD) > 0.5, seen < 0.5))
     measured = ca.if_else(kept, sample, exact + sigma * drawn)
     for index, quantity in enumerate((X_MEAS, Y_MEAS, Z_MEAS, PHI_MEAS)):
         m.output(quantity, measured[index])
