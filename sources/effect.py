@@ -115,6 +115,7 @@ KINDS: dict[str, Kind] = {
     "pose": Kind("", "", _names(value="the undisturbed planar pose x [m], y [m], yaw [rad], 3")),
     "point": Kind("m", "", _names(value="the undisturbed point in a fixed frame [m], 2 or 3")),
     "bundle": Kind("", "", _names(value="signals of several units that travel together")),
+    "gravity": Kind("m/s2", "", _names(value="gravity, in axes taken as level [m/s2], 3")),
 }
 """Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; a `body`
 takes a wrench (force and moment at the reference point, body axes) and additional mass. `pose`,

@@ -23,10 +23,9 @@ HEADING = Quantity("heading", "rad", "direction of the axis of tilt, from the x 
 EFFECT = Effect(
     "base_tilt",
     "Mount on a tilted surface.",
-    ("signal",),
+    ("gravity",),
     TILT,
     source="rotation about an axis",
-    unit="m/s2",
 )
 
 

@@ -136,7 +136,7 @@ class Links:
 def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
     """Build the chain of the device and open the balances of gravity and of the tool."""
     level = ca.vertcat(0, 0, -m.parameter(GRAVITY))
-    tilted = level + m.balance("base", "signal", unit="m/s2", value=level).effort
+    tilted = level + m.balance("base", "gravity", value=level).effort
     rotation = rotation_matrix(mount.quaternion)
     gravity = rotation.T @ tilted
     posture = Posture(chain(m), q)
