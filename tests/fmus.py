@@ -66,7 +66,9 @@ class Slave:
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
             self.fmu = FMU2Slave(**arguments)
-            self.fmu.instantiate(callbacks=self._callbacks)
+            # an interpreted FMU reports its exceptions only when it may log
+            chatty = bool(self.description.coSimulation.needsExecutionTool)
+            self.fmu.instantiate(callbacks=self._callbacks, loggingOn=chatty)
         else:
             self.fmu = FMU3Slave(**arguments)
             self.fmu.instantiate()

@@ -34,7 +34,8 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add what the spring does not transmit."""
     twist, half, stiffness = e.signal("deflection"), e.parameter(GAP) / 2, e.signal("stiffness")
-    inside = ca.fmax(-half, ca.fmin(twist, half))
+    # strict: without a gap the derivative at rest is the spring's, too
+    inside = ca.if_else(ca.fabs(twist) < half, twist, half * ca.sign(twist))
     e.add(stiffness * inside)
     e.stored_energy(-stiffness * inside * (2 * twist - inside) / 2)
     e.loss(0)
