@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .errors import ScenarioError
 from .files import flatten, read_toml
@@ -13,16 +13,26 @@ from .provider import Provider
 from .system import System
 
 
+class Wire(NamedTuple):
+    """A connection as `System.connect` takes it."""
+
+    source: str
+    target: str
+    factor: float = 1.0
+    offset: float = 0.0
+    convert: bool = True
+
+
 @dataclass(frozen=True)
 class SystemFile:
-    """A system as written in TOML, before its FMUs are opened.
+    """A system as written in TOML or SSP, before its FMUs are opened.
 
     Attributes:
         path: the file, for error texts and relative .fmu paths.
         name, text: of the system.
         instances: name -> variant or path of an .fmu.
         parameters: full name -> value.
-        connections: (source, target).
+        connections: between instances.
     """
 
     path: Path
@@ -30,7 +40,7 @@ class SystemFile:
     text: str
     instances: dict[str, str]
     parameters: dict[str, Any]
-    connections: tuple[tuple[str, str], ...]
+    connections: tuple[Wire, ...]
 
     def build(
         self, provider: Provider | None, parameters: Mapping[str, Any] | None = None
@@ -44,8 +54,14 @@ class SystemFile:
         system = System(self.name, provider, self.text)
         for name, reference in self.instances.items():
             system.add(name, reference, base=self.path.parent)
-        for source, target in self.connections:
-            system.connect(source, target)
+        for wire in self.connections:
+            system.connect(
+                wire.source,
+                wire.target,
+                factor=wire.factor,
+                offset=wire.offset,
+                convert=wire.convert,
+            )
         for name, value in {**self.parameters, **(parameters or {})}.items():
             system.set(name, value)
         return system
@@ -84,10 +100,10 @@ def read_system(path: Path | str) -> SystemFile:
     )
 
 
-def _arrow(path: Path, line: Any) -> tuple[str, str]:
+def _arrow(path: Path, line: Any) -> Wire:
     parts = [part.strip() for part in line.split("->")] if isinstance(line, str) else []
     if len(parts) != 2 or not all(parts):
         raise ScenarioError(
             f'{path}: {line!r} is not a connection; write "instance.output -> instance.input"'
         )
-    return parts[0], parts[1]
+    return Wire(parts[0], parts[1])
