@@ -101,7 +101,8 @@ class Fmu:
         )
 
 
-def _unpack(path: Path, folder: Path) -> None:
+def unpack(path: Path, folder: Path) -> None:
+    """Unpack an archive into a new folder, whole or not at all."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=".unpack-", dir=folder.parent))
     try:
@@ -133,7 +134,7 @@ def open_fmu(path: Path | str) -> Fmu:
     folder = cache_folder() / "unpacked" / digest[:32]
     if not folder.is_dir():
         try:
-            _unpack(path, folder)
+            unpack(path, folder)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
             raise FmuFileError(
                 f"{path}: is not a complete FMU archive ({error}); "
