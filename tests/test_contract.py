@@ -187,7 +187,8 @@ def test_effect_has_an_effect(name: str) -> None:
         oracle = Oracle(model)
         differs = False
         for seed in range(8):
-            point = _random_point(oracle, on, seed)
+            nearer = 10.0 ** -(seed % 4)  # some effects live close to standstill
+            point = {k: v * nearer for k, v in _random_point(oracle, on, seed).items()}
             present, null = oracle.outputs(point, 0.01 * seed), oracle.outputs({**point, **absent})
             differs |= any(present[k] != null[k] for k in present)
         assert differs
