@@ -49,4 +49,4 @@ def law(e: EffectModel) -> None:
     following = limited + ca.fmax(-largest, ca.fmin(largest, value - limited))
     e.update(clock, limited, ca.if_else(started > 0.5, following, value))
     e.update(clock, started, ca.SX(1.0))
-    e.add(ca.if_else(ca.logic_and(slowness > 0, started > 0.5), limited - value, 0.0))
+    e.add(ca.if_else(slowness > 0, started * (limited - value), 0.0))

@@ -46,4 +46,4 @@ def law(e: EffectModel) -> None:
     clock = e.clock("sample", ca.if_else(t_s > 0, t_s, NEVER))
     e.update(clock, held, value)
     e.update(clock, started, ca.SX(1.0))
-    e.add(ca.if_else(ca.logic_and(t_s > 0, started > 0.5), held - value, 0.0))
+    e.add(ca.if_else(t_s > 0, started * (held - value), 0.0))

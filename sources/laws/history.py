@@ -79,4 +79,5 @@ class History:
         share = ca.fmin(1.0, ca.fmax(0.0, -age) / ca.fmax(elapsed, 1e-12))
         recent = newest + share * (self._value - newest)
         recorded = ca.if_else(age < 0.0, recent, past)
-        return ca.if_else(self.started > 0.5, recorded, self._value - self._slope * delay)
+        before = self._value - self._slope * delay
+        return before + self.started * (recorded - before)
