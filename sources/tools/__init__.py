@@ -1,0 +1,1 @@
+"""Calculations on numbers that need no simulation: identification, calibration, classification."""
