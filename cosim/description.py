@@ -148,7 +148,8 @@ class Description:
             UnknownNameError: with the nearest names.
         """
         if name not in self.variables:
-            names = [v.name for v in self.variables.values() if v.causality != "local"]
+            ordered = sorted(self.variables.values(), key=lambda v: v.causality == "local")
+            names = [v.name for v in ordered]
             raise UnknownNameError(f"{self.name} has no variable {name!r}; {listing(names, name)}")
         return self.variables[name]
 
@@ -171,10 +172,11 @@ def _number(element: ET.Element, key: str) -> float | None:
     return None if text is None else float(text)
 
 
-def _unit_definitions(root: ET.Element) -> dict[str, Unit]:
+def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str, Unit]:
+    """Units by name, from elements `Unit` of FMI (or of SSP, which has them in a namespace)."""
     units = {}
-    for element in root.iterfind("UnitDefinitions/Unit"):
-        base = element.find("BaseUnit")
+    for element in elements:
+        base = element.find(f"{namespace}BaseUnit")
         name = element.get("name", "")
         if base is not None:
             units[name] = Unit(
@@ -368,7 +370,7 @@ def parse_description(xml: bytes, extra: Mapping[str, Any], where: str) -> Descr
 def _assemble(
     root: ET.Element, interface: ET.Element, extra: Mapping[str, Any], fmi: Literal[2, 3]
 ) -> Description:
-    units = _unit_definitions(root)
+    units = read_units(root.iterfind("UnitDefinitions/Unit"))
     variables = _variables2(root, units) if fmi == 2 else _variables3(root, units)
     inputs = tuple(v.name for v in variables if v.causality == "input")
     if fmi == 2:

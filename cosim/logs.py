@@ -46,7 +46,7 @@ def forget(key: int) -> None:
 def _keep(key: int | None, status: int, message: bytes | None) -> None:
     kept = _messages.get(key or 0)
     if kept is not None:
-        text = (message or b"").decode("utf-8", "replace").strip()
+        text = " ".join((message or b"").decode("utf-8", "replace").split())
         kept.append(text if status == 0 else f"{STATUS[min(status, 5)]}: {text}")
 
 

@@ -131,8 +131,8 @@ def _prefixed(run: str, name: str) -> str:
 
 
 def _every(scenario: Scenario) -> int:
-    if scenario.period is None:
-        return 1
+    if scenario.period is None or not 0.0 < scenario.step < scenario.period:
+        return 1  # a step that is not positive is refused by the master
     every = round(scenario.period / scenario.step)
     if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
         raise ValueRangeError(

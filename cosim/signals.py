@@ -14,8 +14,9 @@ from .errors import ValueRangeError
 
 Vector = NDArray[np.float64]
 CLOCK = 1e-3
-"""Fraction of a sample interval within which two times are the same: logs keep sample times rounded
-(often to 32 bits), so a sample may seem to come just after the communication point it belongs to."""
+"""Fraction of a sample interval within which two times are the same: logs keep sample times
+rounded (often to 32 bits), so a sample may seem to come just after the communication point that it
+belongs to."""
 
 
 class Signal(Protocol):

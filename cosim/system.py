@@ -150,7 +150,9 @@ class System:
             ValueRangeError: outside the declared bounds, or not finite.
         """
         member, variables = self.variables(name)
-        if variables[0].causality in ("output", "independent", "calculatedParameter"):
+        first = variables[0]
+        calculated = first.causality in ("output", "independent", "calculatedParameter")
+        if calculated and first.initial not in ("exact", "approx"):
             raise GraphError(
                 f"{self.name}: {name} is an {variables[0].causality} and cannot be given a value"
             )

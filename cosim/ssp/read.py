@@ -1,0 +1,314 @@
+"""Reads SSP packages, ours and anybody's, into systems."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..archive import Fmu
+from ..signals import Signal, Table
+from ..system import System
+from ..system_file import SystemFile, Wire
+from . import flatten
+from .document import File, Structure, open_package, read_structure
+from .flatten import Net, shown
+from .values import Value, read_binding
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How a package is meant to be run; None where it does not say.
+
+    Attributes:
+        start, stop, step: [s].
+        algorithm: a co-simulation algorithm of ours.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    algorithm: str | None = None
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """A variable behind a connector of the root system: `inside = factor * outside + offset`.
+
+    For outputs it is `outside = factor * inside + offset`.
+    """
+
+    name: str
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Package:
+    """What a package holds, nested systems flattened.
+
+    Attributes:
+        system: instances, connections, parameters.
+        experiment: how it is meant to be run.
+        inputs, outputs: connectors of the root system -> variables of FMUs.
+        signals: full names of inputs -> signals that came with the package.
+        ignored: parameters that match no variable (SSP lets them be ignored).
+        elements: element of the package, `sub.motor` -> instance, `sub_motor`.
+    """
+
+    system: SystemFile
+    experiment: Experiment
+    inputs: Mapping[str, tuple[Terminal, ...]] = field(default_factory=dict)
+    outputs: Mapping[str, Terminal] = field(default_factory=dict)
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+    elements: Mapping[str, str] = field(default_factory=dict)
+
+
+def read(path: Path | str, *, ssd: str = "SystemStructure.ssd") -> System:
+    """Read a package into a system.
+
+    Args:
+        path: an .ssp archive, a folder with its content, or an .ssd file.
+        ssd: which structure, where a package holds several.
+
+    Raises:
+        ScenarioError: it cannot be read; the text names the element.
+        FmuFileError: an FMU inside cannot be read.
+        GraphError: its connections, values or units are wrong.
+    """
+    return read_package(path, ssd=ssd).system.build(None)
+
+
+def read_package(path: Path | str, *, ssd: str = "SystemStructure.ssd") -> Package:
+    """Read a package with what lies beside its system (see `read`)."""
+    structure = read_structure(open_package(Path(path), ssd))
+    return _Flat(structure).package()
+
+
+class _Flat:
+    """A structure with its FMUs opened."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure, self.file = structure, structure.file
+        self.net = Net(structure)
+        if not self.net.fmus:
+            raise self.file.error("holds no FMU")
+        self.names: dict[flatten.Path, str] = {}
+        for place in self.net.fmus:
+            name = re.sub(r"\W", "_", "_".join(place))
+            name = name if name.isidentifier() else f"_{name}"
+            taken, number = name, 2
+            while taken in self.names.values():
+                taken, number = f"{name}_{number}", number + 1
+            self.names[place] = taken
+        self.ignored: list[str] = []
+
+    def full(self, node: flatten.Node) -> str:
+        """Full name of the scalar variable at a node of an FMU."""
+        variable = self.net.variable(node[0], node[1])
+        return f"{self.names[node[0]]}.{variable.elements()[node[2]]}"
+
+    def package(self) -> Package:
+        wires, outputs = self.wires()
+        inputs = self.inputs(outputs)
+        experiment, signals = self.experiment()
+        system = SystemFile(
+            path=self.file.path,
+            name=self.structure.name,
+            text=self.structure.text,
+            instances={
+                name: self.reference(self.net.components[place].source)
+                for place, name in self.names.items()
+            },
+            parameters=self.parameters(),
+            connections=tuple(wires),
+        )
+        return Package(
+            system, experiment, inputs, outputs, signals, tuple(self.ignored),
+            {".".join(place): name for place, name in self.names.items()},
+        )  # fmt: skip
+
+    def reference(self, source: File | None) -> str:
+        assert source is not None  # components have one
+        return Path(os.path.relpath(source.path, self.file.path.parent)).as_posix()
+
+    # -- connections -------------------------------------------------------------------------------
+
+    def wires(self) -> tuple[list[Wire], dict[str, Terminal]]:
+        """Connections between FMUs, in the order of the file, and outputs of the root system."""
+        wires: list[Wire] = []
+        outputs: dict[str, Terminal] = {}
+        for start in self.net.outputs():
+            source = self.full(start)
+            for route in self.net.routes(start):
+                if self.net.leaf(route.end) is None:
+                    outputs[_element(route.end)] = Terminal(source, route.factor, route.offset)
+                else:
+                    target = self.full(route.end)
+                    wires.append(Wire(source, target, route.factor, route.offset, False))
+        return wires, outputs
+
+    def inputs(self, outputs: Mapping[str, Terminal]) -> dict[str, tuple[Terminal, ...]]:
+        """Inputs of the root system."""
+        found = {}
+        root = self.structure.system
+        for connector in root.connectors.values():
+            for index in range(connector.size):
+                node: flatten.Node = ((), connector.name, index)
+                if _element(node) in outputs:
+                    continue
+                terminals = tuple(
+                    Terminal(self.full(route.end), route.factor, route.offset)
+                    for route in self.net.routes(node)
+                    if (leaf := self.net.leaf(route.end)) is not None and leaf.causality == "input"
+                )
+                if terminals:
+                    found[_element(node)] = terminals
+        return found
+
+    # -- parameters --------------------------------------------------------------------------------
+
+    def parameters(self) -> dict[str, Any]:
+        """Full name -> value; enclosing systems win over what they hold, later over earlier."""
+        found: dict[str, Any] = {}
+        places = [*self.net.components, *self.net.systems]
+        for place in sorted(places, key=len, reverse=True):
+            element = self.net.components.get(place) or self.net.systems[place]
+            fmu = self.net.fmus.get(place)
+            for binding in element.bindings:
+                inside = fmu.folder if fmu else None
+                for name, value in read_binding(binding, shown(place), inside):
+                    targets = self.targets(place, name)
+                    if not targets:
+                        self.ignored.append(".".join((*place, name)))
+                    for route in targets:
+                        self.assign(found, route, value)
+        return found
+
+    def targets(self, place: flatten.Path, name: str) -> list[flatten.Route]:
+        """The variables that a name means, seen from an element."""
+        fmu = self.net.fmus.get(place)
+        if fmu is not None:
+            known = fmu.description.variables
+            if name not in known:
+                return []
+            node: flatten.Node = (place, name, -1)
+            return [flatten.Route(node, 1.0, 0.0, known[name].unit)]
+        system = self.net.systems.get(place)
+        if system is None:  # a reference to a signal dictionary
+            return []
+        found: list[flatten.Route] = []
+        if name in system.connectors and system.connectors[name].kind != "output":
+            routes = self.net.routes((place, name, 0))
+            found += [route for route in routes if self.net.leaf(route.end) is not None]
+        for child in system.elements or {}:
+            if name.startswith(f"{child}."):
+                found += self.targets((*place, child), name[len(child) + 1 :])
+        return found
+
+    def assign(self, found: dict[str, Any], route: flatten.Route, value: Value) -> None:
+        place, name, index = route.end
+        variable = self.net.variable(place, name)
+        items = _items(self.net.fmus[place], name) if value.kind == "item" else {}
+        given = value.given(route.unit, items)
+        if (route.factor, route.offset) != (1.0, 0.0):
+            given = [
+                item if isinstance(item, str) else route.factor * float(item) + route.offset
+                for item in given
+            ]
+        if index >= 0 and variable.size > 1:  # one element, through a connector of a system
+            key, size = f"{self.names[place]}.{variable.elements()[index]}", 1
+        else:
+            key, size = f"{self.names[place]}.{name}", variable.size
+        if len(given) != size:
+            raise value.file.error(
+                f"{value.origin} has {len(given)} values, but {shown(place)}.{name} takes {size}"
+            )
+        if variable.causality == "structuralParameter":
+            raise value.file.error(
+                f"{value.origin}: {shown(place)}.{name} is a structural parameter; sizes of "
+                "arrays cannot be changed"
+            )
+        found[key] = given[0] if size == 1 else given
+
+    # -- experiment --------------------------------------------------------------------------------
+
+    def experiment(self) -> tuple[Experiment, dict[str, Signal]]:
+        """The default experiment, with the step that our, OSP's and OMSimulator's annotations name.
+
+        Only start and stop are standard.
+        """
+        element = self.structure.experiment
+        if element is None:
+            return Experiment(), {}
+        step: float | None = None
+        ours: ET.Element | None = None
+        for item in element.iter():
+            local = item.tag.rpartition("}")[2]
+            if local == "Run" and item.tag.startswith("{cosim}"):
+                ours = item
+            if local == "FixedStepAlgorithm":
+                step = self.number(item, "baseStepSize")
+            elif local == "FixedStepMaster":
+                step = self.number(item, "stepSize")
+        algorithm, signals = None, {}
+        if ours is not None:
+            step = self.number(ours, "step") or step
+            algorithm = ours.get("algorithm")
+            if source := ours.get("inputs"):
+                signals = _signals(self.file.beside(source, "the default experiment"))
+        start, stop = self.number(element, "startTime"), self.number(element, "stopTime")
+        return Experiment(start, stop, step, algorithm), signals
+
+    def number(self, element: ET.Element, key: str) -> float | None:
+        text = element.get(key)
+        try:
+            return None if text is None else float(text)
+        except ValueError:
+            raise self.file.error(f"default experiment: {key} = {text!r} is no number") from None
+
+
+def _element(node: flatten.Node) -> str:
+    return node[1] if node[2] == 0 else f"{node[1]}[{node[2] + 1}]"
+
+
+def _items(fmu: Fmu, name: str) -> dict[str, int]:
+    """Items of the enumeration that a variable of an FMU has as its type."""
+    root = ET.parse(fmu.folder / "modelDescription.xml").getroot()
+    declared = ""
+    for element in root.iterfind("ModelVariables/*"):
+        if element.get("name") == name:
+            inner = element.find("Enumeration")
+            declared = (element if inner is None else inner).get("declaredType", "")
+    for kind in root.iterfind("TypeDefinitions/*"):
+        if kind.get("name") == declared:
+            return {
+                item.get("name", ""): int(item.get("value", "0"))
+                for item in kind.iter()
+                if item.tag == "Item"
+            }
+    return {}
+
+
+def _signals(file: File) -> dict[str, Signal]:
+    """Columns of a CSV file with a head such as `time [s],motor.w_ref [rad/s]`."""
+    with file.path.open(encoding="utf-8", newline="") as handle:
+        rows = list(csv.reader(handle))
+    try:
+        heads, numbers = rows[0], [[float(item) for item in row] for row in rows[1:]]
+        columns = list(zip(*numbers, strict=True))
+    except (IndexError, ValueError) as error:
+        raise file.error(f"is not a table of numbers ({error})") from error
+    found: dict[str, Signal] = {}
+    for head, column in zip(heads[1:], columns[1:], strict=True):
+        name, _, unit = head.partition(" ")
+        found[name] = Table(
+            columns[0], column, unit=unit.strip("[]"), text=f"{file.name}:{name}", extend=True
+        )
+    return found
