@@ -20,7 +20,8 @@ class {name}(Fmi2Slave):
         for item in ("a", "b", "fail_at"):
             self.register_variable(Real(item, causality=C.parameter, variability="tunable"))
         self.register_variable(Real("u", causality=C.input))
-        self.register_variable(Real("y", causality=C.output, getter=lambda: self.a * self.u + self.b))
+        law = lambda: self.a * self.u + self.b
+        self.register_variable(Real("y", causality=C.output, getter=law))
         self.register_variable(Integer("n", causality=C.input))
         self.register_variable(Integer("next", causality=C.output, getter=lambda: self.n + 1))
         self.register_variable(Boolean("on", causality=C.input))
@@ -39,7 +40,8 @@ from pythonfmu3 import Boolean, Fmi3Causality as C, Fmi3Slave, Float64, Int32
 class {name}(Fmi3Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
-        self.time, self.u, self.y, self.n, self.next, self.on, self.off = 0.0, 0.0, 0.0, 2, 0, True, False
+        self.time, self.u, self.y, self.n, self.next = 0.0, 0.0, 0.0, 2, 0
+        self.on, self.off = True, False
         self.register_variable(Float64("time", causality=C.independent))
         self.register_variable(Float64("u", causality=C.input))
         self.register_variable(Float64("y", causality=C.output))

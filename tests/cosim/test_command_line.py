@@ -177,7 +177,7 @@ def test_bad_input(command: Command, tmp_path: Path, arguments: list[str], messa
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run"], ["runn"], ["run", "motor_bench", "--stepp", "1"], ["run", "motor_bench", "--step", "x"],
+    [["run"], ["runn"], ["run", "x", "--stepp", "1"], ["run", "x", "--step", "y"],
      ["fmus", "build", "--fmi", "4"], ["fmus", "build", "--kind", "fortran"]],
 )  # fmt: skip
 def test_bad_usage(command: Command, arguments: list[str]) -> None:
@@ -199,7 +199,7 @@ description = "x"
     ("source", "message"),
     [
         ("nan", "constant input nan is not finite"),
-        ("{ times = [0.0, 0.1], values = [1.0, nan] }", "are not finite, the first (nan) at t = 0.1 s"),
+        ("{ times = [0.0, 0.1], values = [1.0, nan] }", "not finite, the first (nan) at t = 0.1 s"),
         ('{ constant = 1.0, unit = "A" }', "unit 'A' (SI A) does not convert into 'N.m'"),
     ],
 )  # fmt: skip

@@ -69,7 +69,7 @@ def test_archive_without_description(tmp_path: Path) -> None:
     ("change", "message"),
     [
         (lambda text: text[:300], "modelDescription.xml cannot be read"),
-        (lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"'), "is of FMI version 1.0"),
+        (lambda text: text.replace('Version="2.0"', 'Version="1.0"', 1), "is of FMI version 1.0"),
         (lambda text: text.replace("CoSimulation", "OtherInterface"), "has no co-simulation"),
         (lambda text: text.replace('valueReference="', 'valueReference="x', 1), "is not valid"),
     ],

@@ -40,7 +40,7 @@ def test_parquet_keeps_every_bit_and_the_provenance(recording: Recording, tmp_pa
     gearbox = back.provenance["instances"]["gearbox"]
     assert gearbox["reference"] == "gearbox.lab_bench/ratio" and len(gearbox["sha256"]) == 64
     assert back.provenance["algorithm"] == "jacobi"
-    assert list(pd.read_parquet(path).columns)[0] == "time"
+    assert next(iter(pd.read_parquet(path).columns)) == "time"
 
 
 def test_csv_keeps_every_bit_and_names_units(recording: Recording, tmp_path: Path) -> None:
