@@ -255,13 +255,14 @@ def _effect_symbols(name: str, places: list[Place]) -> list[tuple[str, ...]]:
 
     component, fidelity, balance = min(places, key=size)
     model = build_model(f"{component}/{fidelity}+{name}@{balance}")
-    prefix = f"{balance}.{name}."
+    prefix, added = f"{balance}.{name}.", model.balances[balance].unit
     rows = _symbols(v for v in model.variables.values() if v.name.startswith(prefix))
     result = []
     for symbol, unit, *rest in rows:
         local = symbol.strip("`").removeprefix(prefix)
         known = declared.get(local.split("[")[0])
-        general = unit if known is None or known.unit == unit else "by balance"
+        own = known.unit if known else "1"
+        general = "by balance" if unit != own and (known or unit == added) else unit
         result.append((f"`{name}.{local}`", general, *rest))
     return result
 
