@@ -1,0 +1,32 @@
+"""Viscous drag on the motion of a body, e.g. of something that it pulls along.
+
+    F = -c v,   P_loss = c |v|^2
+
+at the reference point.
+
+Not modelled: a moment, dry friction.
+
+Source: linear damping.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+DRAG = Quantity(
+    "c", "N.s/m", "drag force per velocity, 0 = absent", start=10.0, minimum=0.0, strength=True
+)
+
+EFFECT = Effect("body_drag", "Viscous drag on a body.", ("body",), DRAG, source="linear damping")
+
+
+def law(e: EffectModel) -> None:
+    """Add the drag."""
+    velocity = e.signal("velocity")
+    force = -e.parameter(DRAG) * velocity
+    e.add(ca.vertcat(force, ca.SX.zeros(3)))
+    e.loss(-ca.dot(force, velocity))

@@ -1,0 +1,45 @@
+"""Slippery round patch on the floor.
+
+    mu -> mu (1 - reduction exp(-(d/radius)^4)),   d: distance from the centre of the patch
+
+Not modelled: a film that a wheel carries along.
+
+Source: none, a shape with a flat middle and a smooth edge.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+REDUCTION = Quantity(
+    "reduction",
+    "1",
+    "share of the friction coefficient that is lost, 0 = absent",
+    start=0.8,
+    minimum=0.0,
+    maximum=1.0,
+    strength=True,
+)
+X_P = Quantity("x_p", "m", "world position of the centre", start=1.0)
+Y_P = Quantity("y_p", "m", "world position of the centre")
+RADIUS = Quantity("radius", "m", "radius of the patch", start=0.3, minimum=1e-3)
+
+EFFECT = Effect(
+    "low_friction_patch",
+    "Slippery patch on the floor.",
+    ("coefficient",),
+    REDUCTION,
+    needs=("x", "y"),
+    unit="1",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Lower the coefficient."""
+    square = (e.signal("x") - e.parameter(X_P)) ** 2 + (e.signal("y") - e.parameter(Y_P)) ** 2
+    inside = ca.exp(-((square / e.parameter(RADIUS) ** 2) ** 2))
+    e.add(-e.parameter(REDUCTION) * inside * e.signal("value"))

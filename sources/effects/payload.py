@@ -1,0 +1,29 @@
+"""Mass that is fixed to a body.
+
+    m -> m + m_p,   first moment -> + m_p p,   inertia -> + m_p (|p|^2 1 - p p')
+
+The component adds its weight and its inertia.
+
+Not modelled: extent of the payload (a point mass), sloshing or swinging.
+
+Source: rigid body mechanics.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+MASS = Quantity("mass", "kg", "mass, 0 = absent", start=5.0, minimum=0.0, strength=True)
+POSITION = Quantity("position", "m", "where it sits, from the reference point in body axes", size=3)
+
+EFFECT = Effect("payload", "Mass fixed to a body.", ("body",), MASS, source="mechanics")
+
+
+def law(e: EffectModel) -> None:
+    """Add the mass."""
+    e.add_mass(e.parameter(MASS), e.parameter(POSITION), ca.SX.zeros(3, 3))
+    e.loss(0)

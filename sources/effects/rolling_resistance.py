@@ -1,0 +1,40 @@
+"""Rolling resistance on top of what a wheel declares.
+
+    tau = -c N r tanh(w/w_0),   P_loss = c N r w tanh(w/w_0)
+
+Not modelled: dependence of c on speed and temperature, creep out of standstill (below w_0 the
+moment falls).
+
+Source: Johnson, Contact Mechanics, 1985, ch. 9 (hysteresis of the tread).
+"""
+
+from __future__ import annotations
+
+from ..effect import Effect
+from ..laws.contact import rolling_resistance
+from ..model import EffectModel
+from ..quantity import Quantity
+
+COEFFICIENT = Quantity(
+    "c", "1", "additional rolling resistance coefficient, 0 = absent", start=0.01, strength=True
+)
+W_0 = Quantity("w_0", "rad/s", "wheel speed over which it changes sign", start=0.1, minimum=1e-6)
+
+EFFECT = Effect(
+    "rolling_resistance",
+    "Rolling resistance of a loaded wheel.",
+    ("rotation",),
+    COEFFICIENT,
+    needs=("normal", "radius"),
+    source="Johnson 1985",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Add the moment."""
+    speed = e.signal("velocity")
+    moment = rolling_resistance(
+        e.parameter(COEFFICIENT), e.signal("normal"), e.signal("radius"), speed, e.parameter(W_0)
+    )
+    e.add(-moment)
+    e.loss(moment * speed)

@@ -1,0 +1,36 @@
+"""Eccentric wheel: its rolling radius changes over a turn.
+
+    r -> r + e cos(phi - phi_0)
+
+Not modelled: higher harmonics of the rim.
+
+Source: kinematics of an eccentric circle, to first order in e.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..effect import Effect
+from ..model import EffectModel
+from ..quantity import Quantity
+
+ECCENTRICITY = Quantity(
+    "e", "m", "amplitude of the radius, 0 = absent", start=5e-4, nominal=1e-3, strength=True
+)
+PHASE = Quantity("phi_0", "rad", "wheel angle at which the radius is largest")
+
+EFFECT = Effect(
+    "wheel_runout",
+    "Eccentric wheel.",
+    ("coefficient",),
+    ECCENTRICITY,
+    needs=("angle",),
+    unit="m",
+    source="kinematics",
+)
+
+
+def law(e: EffectModel) -> None:
+    """Modulate the radius."""
+    e.add(e.parameter(ECCENTRICITY) * ca.cos(e.signal("angle") - e.parameter(PHASE)))
