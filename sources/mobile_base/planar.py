@@ -75,17 +75,18 @@ SHARE = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
-    mass, com_x, com_y = m.parameter(MASS), m.parameter(COM_X), m.parameter(COM_Y)
+    mass, com = m.parameter(MASS), ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), 0)
+    com += m.balance("load", "position", value=com).effort
     cabinet, drive_mass = m.parameter(CABINET_MASS), m.parameter(DRIVE_MASS)
     x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
     v_x, v_y, w = m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE)
 
     # without the casters, which count their own kinetic energy
     own = mass + cabinet + 2 * drive_mass
-    s_x, s_y = mass * com_x, mass * com_y
+    s_x, s_y = mass * com[0], mass * com[1]
     yaw = (
         m.parameter(I_ZZ)
-        + mass * (com_x**2 + com_y**2)
+        + mass * (com[0] ** 2 + com[1] ** 2)
         + m.parameter(CABINET_I_ZZ)
         + 2 * (m.parameter(DRIVE_INERTIA) + drive_mass * places.half_track**2)
     )

@@ -139,9 +139,11 @@ def _ring(mass: SX, count: int, x: SX, y: SX, z: SX) -> _Mass:
 def _base_mass(m: Model, places: Places) -> _Mass:
     """Body and cabinet, with the drive wheels' inertia about their own centres."""
     r = places.radius
+    com = ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), m.parameter(COM_Z) - r)
+    load = m.balance("load", "position", value=com)
     body = _at(
         m.parameter(MASS),
-        ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), m.parameter(COM_Z) - r),
+        com + load.effort,
         ca.diag(ca.vertcat(m.parameter(I_XX), m.parameter(I_YY), m.parameter(I_ZZ))),
     )
     cabinet = _at(
