@@ -215,7 +215,8 @@ def run(
         name: `motor_bench`, `crawler_paper/SET1_1`, a folder or a scenario.toml.
         variants: instance (or component, or slot) -> variant, fidelity, or `+effect`.
         parameters: `instance.name` -> value.
-        algorithm, step, duration: replace the scenario's.
+        algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
+            does not reach.
         provider: where variants come from; by default they are built from the sources, or taken
             from the installed FMUs where those are missing.
         out: folder for recording, plot and result; nothing is written without it.
@@ -235,6 +236,8 @@ def run(
     files: list[Path] = []
     for run_name in chosen:
         item = file.scenario(run_name)
+        if duration is not None and duration < item.duration:
+            item = _shortened(item, duration)
         item = replace(
             item,
             variants={**item.variants, **(variants or {})},
@@ -268,6 +271,13 @@ def run(
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
     return final
+
+
+def _shortened(scenario: Scenario, duration: float) -> Scenario:
+    """A shorter run keeps the checks whose time window lies in it; the others need the whole run."""
+    end = scenario.start + duration
+    kept = tuple(check for check in scenario.checks if check.before <= end)
+    return replace(scenario, duration=duration, checks=kept)
 
 
 def _told(progress: Callable[[str, float], None], name: str) -> Callable[[float], None]:
