@@ -34,7 +34,7 @@ ASYMMETRY = Quantity(
     minimum=-1.0,
     maximum=1.0,
 )
-W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 
 EFFECT = Effect(
     "asymmetric_coulomb",

@@ -2,7 +2,9 @@
 
     f = -f_c tanh(v / v_0),   P_loss = f_c v tanh(v / v_0)
 
-`v_0` must be well below the speeds of interest; at standstill the law creeps instead of sticking.
+`v_0` must be well below the speeds of interest; at standstill the law creeps instead of sticking
+(`bristle` sticks). On an inertia J the friction reacts within v_0 J / f_c: where another component
+owns the inertia, communication steps must stay below twice that.
 
 Not modelled: stiction, dependence on load or temperature.
 
@@ -20,7 +22,7 @@ from ..quantity import Quantity
 TAU_C = Quantity(
     "tau_c", "N.m", "Coulomb friction torque, 0 = absent", start=0.5, minimum=0.0, strength=True
 )
-W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 
 EFFECT = Effect(
     "coulomb", "Coulomb friction of a shaft.", ("rotation",), TAU_C, source="Armstrong 1991"

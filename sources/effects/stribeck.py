@@ -28,7 +28,7 @@ EXCESS = Quantity(
     strength=True,
 )
 W_S = Quantity("w_s", "rad/s", "speed over which the excess decays", start=0.5, minimum=1e-6)
-W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 
 EFFECT = Effect(
     "stribeck",

@@ -1,0 +1,252 @@
+"""What the effects on shafts, windings, gears and springs do, against laws written apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from sources.function import Oracle
+from sources.model import ModelError
+from sources.variant import build_model
+from tests.drives.closed_drive import ClosedDrive
+
+Point = Mapping[str, float]
+
+
+def torque_of(effect: str, point: Point) -> float:
+    """Torque that an effect adds to a disc, from its acceleration."""
+    with_effect = Oracle(build_model(f"inertia/disc+{effect}"))
+    plain = Oracle(build_model("inertia/disc"))
+    inertia = 0.08
+    shared = {k: v for k, v in point.items() if "." not in k}
+    return inertia * (with_effect.derivatives(point)["speed"] - plain.derivatives(shared)["speed"])
+
+
+SHAFT_LAWS: dict[str, tuple[Point, Callable[[float, float, float], float]]] = {
+    # effect: parameters, torque over (speed w, angle phi, transmitted torque tau)
+    "viscous": ({"b": 0.2}, lambda w, phi, tau: -0.2 * w),
+    "coulomb": ({"tau_c": 0.7, "w_0": 0.1}, lambda w, phi, tau: -0.7 * math.tanh(w / 0.1)),
+    "stribeck": (
+        {"tau_s": 0.4, "w_s": 2.0, "w_0": 0.1},
+        lambda w, phi, tau: -0.4 * math.exp(-(w**2) / 4) * math.tanh(w / 0.1),
+    ),
+    "quadratic_drag": ({"c": 0.01}, lambda w, phi, tau: -0.01 * w * abs(w)),
+    "load_friction": (
+        {"mu": 0.1, "w_0": 0.1},
+        lambda w, phi, tau: -0.1 * abs(tau) * math.tanh(w / 0.1),
+    ),
+    "asymmetric_coulomb": (
+        {"tau_c": 0.5, "a": 0.6, "w_0": 1e-3},
+        lambda w, phi, tau: -0.8 if w > 0 else 0.2,
+    ),
+    "cogging": (
+        {"tau_c": 0.1, "n": 7.0, "psi": 0.3},
+        lambda w, phi, tau: -0.1 * math.sin(7 * phi + 0.3),
+    ),
+    "unbalance": ({"m_u": 0.2, "psi": 0.5}, lambda w, phi, tau: -0.2 * math.sin(phi + 0.5)),
+    "temperature_drift": ({"b": 0.3, "h": 0.25}, lambda w, phi, tau: -0.3 * 0.75 * w),
+}
+
+
+@pytest.mark.parametrize("effect", SHAFT_LAWS)
+@pytest.mark.parametrize("point", [(1.5, 0.4, 0.9), (-2.5, -3.0, -1.2)])
+def test_torque_on_a_shaft(effect: str, point: tuple[float, float, float]) -> None:
+    parameters, law = SHAFT_LAWS[effect]
+    speed, angle, load = point
+    values = {"speed": speed, "angle": angle, "tau": load}
+    values |= {f"{effect}.{name}": value for name, value in parameters.items()}
+    # rounding of accelerations near 50 rad/s2
+    assert torque_of(effect, values) == pytest.approx(law(speed, angle, load), rel=1e-9)
+
+
+def voltage_of(effect: str, point: Point) -> float:
+    """Voltage that an effect adds to the winding, from the rate of the current."""
+    with_effect = Oracle(build_model(f"dc_motor/sampled+{effect}"))
+    plain = Oracle(build_model("dc_motor/sampled"))
+    shared = {k: v for k, v in point.items() if "." not in k}
+    return 2e-4 * (with_effect.derivatives(point)["current"] - plain.derivatives(shared)["current"])
+
+
+WINDING_LAWS: dict[str, tuple[Point, Callable[[float, float, float], float]]] = {
+    # effect: parameters, voltage over (current i, terminal voltage u, speed w)
+    "winding_heating": (
+        {"r_th": 2.0, "p": 25.0},
+        lambda i, u, w: -0.1 * 0.00393 * 50.0 * i,
+    ),
+    "battery_sag": ({"r_b": 0.2}, lambda i, u, w: -0.2 * i * (u / 48) ** 2),
+    "brush_drop": ({"u_b": 0.8, "i_0": 0.3}, lambda i, u, w: -0.8 * math.tanh(i / 0.3)),
+    "pwm_dead_zone": ({"u_dz": 0.6}, lambda i, u, w: -math.copysign(min(abs(u), 0.6), u)),
+    "torque_constant_saturation": (
+        {"s": 0.2, "i_s": 15.0},
+        lambda i, u, w: 0.13 * 0.2 * i**2 / (i**2 + 225) * w,
+    ),
+    "torque_ripple": (
+        {"r": 0.05, "n": 4.0, "psi": 0.2, "theta": 0.7},
+        lambda i, u, w: -0.13 * 0.05 * math.cos(4 * 0.7 + 0.2) * w,
+    ),
+}
+
+
+@pytest.mark.parametrize("effect", WINDING_LAWS)
+@pytest.mark.parametrize("point", [(8.0, 5.0, 30.0), (-3.0, 0.4, -20.0)])
+def test_voltage_of_a_winding(effect: str, point: tuple[float, float, float]) -> None:
+    parameters, law = WINDING_LAWS[effect]
+    current, voltage, speed = point
+    values = {"current": current, "set_voltage": voltage, "w": speed}
+    values |= {f"{effect}.{name}": value for name, value in parameters.items()}
+    # rounding of rates near 1e5 A/s
+    assert voltage_of(effect, values) == pytest.approx(law(current, voltage, speed), rel=1e-9)
+
+
+def test_a_warm_winding_settles_where_heat_in_is_heat_out() -> None:
+    oracle = Oracle(build_model("dc_motor/sampled+winding_heating"))
+    current, r_th, alpha = 20.0, 1.5, 0.00393
+    hot = 0.1 * current**2 / (1 - alpha * r_th * 0.1 * current**2)  # p = R (1 + alpha r_th p) i^2
+    values = {"current": current, "winding_heating.p": hot}
+    assert oracle.derivatives(values)["winding_heating.p"] == pytest.approx(0.0, abs=1e-12)
+    assert oracle.outputs(values)["winding_heating.rise"] == pytest.approx(r_th * hot)
+
+
+@pytest.mark.parametrize(
+    ("effect", "measured"),
+    [("current_offset", 3.0 + 0.2), ("current_gain", 3.0 * 1.02)],
+)
+def test_a_wrong_current_sensor_misleads_its_loop(effect: str, measured: float) -> None:
+    """The loop brings the measured current to its set value, so the true one is off."""
+    oracle = Oracle(build_model(f"dc_motor/electrical+{effect}"))
+    point = {"current": 3.0, "current_integral": 0.0}
+    assert oracle.outputs(point)["i_measured"] == pytest.approx(measured, rel=1e-12)
+    assert oracle.outputs(point)["i"] == 3.0
+    assert oracle.outputs(point)["u"] == pytest.approx(-0.19 * measured, rel=1e-12)
+
+
+def test_transmission_error_turns_the_motor_by_its_own_shape() -> None:
+    """Integrated over the output angle, w_a / w_b gives ratio (theta + eps sin(n theta))."""
+    oracle = Oracle(build_model("gearbox/ratio+mesh_ripple"))
+    values = {"w_b": 2.0, "mesh_ripple.n": 5.0, "mesh_ripple.eps": 0.01}
+    times = np.linspace(0.0, 1.0, 2001)
+    run = oracle.simulate(times, values)
+    angle = np.concatenate(
+        [[0.0], np.cumsum((run["w_a"][1:] + run["w_a"][:-1]) / 2) * (times[1] - times[0])]
+    )
+    expected = 10.167 * (2 * times + 0.01 * np.sin(10 * times))
+    # trapezoidal rule: h^2 / 12 times the second derivative of 10 rad/s3, over 1 s
+    np.testing.assert_allclose(angle, expected, atol=1e-5)
+
+
+def disc_under_torque(
+    effect: str, torque: Callable[[float], float], end: float
+) -> dict[str, np.ndarray]:
+    """A disc without other friction, sampled every 10 ms."""
+    oracle = Oracle(build_model(f"inertia/disc+{effect}"))
+    times = np.linspace(0.0, end, round(end / 0.01) + 1)
+    return oracle.simulate(times, {"b": 0.0}, lambda t: {"tau": torque(t)}, rtol=1e-6, atol=1e-11)
+
+
+def test_bristle_sticks_and_coulomb_creeps() -> None:
+    """0.5 N.m of sliding friction under 0.45 N.m."""
+    stuck = disc_under_torque("bristle", lambda t: 0.45, 2.0)
+    creeping = disc_under_torque("coulomb", lambda t: 0.45, 2.0)
+    assert creeping["speed"][-1] == pytest.approx(2e-3 * math.atanh(0.9), rel=1e-6)
+    # it may slip while it settles, by a few times its length of 5e-4 rad, but comes to rest
+    assert stuck["angle"][-1] < 2e-3
+    assert abs(stuck["speed"][-1]) < 1e-8
+
+
+def test_bristle_does_not_drift_under_a_load_that_varies() -> None:
+    """LuGre's model creeps here; elasto-plastic presliding must not."""
+    run = disc_under_torque("bristle", lambda t: 0.2 + 0.1 * math.sin(8 * math.pi * t), 2.0)
+    angle = run["angle"][[100, 125, 150, 175, 200]]  # the same phase of five periods
+    # elastic motion is 2e-4 rad; the solver's tolerance leaves 1e-6 of it per period
+    assert np.ptp(angle) < 1e-9
+
+
+def test_bristle_breaks_away_at_its_maximum_and_then_slides() -> None:
+    held = disc_under_torque("bristle", lambda t: 0.64 * min(t, 1), 1.5)
+    gone = disc_under_torque("bristle", lambda t: 0.66 * min(t, 1), 1.5)
+    # breakaway is at 0.5 N.m times (1 + 0.3)
+    assert held["angle"][-1] < 5e-3
+    assert abs(held["speed"][-1]) < 1e-2
+    assert gone["speed"][-1] > 0.5
+    acceleration = (gone["speed"][-1] - gone["speed"][-2]) / 0.01
+    assert acceleration == pytest.approx((0.66 - 0.5) / 0.08, rel=1e-3)
+
+
+def test_friction_fades_while_the_shaft_turns_and_returns_at_rest() -> None:
+    oracle = Oracle(build_model("inertia/disc+temperature_drift"))
+    rate = "temperature_drift.h"
+    assert oracle.derivatives({"speed": 1.0})[rate] == pytest.approx(0.5 / 60)
+    assert oracle.derivatives({"temperature_drift.h": 0.6})[rate] == pytest.approx(-0.01)
+
+
+@pytest.mark.parametrize(("twist", "torque"), [(1e-3, 0.0), (-1.5e-3, 0.0), (2.5e-3, 6.0)])
+def test_backlash_leaves_a_gap(twist: float, torque: float) -> None:
+    oracle = Oracle(build_model("gearbox/elastic+backlash"))
+    out = oracle.outputs({"twist": twist, "backlash.gap": 3e-3})
+    assert out["tau_b"] == pytest.approx(torque, abs=1e-12)  # 6000 N.m/rad beyond 1.5 mrad
+
+
+def test_spring_that_stiffens() -> None:
+    oracle = Oracle(build_model("gearbox/elastic+cubic_stiffness"))
+    out = oracle.outputs({"twist": 2e-3, "cubic_stiffness.k_3": 1e9})
+    assert out["tau_b"] == pytest.approx(6000 * 2e-3 + 1e9 * 8e-9, rel=1e-12)
+
+
+def test_hysteresis_loses_the_area_of_its_loop() -> None:
+    """Slow cycles of the twist between blocked ends: 4 tau_h (A - x) per cycle.
+
+    x is between 0 and the deflection 2 x_h over which the loop turns.
+    """
+    width, length, amplitude = 0.5, 5e-4, 0.01
+    oracle = Oracle(build_model("gearbox/elastic+hysteresis"))
+    names = oracle.state_names
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        twist_rate = amplitude * math.cos(t)
+        values = {
+            "twist": amplitude * math.sin(t),
+            "rotor_speed": 10.167 * twist_rate,
+            "hysteresis.z": y[0],
+        }
+        args = oracle.arguments(values)
+        xdot, out = oracle.functions.outputs(*args)
+        loss = float(out[oracle.output_names.index("hysteresis.P_loss")])
+        return np.array([float(xdot[names.index("hysteresis.z")]), loss])
+
+    run = solve_ivp(rate, (0.0, 4 * math.pi), [0.0, 0.0], rtol=1e-7, atol=1e-10, max_step=0.01)
+    second_cycle = run.y[1, -1] - np.interp(2 * math.pi, run.t, run.y[1])
+    full = 4 * width * amplitude
+    assert full - 4 * width * 2 * length < second_cycle < full
+
+
+def test_effects_find_their_natural_balance() -> None:
+    assert "coulomb.tau_c" in build_model("gearbox/elastic+coulomb").variables
+    assert "flange_a.coulomb.tau_c" in build_model("gearbox/elastic+coulomb@flange_a").variables
+    with pytest.raises(ModelError, match="adds A, but balance 'speed_sensor' is in rad/s"):
+        build_model("dc_motor/sampled+current_offset@speed_sensor")
+    with pytest.raises(ModelError, match="acts on compliance"):
+        build_model("gearbox/ratio+backlash")
+
+
+def test_unbalance_wherever_it_sits_is_the_same() -> None:
+    """On the gearbox, which knows only the speed, the effect integrates the angle itself."""
+    results = []
+    for gearbox, load, key in (
+        ("gearbox/ratio", "inertia/disc+unbalance", "load.unbalance"),
+        ("gearbox/ratio+unbalance@flange_b", "inertia/disc", "gear.flange_b.unbalance"),
+    ):
+        drive = ClosedDrive("dc_motor/electrical", load, gearbox, {f"{key}.m_u": 2.0})
+        run = solve_ivp(
+            lambda _, x, drive=drive: np.asarray(drive.rate(x, [], 30.0)).ravel(),
+            (0.0, 0.5),
+            drive.start,
+            method="Radau",
+            rtol=1e-8,
+            atol=1e-9,
+        )
+        results.append(run.y[drive.states.index("load.speed"), -1])
+    assert results[0] == pytest.approx(results[1], rel=1e-6)  # a hundred times the solver's
