@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from sources.function import Oracle
 from sources.variant import build_model
@@ -62,6 +63,27 @@ def test_two_masses_resonate_where_theory_says(inertia: float) -> None:
     # what is left of the motor is a servo of 1e-9 N.m.s/rad, 1e-5 of the spring's damping
     assert abs(pole) == pytest.approx(np.sqrt(stiffness * compliance), rel=1e-6)
     assert -2 * pole.real == pytest.approx(damping * compliance, rel=1e-4)
+
+
+@pytest.mark.parametrize(("order", "share"), [("Jacobi", 1.0), ("Gauss-Seidel", 0.0)])
+def test_damping_lost_by_the_exchange_with_the_load(order: str, share: float) -> None:
+    """Held speeds cost damping k H (1/J) / (1/J + 1/(ratio^2 J_a)) with Jacobi, none otherwise."""
+    stiffness, damping, inertia, step = 6000.0, 1.1, 0.1, 1e-4
+    oracle = Oracle(build_model("gearbox/elastic"))
+    columns = [oracle.derivatives({name: 1e-6}) for name in (*oracle.state_names, "w_b")]
+    a = np.array([[c[name] * 1e6 for c in columns] for name in oracle.state_names])
+    exact = expm(np.vstack([a, np.zeros((1, 3))]) * step)  # gearbox with the load's speed held
+    torque = np.array([stiffness, damping / RATIO, -damping])
+    after = exact @ np.eye(3)
+    exchanged = torque if order == "Jacobi" else torque @ after
+    after[2] += step / inertia * exchanged
+    pole = np.log(np.linalg.eigvals(after).astype(complex)) / step
+    pole = pole[np.argmax(pole.imag)]
+    compliance = 1 / inertia + 1 / (RATIO**2 * 2e-4)
+    lost = damping + 2 * pole.real / compliance
+    expected = share * stiffness * step / inertia / compliance
+    # terms of higher order in H: (omega H)^2 = 0.4 % of k H
+    assert lost == pytest.approx(expected, abs=0.004 * stiffness * step)
 
 
 @pytest.mark.parametrize(("signed", "rigid"), [(1.0, "lossy"), (0.0, "ratio")])
