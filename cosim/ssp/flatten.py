@@ -97,11 +97,15 @@ class Net:
         self, reference: Element, place: Path, scopes: tuple[tuple[Path, Element], ...]
     ) -> None:
         """Join the connectors of a reference with the signals of the dictionary it refers to."""
-        for path, system in reversed(scopes):
-            signals = (system.dictionaries or {}).get(reference.dictionary)
-            if signals is not None:
-                break
-        else:
+        scope, signals = next(
+            (
+                (path, (system.dictionaries or {})[reference.dictionary])
+                for path, system in reversed(scopes)
+                if reference.dictionary in (system.dictionaries or {})
+            ),
+            ((), None),
+        )
+        if signals is None:
             raise self.file.error(
                 f"{shown(place)} refers to signal dictionary {reference.dictionary!r}, which no "
                 "enclosing system has"
@@ -114,7 +118,7 @@ class Net:
                     f"{listing(signals, connector.name)}"
                 )
             outer: Node = (place, connector.name, 0)
-            inner: Node = ((*path, f"#{reference.dictionary}"), connector.name, 0)
+            inner: Node = ((*scope, f"#{reference.dictionary}"), connector.name, 0)
             self._units[outer] = connector.unit
             self._units[inner] = signals[connector.name]
             self._edges.setdefault(outer, []).append(_Edge(inner, None))

@@ -108,6 +108,7 @@ class _Flat:
                 taken, number = f"{name}_{number}", number + 1
             self.names[place] = taken
         self.ignored: list[str] = []
+        self.sizes: dict[str, int] = {}
 
     def full(self, node: flatten.Node) -> str:
         """Full name of the scalar variable at a node of an FMU."""
@@ -142,17 +143,31 @@ class _Flat:
 
     def wires(self) -> tuple[list[Wire], dict[str, Terminal]]:
         """Connections between FMUs, in the order of the file, and outputs of the root system."""
-        wires: list[Wire] = []
+        found: dict[tuple[str, str], list[tuple[int, int, float, float]]] = {}
         outputs: dict[str, Terminal] = {}
         for start in self.net.outputs():
-            source = self.full(start)
+            source = f"{self.names[start[0]]}.{start[1]}"
             for route in self.net.routes(start):
+                change = (route.factor, route.offset)
                 if self.net.leaf(route.end) is None:
-                    outputs[_element(route.end)] = Terminal(source, route.factor, route.offset)
+                    outputs[_element(route.end)] = Terminal(self.full(start), *change)
                 else:
-                    target = self.full(route.end)
-                    wires.append(Wire(source, target, route.factor, route.offset, False))
-        return wires, outputs
+                    target = f"{self.names[route.end[0]]}.{route.end[1]}"
+                    found.setdefault((source, target), []).append((start[2], route.end[2], *change))
+            self.sizes[source] = self.net.variable(start[0], start[1]).size
+        return [self.wire(*ends, ways) for ends, ways in found.items()], outputs
+
+    def wire(self, source: str, target: str, ways: list[tuple[int, int, float, float]]) -> Wire:
+        """One wire for a scalar, or for an array that is joined as a whole."""
+        size = self.sizes[source]
+        order = sorted((start, end) for start, end, _, _ in ways)
+        changes = {(factor, offset) for _, _, factor, offset in ways}
+        if order != [(index, index) for index in range(size)] or len(changes) > 1:
+            raise self.file.error(
+                f"connection {source} - {target} joins single elements of arrays; only whole "
+                "arrays can be connected"
+            )
+        return Wire(source, target, *changes.pop(), False)
 
     def inputs(self, outputs: Mapping[str, Terminal]) -> dict[str, tuple[Terminal, ...]]:
         """Inputs of the root system."""

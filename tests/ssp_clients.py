@@ -1,0 +1,74 @@
+"""Other tools as clients of our SSP archives, each in a process of its own.
+
+`run(client, path, step, count, names)` returns the values of outputs after each step. Run as a
+script, this file is that process: `clients.py libcosim FILE STEP COUNT NAME...` prints JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+PARAMETER_SET = "parameters"
+
+
+def run(client: str, path: Path, step: float, count: int, names: list[str]) -> np.ndarray:
+    """One row per step, one column per name."""
+    done = subprocess.run(
+        [sys.executable, __file__, client, str(path), repr(step), str(count), *names],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"{client}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
+    return np.array(json.loads(done.stdout.splitlines()[-1]))
+
+
+def libcosim(path: str, step: float, count: int, names: list[str]) -> list[list[float]]:
+    from libcosimpy.CosimEnums import CosimExecutionState
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
+    log_output_level(CosimLogLevel.WARNING)
+    # steps are whole nanoseconds
+    execution = CosimExecution.from_ssp_file(path, step_size=round(step * 1e9))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    places = []
+    for name in names:
+        instance, _, variable = name.partition(".")
+        slave = execution.slave_index_from_instance_name(instance)
+        found = [v.reference for v in execution.slave_variables(slave)
+                 if v.name.decode() == variable]  # fmt: skip
+        places.append((slave, found))
+    rows = []
+    for _ in range(count):
+        if not execution.step():
+            raise RuntimeError("a step failed")
+        rows.append([observer.last_real_values(slave, found)[0] for slave, found in places])
+    assert execution.status().state != CosimExecutionState.ERROR.value
+    return rows
+
+
+def ecos(path: str, step: float, count: int, names: list[str]) -> list[list[float]]:
+    from ecospy import EcosLib, EcosSimulation
+
+    EcosLib.set_log_level("warn")
+    rows = []
+    with EcosSimulation(step, ssp_path=path) as simulation:
+        simulation.init(parameter_set=PARAMETER_SET)
+        for _ in range(count):
+            simulation.step()
+            rows.append([simulation.get_real(name.replace(".", "::")) for name in names])
+        simulation.terminate()
+    return rows
+
+
+if __name__ == "__main__":
+    client, path, step, count, *names = sys.argv[1:]
+    rows = {"libcosim": libcosim, "ecos": ecos}[client](path, float(step), int(count), names)
+    print("\n" + json.dumps(rows))
