@@ -51,12 +51,11 @@ class RunResult:
     def plot(self, path: Path | str | None = None) -> Any:
         """Plot what the scenario names, else what is compared, else everything."""
         references = {
-            reference.signal: (
-                reference.times,
-                convert_reference(self.recording, reference),
-                reference.text,
-            )
+            name: (reference.times, values, reference.text)
             for reference in self.scenario.references.values()
+            for name, values in zip(
+                reference.signals, convert_reference(self.recording, reference).T, strict=True
+            )
         }
         signals = self.scenario.plot or tuple(references) or None
         return self.recording.plot(signals, path, references)
@@ -165,11 +164,11 @@ def run_scenario(
     system = file.build(provider, scenario.parameters)
     record = scenario.record
     if record is not None:
-        wanted = [reference.signal for reference in scenario.references.values()]
+        wanted = [name for item in scenario.references.values() for name in item.signals]
         wanted += [name for check in scenario.checks for name in check.signals]
         record = tuple(dict.fromkeys([*record, *wanted]))
     else:
-        extra = [r.signal for r in scenario.references.values()]
+        extra = [name for item in scenario.references.values() for name in item.signals]
         record = tuple(dict.fromkeys([*system.signals(), *extra]))
     master = Master(system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name)
     started = time.perf_counter()
@@ -274,7 +273,7 @@ def run(
 
 
 def _shortened(scenario: Scenario, duration: float) -> Scenario:
-    """A shorter run keeps the checks whose time window lies in it; the others need the whole run."""
+    """A shorter run keeps the checks whose time window it reaches; others need the whole run."""
     end = scenario.start + duration
     kept = tuple(check for check in scenario.checks if check.before <= end)
     return replace(scenario, duration=duration, checks=kept)

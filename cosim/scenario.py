@@ -368,13 +368,18 @@ class _Reader:
         )
 
     def reference(self, name: str, entry: Any) -> Reference:
-        if not isinstance(entry, dict) or "signal" not in entry:
+        if not isinstance(entry, dict) or not {"signal", "signals"} & set(entry):
             raise self.fail(f"compare {name}: signal is missing")
-        _only(
-            self.file.path, entry, _SOURCE_KEYS | {"signal", "offset", "scale"}, f"compare {name}"
-        )
-        column = str(entry.get("column", name))
-        times, values, unit, text = self.samples(f"compare {name}", entry, column)
+        keys = _SOURCE_KEYS | {"signal", "signals", "offset", "scale"}
+        _only(self.file.path, entry, keys, f"compare {name}")
+        signals = tuple(entry.get("signals", [entry.get("signal")]))
+        columns = entry.get("columns", [entry.get("column", name)])
+        if len(columns) != len(signals):
+            raise self.fail(
+                f"compare {name}: {len(columns)} columns for {len(signals)} signals; give as many"
+            )
+        parts = [self.samples(f"compare {name}", entry, str(column)) for column in columns]
+        values = np.column_stack([np.asarray(part[1], dtype=np.float64) for part in parts])
         offset = entry.get("offset", 0.0)
         if isinstance(offset, str):
             known = self.log(entry).values
@@ -385,9 +390,9 @@ class _Reader:
                 )
             offset = known[offset]
         return Reference(
-            entry["signal"],
-            np.asarray(times, dtype=np.float64),
-            (np.asarray(values, dtype=np.float64) - float(offset)) * float(entry.get("scale", 1.0)),
-            unit,
-            text,
+            signals,
+            np.asarray(parts[0][0], dtype=np.float64),
+            (values - float(offset)) * float(entry.get("scale", 1.0)),
+            parts[0][2],
+            ", ".join(part[3] for part in parts),
         )

@@ -107,18 +107,29 @@ def straight() -> Recording:
 def test_comparison_on_the_grid_of_the_reference() -> None:
     times = np.array([-0.5, 0.05, 0.55, 0.75, 2.0])
     values = np.array([0.0, 100.0, 1100.0, np.nan, 0.0]) + 300.0
-    found = compare(straight(), Reference("a.x", times, values, "mm", "log:x"))
+    found = compare(straight(), Reference(("a.x",), times, values[:, None], "mm", "log:x"))
     # 0.1 m and 1.1 m against 0.4 m and 1.4 m; outside and gaps are left out
     assert found.count == 2 and found.unit == "m"
     assert found.rms == pytest.approx(0.3, rel=1e-12) and found.max == pytest.approx(0.3, rel=1e-12)
 
 
+def test_comparison_of_a_path_takes_the_distance() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    path = Recording(time, np.column_stack([time, 0.0 * time]), ("x", "y"), {"x": "m", "y": "m"})
+    away = np.array([[0.5 + 0.3, 0.4], [1.0, 0.5]])
+    found = compare(path, Reference(("x", "y"), np.array([0.5, 1.0]), away, "m", "log"))
+    np.testing.assert_allclose(found.differences, [0.5, 0.5], rtol=1e-12)
+    mixed = Recording(time, path.values, ("x", "y"), {"x": "m", "y": "rad"})
+    with pytest.raises(UnitError, match=r"the distance of x, y: their units are m, rad"):
+        compare(mixed, Reference(("x", "y"), np.array([0.5, 1.0]), away, "m", "log"))
+
+
 def test_comparison_refuses() -> None:
     times = np.array([0.5])
     with pytest.raises(UnitError, match=r"cannot compare a.x with log: 's' .* does not convert"):
-        compare(straight(), Reference("a.x", times, times, "s", "log"))
+        compare(straight(), Reference(("a.x",), times, times[:, None], "s", "log"))
     with pytest.raises(ValueRangeError, match=r"no sample lies within the recording"):
-        compare(straight(), Reference("a.x", times + 5.0, times, "m", "log"))
+        compare(straight(), Reference(("a.x",), times + 5.0, times[:, None], "m", "log"))
 
 
 # -- measured data ---------------------------------------------------------------------------------

@@ -226,7 +226,7 @@ def test_scenario_error_is_wrong_input() -> None:
 def test_a_shorter_run_keeps_only_the_checks_that_it_reaches(folder: Path, provider) -> None:
     with (folder / "disc" / "scenario.toml").open("a") as handle:
         handle.write(
-            '[[checks]]\nname = "early"\nsignal = "load.w"\nof = "peak"\nbefore = 0.02\nlimit = 9.0\n'
+            '[[checks]]\nname = "early"\nsignal = "load.w"\nof = "peak"\nbefore = 0.02\nlimit = 9\n'
         )
     assert set(run("disc", provider=provider, folder=folder).checks) == {"final speed", "early"}
     short = run("disc", provider=provider, folder=folder, duration=0.05)
