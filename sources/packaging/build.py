@@ -7,6 +7,9 @@ import importlib.metadata
 import inspect
 import json
 import platform as host
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import lru_cache
 from html import escape
@@ -25,6 +28,8 @@ from .layout import Entry, layout
 
 Kind = description.Kind
 _SOURCES = Path(__file__).parent.parent
+_EQUATIONS = threading.Lock()
+"""Held while CasADi works: it counts references without locks. Compilers run beside it."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,8 @@ def _documentation(variant: Variant) -> bytes:
     return page.encode()
 
 
-def _native_files(variant: Variant, fmi: int, platforms: list[str]) -> dict[str, bytes]:
+def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
+    """All files but the libraries, and the generated C source that these are compiled from."""
     identifier = variant.name.identifier
     template = native.model_source(variant.model, variant.functions, variant.entries, identifier)
     fixed = {path.name: path.read_text(encoding="utf-8") for path in native.C_SOURCES.glob("*.c")}
@@ -142,15 +148,21 @@ def _native_files(variant: Variant, fmi: int, platforms: list[str]) -> dict[str,
             files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals
     for name, text in {**fixed, "model.c": source}.items():
         files[f"sources/{name}"] = text.encode()
-    for platform in platforms:
+    return files, source
+
+
+def _libraries(source: str, identifier: str, fmi: int, platforms: list[str]) -> dict[str, bytes]:
+    def compiled(platform: str) -> tuple[str, bytes]:
         target = native.PLATFORMS[platform]
         folder = target.fmi2 if fmi == 2 else target.fmi3
         library = native.compile_library(source, identifier, platform)
-        files[f"binaries/{folder}/{identifier}{target.suffix}"] = library
-    return files
+        return f"binaries/{folder}/{identifier}{target.suffix}", library
+
+    with ThreadPoolExecutor(len(platforms)) as pool:
+        return dict(pool.map(compiled, platforms))
 
 
-def _python_files(variant: Variant) -> dict[str, bytes]:
+def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
     source = python.slave_source(variant.model, variant.functions, variant.entries, variant.name)
     arguments = (variant.model, variant.functions, variant.entries)
     identifier = variant.name.identifier
@@ -166,7 +178,7 @@ def _python_files(variant: Variant) -> dict[str, bytes]:
         "resources/slavemodule.txt": module.encode(),
         f"resources/{module}.py": source.encode(),
     }
-    return files | python.binaries(identifier)
+    return files | python.binaries(identifier), source
 
 
 @lru_cache(maxsize=1)
@@ -240,15 +252,53 @@ def build(
             stamp = _stamp(parsed, fmi, kind, served)
             if stamp.exists() and stamp.read_text() == digest:
                 return path
-    variant = collect(name)
+    with _EQUATIONS:
+        variant = collect(name)
+        files, source = _native_files(variant, fmi) if kind == "native" else _python_files(variant)
+        files["documentation/index.html"] = _documentation(variant)
+        files["extra/cosim/component.json"] = component_json(variant)
     if kind == "native":
-        files = _native_files(variant, fmi, _platforms(platform))
-    else:
-        files = _python_files(variant)
-    files["documentation/index.html"] = _documentation(variant)
-    files["extra/cosim/component.json"] = component_json(variant)
+        files |= _libraries(source, parsed.identifier, fmi, _platforms(platform))
     content = pack(files)
     write_atomically(path, content)
     stamp = _stamp(parsed, fmi, kind, platform)
     write_atomically(stamp, hashlib.sha256(content).hexdigest().encode())
     return path
+
+
+def build_many(
+    names: Sequence[str],
+    *,
+    out: Path,
+    fmi: Literal[2, 3] = 2,
+    kind: Kind = "native",
+    platform: Literal["host", "all"] = "host",
+    workers: int = 2,
+    progress: Callable[[str, Path], None] | None = None,
+) -> list[Path]:
+    """Build several FMUs, compilers in parallel; returns their paths in the order of the names.
+
+    Args:
+        names: variants.
+        out, fmi, kind, platform: as in `build`.
+        workers: variants in work at the same time.
+        progress: called with name and path of each FMU as it is finished.
+
+    Raises:
+        as `build`, for the first variant that fails; those not begun are left out then.
+    """
+    with ThreadPoolExecutor(workers) as pool:
+        jobs = {
+            pool.submit(build, name, out=out, fmi=fmi, kind=kind, platform=platform): name
+            for name in dict.fromkeys(names)
+        }
+        try:
+            for job in as_completed(jobs):
+                path = job.result()
+                if progress:
+                    progress(jobs[job], path)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    paths = {name: job.result() for job, name in jobs.items()}
+    return [paths[name] for name in names]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fmpy.model_description import ModelDescription, ValidationError, read_model_description
 
 _ENTRY = "extra/cosim/component.json"
+# what zipfile raises for a member that it cannot give: checksum, stream, truncation, method
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError)
 
 
 def check(path: Path) -> list[str]:
@@ -19,25 +22,30 @@ def check(path: Path) -> list[str]:
     every variable has a unit and a description, the capabilities that we promise are declared,
     output dependencies are given, ports name existing variables, and a binary or a slave is there.
     """
+    contents: dict[str, bytes] = {}
     try:
         with zipfile.ZipFile(path) as archive:
-            broken = archive.testzip()
-            if broken:
-                return [f"{path.name}: the file {broken} in the archive is damaged"]
-            names = set(archive.namelist())
-            ours = json.loads(archive.read(_ENTRY)) if _ENTRY in names else None
-            text = archive.read("modelDescription.xml")
-    except KeyError:
-        return [f"{path.name}: the archive has no modelDescription.xml"]
+            for name in archive.namelist():
+                try:
+                    contents[name] = archive.read(name)
+                except _DAMAGE as error:
+                    return [f"{path.name}: the file {name} in the archive is damaged ({error})"]
     except (OSError, zipfile.BadZipFile) as error:
         return [f"{path.name}: not a readable .fmu archive ({error})"]
+    if "modelDescription.xml" not in contents:
+        return [f"{path.name}: the archive has no modelDescription.xml"]
+    try:
+        ours = json.loads(contents[_ENTRY]) if _ENTRY in contents else None
+    except ValueError as error:
+        return [f"{path.name}: {_ENTRY} cannot be read ({error})"]
     try:
         model = read_model_description(str(path), validate=True)
     except ValidationError as error:
         return [f"{path.name}: {problem}" for problem in error.problems]
     except Exception as error:  # fmpy raises plain Exception for XML that it cannot read
         return [f"{path.name}: {error}"]
-    problems = _problems_of_ours(model, ET.fromstring(text), ours, names) if ours else []
+    root = ET.fromstring(contents["modelDescription.xml"])
+    problems = _problems_of_ours(model, root, ours, set(contents)) if ours else []
     return [f"{path.name}: {problem}" for problem in problems]
 
 

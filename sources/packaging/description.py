@@ -14,6 +14,7 @@ from .layout import METHODS, Entry
 Kind = Literal["native", "python"]
 TOOL = "cosim"
 SOURCE_FILES = ("all.c",)
+LOG_CATEGORIES = ("logStatusDiscard", "logStatusError")
 
 
 def _text(value: float) -> str:
@@ -170,7 +171,7 @@ def describe_fmi2(
         simple = ET.SubElement(types, "SimpleType", name="SolverMethod")
         _method_items(ET.SubElement(simple, "Enumeration"))
     categories = ET.SubElement(root, "LogCategories")
-    for category in ("logStatusWarning", "logStatusError"):
+    for category in LOG_CATEGORIES:
         ET.SubElement(categories, "Category", name=category)
     ET.SubElement(
         root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)
@@ -270,7 +271,7 @@ def describe_fmi3(
         types = ET.SubElement(root, "TypeDefinitions")
         _method_items(ET.SubElement(types, "EnumerationType", name="SolverMethod"))
     categories = ET.SubElement(root, "LogCategories")
-    for category in ("logStatusWarning", "logStatusError"):
+    for category in LOG_CATEGORIES:
         ET.SubElement(categories, "Category", name=category)
     ET.SubElement(
         root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)

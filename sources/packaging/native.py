@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from .elimination import eliminate
 from .layout import Entry
 
 C_SOURCES = Path(__file__).parent / "c"
+_COMPILERS = threading.BoundedSemaphore(os.cpu_count() or 1)
+"""As many compilers at a time as there are processors."""
 
 
 @dataclass(frozen=True)
@@ -195,14 +198,15 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
         if "windows" not in target.target:
             command.append("-lm")
         zig = str(cache_folder("zig"))
-        result = subprocess.run(
-            command,
-            cwd=folder,
-            env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        with _COMPILERS:
+            result = subprocess.run(
+                command,
+                cwd=folder,
+                env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig},
+                capture_output=True,
+                text=True,
+                check=False,
+            )
         if result.returncode:
             raise CompilerError(
                 f"compiling {identifier} for {platform} failed (is ziglang complete?):\n"

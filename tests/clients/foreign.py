@@ -7,6 +7,7 @@ and writes `{output: [value after each step]}`. Uses nothing but the client name
 from __future__ import annotations
 
 import json
+import os
 import sys
 from typing import Any
 
@@ -86,3 +87,6 @@ if __name__ == "__main__":
     client = {"libcosimpy": libcosimpy, "ecospy": ecospy}[sys.argv[1]]
     answer = client(json.load(sys.stdin))
     sys.stdout.write("\n@" + json.dumps(answer) + "\n")  # behind what the client prints
+    sys.stdout.flush()
+    # A pythonfmu slave that libcosim's threads have called can crash the interpreter's own end.
+    os._exit(0)

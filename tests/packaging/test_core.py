@@ -1,0 +1,132 @@
+"""The C core and its Python twin: ticks, modes, and what they refuse, with its words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sources.packaging.build import collect
+from tests.fmus import Slave, fmu
+
+KINDS = [("native", 2), ("native", 3), ("python", 2)]
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS)
+@pytest.mark.parametrize("period", [0.02, 0.01, 0.1 / 3, 1e-3])
+def test_a_tick_at_the_end_of_a_step_belongs_to_the_next(
+    kind: str, fmi: int, period: float
+) -> None:
+    """A link that holds commands for two steps gives in the second what the first was given."""
+    with Slave(fmu("command_link/held", kind, fmi), {"T": period}) as slave:
+        for k in range(400):
+            slave.set({"v_set": float(k)})
+            slave.step(k * (period / 2), period / 2)
+            assert slave.get(["v_d"])[0] == 2 * (k // 2), k
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS)
+def test_ticks_inside_a_step_happen_at_their_time(kind: str, fmi: int) -> None:
+    """Times of one step added up, not multiplied: the rounding of 1e5 sums may not move a tick."""
+    with Slave(fmu("command_link/held", kind, fmi), {"T": 0.01}) as slave:
+        t, expected = 0.0, 0.0
+        for k in range(1000):
+            if k % 10 == 0:
+                expected = t
+            slave.set({"v_set": t})
+            slave.step(t, 1e-3)
+            t += 1e-3
+            assert slave.get(["v_d"])[0] == expected, k
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS)
+def test_clocks_of_a_late_start_keep_to_the_grid(kind: str, fmi: int) -> None:
+    with Slave(fmu("command_link/held", kind, fmi), {"T": 0.01}, start=0.013) as slave:
+        seen = []
+        for k in range(10):
+            t = 0.013 + 0.003 * k
+            slave.set({"v_set": float(k)})
+            slave.step(t, 0.003)
+            seen.append(slave.get(["v_d"])[0])
+    # passes on until the first tick at 0.02 (in step 2), then 0.03 (step 5), 0.04 begins step 9
+    assert seen == [0, 1, 2, 2, 2, 5, 5, 5, 5, 9]
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS)
+def test_a_result_that_is_not_finite_is_refused(kind: str, fmi: int) -> None:
+    with Slave(fmu("gearbox/ratio", kind, fmi)) as slave:
+        slave.set({"tau_a": 1e308})
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.get(["tau_b"])
+        if fmi == 2:
+            assert any("variable tau_b is not finite (inf)" in text for text in slave.messages)
+        if kind == "python":
+            return  # pythonfmu calls every error fatal: nothing may follow
+        slave.set({"tau_a": 1.0})
+        assert np.isfinite(slave.get(["tau_b"])[0])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_values_of_another_type_are_refused(fmi: int) -> None:
+    with Slave(fmu("gearbox/elastic", fmi=fmi)) as slave:
+        method = [slave.vr["solver.method"]]
+        read = slave.fmu.getReal if fmi == 2 else slave.fmu.getFloat64
+        write = slave.fmu.setReal if fmi == 2 else slave.fmu.setFloat64
+        with pytest.raises(Exception, match=r"status [34]"):
+            read(method)
+        with pytest.raises(Exception, match=r"status [34]"):
+            write(method, [1.5])
+
+
+def test_doing_things_at_the_wrong_time_is_refused_with_the_reason() -> None:
+    with Slave(fmu("gearbox/elastic"), initialize=False) as slave:
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.0, 0.1)
+        slave.initialize()
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.5, 0.1)
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.0, -0.1)
+        slave.fmu.terminate()
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.0, 0.1)
+        expected = ["is not initialized", "starts at 0.5 s but", "step -0.1 s", "is terminated"]
+        for text, part in zip(slave.messages, expected, strict=True):
+            assert part in text
+
+
+def test_a_failed_step_stays_failed_until_reset() -> None:
+    values = {"solver.method": 1, "solver.step": 1e-3}  # explicit steps far beyond stability
+    with Slave(fmu("gearbox/elastic"), {"d": 1e6, "w_b": 1.0, **values}) as slave:
+        with pytest.raises(Exception, match=r"status [34]"):
+            for k in range(1000):
+                slave.step(0.1 * k, 0.1)
+        assert "is not finite" in slave.messages[0]
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.1, 0.1)
+        assert "has failed before" in slave.messages[1]
+        slave.fmu.reset()
+        slave.initialize()
+        slave.step(0.0, 0.1)
+
+
+def test_messages_reach_printf_loggers_unharmed() -> None:
+    """FMI 2 hands messages to the logger as a format."""
+    slave = Slave(fmu("gearbox/ratio"), initialize=False)
+    with pytest.raises(Exception, match="instantiate"):
+        Slave(fmu("gearbox/ratio"), token="%s%n%d")
+    slave.close()
+
+
+def test_periods_of_clocks_are_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    import sources.command_link.held as held
+    from sources.model import ModelError
+
+    monkeypatch.setattr(held, "T", replace(held.T, variability="tunable"))
+    with pytest.raises(ModelError) as caught:
+        collect("command_link/held")
+    assert str(caught.value) == (
+        "command_link/held: the period of clock 'command' depends on T; "
+        "it may depend on fixed parameters only"
+    )
