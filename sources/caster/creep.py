@@ -19,7 +19,7 @@ from ..quantity import Quantity
 from .fork import fork
 
 LEVEL = 2
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
 C_H = Quantity(
     "c_h", "m/(N.s)", "creep velocity per force, along the wheel", start=1e-6, minimum=1e-12

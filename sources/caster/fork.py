@@ -26,7 +26,7 @@ from collections.abc import Callable
 
 import casadi as ca
 
-from ..laws.contact import rolling_resistance
+from ..laws.contact import SMALL, rolling_resistance
 from ..model import SX, Model
 from ..quantity import Quantity
 from . import (
@@ -79,9 +79,6 @@ SPIN = Quantity("spin", "rad/s", "state: wheel speed")
 Friction = Callable[[SX, SX, SX, SX, SX, SX], tuple[SX, SX]]
 """(s_h, s_n, normal force, r w, x, y) -> forces along the wheel and across it."""
 
-ROLLING_FLOOR = 1e-12
-"""Added to the squared rolling speed [m2/s2], so that its root has a slope at standstill."""
-
 
 def fork(m: Model, friction: Friction) -> None:
     """Collect the equations of a swivelling caster with the given friction."""
@@ -117,7 +114,7 @@ def fork(m: Model, friction: Friction) -> None:
         "floor",
         "pivot",
         spin=rate,
-        rolling=ca.sqrt((radius * spin) ** 2 + ROLLING_FLOOR),
+        rolling=ca.sqrt((radius * spin) ** 2 + SMALL),
         normal=load,
     )
     hinge = swivel.effort - swivel_damping * swing

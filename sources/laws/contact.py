@@ -17,6 +17,10 @@ FORCE_FLOOR = 1e-6
 """Friction limit [N] below which creep friction becomes viscous: keeps a lifted wheel regular."""
 
 
+SMALL = 1e-24
+"""Added to squared speeds and lengths (SI), so that their roots have a slope at 0."""
+
+
 def normal_force(depth: SX, rate: SX, k: SX, b: SX, width: SX) -> tuple[SX, SX, SX]:
     """Normal force, elastic energy and loss power of a floor that is penetrated by `depth`.
 

@@ -173,8 +173,8 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
 
     x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
     z, pitch, roll = m.state(POSE_Z), m.state(PITCH), m.state(ROLL)
-    v = ca.vertcat(m.state(VEL_X), m.state(VEL_Y), m.state(VEL_Z))
-    w = ca.vertcat(m.state(ROLL_RATE), m.state(PITCH_RATE), m.state(YAW_RATE))
+    v: SX = ca.vertcat(m.state(VEL_X), m.state(VEL_Y), m.state(VEL_Z))
+    w: SX = ca.vertcat(m.state(ROLL_RATE), m.state(PITCH_RATE), m.state(YAW_RATE))
 
     c, s = ca.cos(phi), ca.sin(phi)
     cp, sp, cr, sr = ca.cos(pitch), ca.sin(pitch), ca.cos(roll), ca.sin(roll)
@@ -211,9 +211,9 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     mu = ca.vertcat(mount.x, mount.y, mount.height - r)
     about = all_mass.about(mu)
     v_m = v + ca.cross(w, mu)
-    turning = ca.cross(w, v_m)
+    turning: SX = ca.cross(w, v_m)
     # what rests on the floor below O: friction, swinging forks, horizontal mass of sprung wheels
-    ground = ca.vertcat(0, 0, -r) - mu
+    ground: SX = ca.vertcat(0, 0, -r) - mu
     reach = ca.SX.zeros(3, 6)
     reach[0, 0] = reach[1, 1] = reach[2, 5] = 1
     reach[0, 4], reach[0, 5] = ground[2], -ground[1]

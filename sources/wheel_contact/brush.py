@@ -22,13 +22,14 @@ import casadi as ca
 
 from ..component import Solver
 from ..laws.bristle import STICK
+from ..laws.contact import SMALL
 from ..model import SX, Model
 from ..quantity import Quantity
 from .stick_slip import MU_D, MU_S
-from .wheel import ROLLING_FLOOR, Contact, wheel
+from .wheel import Contact, wheel
 
 LEVEL = 4
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 V_S = Quantity(
     "v_s", "m/s", "slip velocity over which static friction falls", start=0.02, minimum=1e-6
 )
@@ -42,8 +43,6 @@ KAPPA = Quantity(
 Z_X = Quantity("z_x", "m", "deflection of the bristles along the wheel", nominal=1e-4)
 Z_Y = Quantity("z_y", "m", "deflection of the bristles across the wheel", nominal=1e-4)
 
-SMALL = 1e-24
-"""Added to squared lengths and speeds (SI), so that roots have slopes at 0."""
 LOAD_FLOOR = 1.0
 """Normal force [N] below which bristles slide as under this one: a lifted wheel lets go."""
 
@@ -62,7 +61,7 @@ def equations(m: Model) -> None:
         used = ca.sqrt(z_x**2 + z_y**2 + SMALL) / largest
         x = ca.fmax(0, ca.fmin((used - STICK) / (1 - STICK), 1))
         sliding = x**2 * (3 - 2 * x) * ca.sqrt(square + SMALL) / largest
-        decay = sliding + kappa * ca.sqrt(c.rolling**2 + ROLLING_FLOOR)
+        decay = sliding + kappa * ca.sqrt(c.rolling**2 + SMALL)
         m.derivative(z_x, c.s_x - decay * z_x)
         m.derivative(z_y, c.s_y - decay * z_y)
         stuck = damping * ca.fmax(0, 1 - used)

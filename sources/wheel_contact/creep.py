@@ -22,7 +22,7 @@ from .rolling import creep_coefficients
 from .wheel import Contact, wheel
 
 LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
 
 

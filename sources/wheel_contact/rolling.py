@@ -19,7 +19,7 @@ from ..quantity import Quantity
 from .wheel import Contact, wheel
 
 LEVEL = 0
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 C_X = Quantity(
     "c_x", "m/(N.s)", "creep velocity per force, along the wheel", start=1e-6, minimum=1e-12
 )

@@ -17,7 +17,7 @@ from .stick_slip import stick_slip
 from .wheel import wheel
 
 LEVEL = 3
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 
 
 def equations(m: Model) -> None:

@@ -22,7 +22,7 @@ from ..quantity import Quantity
 from .wheel import Contact, Friction, wheel
 
 LEVEL = 2
-SOLVER = Solver("rodas3", 1e-3)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 MU_S = Quantity("mu_s", "1", "static friction coefficient", start=0.7, minimum=1e-6)
 MU_D = Quantity("mu_d", "1", "dynamic friction coefficient", start=0.5, minimum=0.0)
 V_C = Quantity(

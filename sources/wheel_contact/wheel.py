@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..laws.contact import normal_force, rolling_resistance
+from ..laws.contact import SMALL, normal_force, rolling_resistance
 from ..model import SX, Model
 from ..quantity import Quantity
 from . import (
@@ -50,9 +50,6 @@ B = Quantity("b", "N.s/m", "normal damping", start=1500.0, minimum=0.0, nominal=
 WIDTH = Quantity(
     "width", "m", "penetration over which the normal force sets in", start=1e-4, minimum=1e-9
 )
-
-ROLLING_FLOOR = 1e-12
-"""Added to the squared rolling speed [m2/s2], so that its root has a slope at standstill."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ def wheel(
         "floor",
         "pivot",
         spin=w_z,
-        rolling=ca.sqrt((radius * speed) ** 2 + ROLLING_FLOOR),
+        rolling=ca.sqrt((radius * speed) ** 2 + SMALL),
         normal=f_n,
     )
     m.derivative(angle, speed)
