@@ -286,7 +286,7 @@ def read_structure(file: File, within: tuple[Path, ...] = ()) -> Structure:
         file,
         root.get("name") or system.get("name") or "system",
         system.get("description") or root.get("description") or "",
-        reader.element(system, ""),
+        reader.element(system, None),
         root.find("ssd:DefaultExperiment", NAMES),
     )
 
@@ -333,10 +333,10 @@ class _Reader:
         self.file, self.root, self.within = file, root, within
         self.units = units_of(root, "ssd", file)
 
-    def element(self, element: ET.Element, path: str) -> Element:
-        """An element and all below it; `path` is that of its parent, for error texts."""
+    def element(self, element: ET.Element, path: str | None) -> Element:
+        """An element and all below it; `path` is that of its parent, None for the root system."""
         name = element.get("name", "")
-        where = f"{path}.{name}" if path else name
+        where = "" if path is None else f"{path}.{name}".lstrip(".")
         kind = _local(element)
         if kind == "Component":
             return self.component(element, where)
@@ -348,15 +348,16 @@ class _Reader:
             )
         if kind != "System":
             raise self.file.error(f"element {where!r} is a {kind}, which cannot be read")
+        inside = f"system {where!r}" if where else "the root system"
         children: dict[str, Element] = {}
         for child in element.iterfind("ssd:Elements/*", NAMES):
             if _local(child) == "Annotations":
                 continue
             found = self.element(child, where)
             if not found.name:
-                raise self.file.error(f"system {where!r} has a {_local(child)} without a name")
+                raise self.file.error(f"{inside} has a {_local(child)} without a name")
             if found.name in children:
-                raise self.file.error(f"system {where!r} has two elements named {found.name!r}")
+                raise self.file.error(f"{inside} has two elements named {found.name!r}")
             children[found.name] = found
         return Element(
             name,

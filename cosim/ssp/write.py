@@ -20,7 +20,7 @@ from ..description import Variable
 from ..errors import GraphError, InputError, UnitError
 from ..files import atomic
 from ..signals import Constant, Signal, as_signal
-from ..system import Member, System
+from ..system import Connection, Member, System
 from ..units import conversion, parse
 from .document import FMU, SSC, SSD, SSV
 from .read import Experiment
@@ -288,13 +288,27 @@ class _Writer:
             if plain and units[0] == units[1]:
                 lines.append(head + "/>")
                 continue
-            change = attributes(factor=wire.gain, offset=wire.offset)
-            lines += [
-                head + ' suppressUnitConversion="true">',
-                f"        <ssc:LinearTransformation{change}/>",
-                "      </ssd:Connection>",
-            ]
+            lines += [head + ' suppressUnitConversion="true">', *self.transformation(wire)]
+            lines.append("      </ssd:Connection>")
         return [*lines, "    </ssd:Connections>"]
+
+    def transformation(self, wire: Connection) -> list[str]:
+        instance, _, variable = self.whole(wire.target).partition(".")
+        type_ = self.system.members[instance].description.variables[variable].type
+        if type_.startswith("Float"):
+            change = attributes(factor=wire.gain, offset=wire.offset)
+            return [f"        <ssc:LinearTransformation{change}/>"]
+        images = [wire.gain * value + wire.offset for value in (0.0, 1.0)]
+        if not type_.startswith("Boolean") or any(image not in (0.0, 1.0) for image in images):
+            raise GraphError(
+                f"{wire.source} -> {wire.target}: SSP scales real numbers only, not {type_}"
+            )
+        entries = "".join(
+            f"<ssc:MapEntry{attributes(source=bool(value), target=bool(image))}/>"
+            for value, image in enumerate(images)
+        )
+        name = "BooleanMappingTransformation"
+        return [f"        <ssc:{name}>{entries}</ssc:{name}>"]
 
     def whole(self, name: str) -> str:
         """The FMU's variable that a scalar element belongs to."""

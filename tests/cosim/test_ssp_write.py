@@ -207,6 +207,26 @@ def _arrays(tmp_path: Path) -> Path:
     return rewrite(fmu("inertia/disc", "native", 3), tmp_path / "arrays.fmu", xml=enlarge)
 
 
+def test_booleans_are_mapped_and_integers_not_scaled(tmp_path: Path, affine: Path) -> None:
+    system = System("flags")
+    for name in "abc":
+        system.add(name, str(affine), {"n": 3, "on": False})
+    system.connect("a.off", "b.on", factor=-1.0, offset=1.0)
+    system.connect("a.off", "c.on", factor=0.0, offset=1.0)
+    system.connect("a.next", "b.n")
+    path = ssp.write(system, tmp_path / "flags.ssp")
+    with zipfile.ZipFile(path) as archive:
+        assert schema("1.0", "Description").validate(
+            etree.fromstring(archive.read("SystemStructure.ssd"))
+        )
+    again = ssp.read(path)
+    assert again.connections == system.connections
+    assert again.members["a"].parameters == {"n": 3.0, "on": False}
+    system.connect("b.next", "c.n", factor=2.0)
+    with pytest.raises(GraphError, match=r"b.next -> c.n: SSP scales real numbers only, not Int32"):
+        ssp.write(system, path)
+
+
 def test_arrays_need_version_2(tmp_path: Path) -> None:
     path = _arrays(tmp_path)
     system = System("arrays")

@@ -1,0 +1,566 @@
+"""SSP packages as other tools write them: nested, with units, bindings and mappings."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import Master, ssp
+from cosim.errors import ConnectError, InputError, ScenarioError, UnitError
+from tests.cosim_fmus import rewrite, slave
+from tests.fmus import fmu
+
+NAMES = " ".join(
+    f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
+    for prefix, name in {
+        "ssd": "Description", "ssc": "Common", "ssv": "ParameterValues", "ssm": "ParameterMapping",
+        "ssb": "SignalDictionary",
+    }.items()
+)  # fmt: skip
+UNITS = """
+<ssc:Unit name="rad/s"><ssc:BaseUnit rad="1" s="-1"/></ssc:Unit>
+<ssc:Unit name="rpm"><ssc:BaseUnit rad="1" s="-1" factor="0.10471975511965977"/></ssc:Unit>
+<ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit>
+<ssc:Unit name="kg.m2"><ssc:BaseUnit kg="1" m="2"/></ssc:Unit>
+<ssc:Unit name="g.m2"><ssc:BaseUnit kg="1" m="2" factor="0.001"/></ssc:Unit>
+<ssc:Unit name="1"><ssc:BaseUnit/></ssc:Unit>
+"""
+
+
+def ssd(system: str, experiment: str = "", version: str = "1.0") -> str:
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription {NAMES} version="{version}" name="foreign">
+<ssd:System name="root">{system}</ssd:System>
+<ssd:Units>{UNITS}</ssd:Units>{experiment}</ssd:SystemStructureDescription>"""
+
+
+def ssv(*parameters: str) -> str:
+    return (
+        f'<ssv:ParameterSet {NAMES} version="1.0" name="values"><ssv:Parameters>'
+        f"{''.join(parameters)}</ssv:Parameters><ssv:Units>{UNITS}</ssv:Units></ssv:ParameterSet>"
+    )
+
+
+def real(name: str, value: object, unit: str = "") -> str:
+    declared = f' unit="{unit}"' if unit else ""
+    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}"{declared}/></ssv:Parameter>'
+
+
+def ssm(*entries: str) -> str:
+    return f'<ssm:ParameterMapping {NAMES} version="1.0">{"".join(entries)}</ssm:ParameterMapping>'
+
+
+def binding(values: str, mapping: str = "", attributes: str = "") -> str:
+    inner = f"<ssd:ParameterMapping>{mapping}</ssd:ParameterMapping>" if mapping else ""
+    return (
+        f"<ssd:ParameterBindings><ssd:ParameterBinding {attributes}><ssd:ParameterValues>{values}"
+        f"</ssd:ParameterValues>{inner}</ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+
+
+def connectors(**kinds: str) -> str:
+    """`y="output"` or `y="output Real rpm"`."""
+    found = ""
+    for name, text in kinds.items():
+        kind, type_, unit = text.split(" ") if " " in text else (text, "Real", "")
+        declared = f' unit="{unit}"' if unit else ""
+        found += (
+            f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{type_}{declared}/></ssd:Connector>'
+        )
+    return f"<ssd:Connectors>{found}</ssd:Connectors>"
+
+
+def component(name: str, source: str, inner: str = "", attributes: str = "") -> str:
+    return f'<ssd:Component name="{name}" source="{source}" {attributes}>{inner}</ssd:Component>'
+
+
+def connection(start: str, end: str, inner: str = "", attributes: str = "") -> str:
+    """Ends as `element.connector`, or `.connector` of the system itself."""
+    ends = ""
+    for side, text in (("start", start), ("end", end)):
+        element, _, connector = text.rpartition(".")
+        ends += f' {side}Element="{element}"' if element else ""
+        ends += f' {side}Connector="{connector}"'
+    return f"<ssd:Connection{ends} {attributes}>{inner}</ssd:Connection>"
+
+
+def system(
+    elements: str, *connections: str, inner: str = "", name: str = "", after: str = ""
+) -> str:
+    content = f"{inner}<ssd:Elements>{elements}</ssd:Elements>"
+    if connections:
+        content += f"<ssd:Connections>{''.join(connections)}</ssd:Connections>"
+    content += after
+    return f'<ssd:System name="{name}">{content}</ssd:System>' if name else content
+
+
+def package(path: Path, structure: str, files: Mapping[str, str | Path]) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", structure)
+        for name, content in files.items():
+            archive.writestr(name, content.read_bytes() if isinstance(content, Path) else content)
+    return path
+
+
+@pytest.fixture
+def make(tmp_path: Path, affine: Path):
+    """Writes a package with the FMU y = a u + b at resources/affine.fmu."""
+
+    def write(structure: str, files: Mapping[str, str | Path] | None = None) -> Path:
+        content = {"resources/affine.fmu": affine, **(files or {})}
+        return package(tmp_path / "foreign.ssp", structure, content)
+
+    return write
+
+
+A = "resources/affine.fmu"
+GEAR = "resources/gearbox.fmu"
+
+
+def wires(found: object) -> set[tuple[str, str, float, float]]:
+    return {(c.source, c.target, c.gain, c.offset) for c in found.connections}
+
+
+# -- connections -----------------------------------------------------------------------------------
+
+
+def test_nested_systems_are_flattened(make) -> None:
+    inner = system(
+        component("c1", A, connectors(u="input", y="output"))
+        + component("c 2", A, connectors(u="input", y="output")),
+        connection(".in", "c1.u"),
+        connection("c1.y", "c 2.u"),
+        # start and end say nothing about the direction
+        connection(".out", "c 2.y"),
+        inner=connectors(**{"in": "input", "out": "output"}),
+        name="sub",
+    )
+    root = system(
+        inner + component("first", A) + component("last", A),
+        connection("first.y", "sub.in"),
+        connection("last.u", "sub.out"),
+        connection(".set", "first.u"),
+        connection("last.y", ".result"),
+        inner=connectors(set="input", result="output"),
+    )
+    found = ssp.read_package(make(ssd(root)))
+    assert list(found.system.instances) == ["sub_c1", "sub_c_2", "first", "last"]
+    assert found.elements["sub.c 2"] == "sub_c_2"
+    assert wires(found.system.build(None)) == {
+        ("sub_c1.y", "sub_c_2.u", 1.0, 0.0),
+        ("first.y", "sub_c1.u", 1.0, 0.0),
+        ("sub_c_2.y", "last.u", 1.0, 0.0),
+    }
+    assert [t.name for t in found.inputs["set"]] == ["first.u"]
+    assert found.outputs["result"].name == "last.y"
+
+
+def test_transformations_on_the_way_add_up(make) -> None:
+    scale = '<ssc:LinearTransformation factor="{}" offset="{}"/>'
+    inner = system(
+        component("c", A), connection(".in", "c.u", scale.format(3.0, 4.0)),
+        inner=connectors(**{"in": "input"}), name="sub",
+    )  # fmt: skip
+    root = system(component("a", A) + inner, connection("a.y", "sub.in", scale.format(2.0, 1.0)))
+    # 3 (2 y + 1) + 4
+    assert wires(ssp.read(make(ssd(root)))) == {("a.y", "sub_c.u", 6.0, 7.0)}
+
+
+def test_booleans_are_negated(make) -> None:
+    entries = (
+        '<ssc:MapEntry source="true" target="false"/><ssc:MapEntry source="false" target="true"/>'
+    )
+    negated = f"<ssc:BooleanMappingTransformation>{entries}</ssc:BooleanMappingTransformation>"
+    partial = (
+        '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+        "</ssc:BooleanMappingTransformation>"
+    )
+    root = system(
+        component("a", A) + component("b", A) + component("c", A),
+        connection("a.off", "b.on", negated),
+        connection("a.off", "c.on", partial),  # false stays as it is: always false
+        connection("a.next", "b.n"),
+    )
+    found = ssp.read(make(ssd(root)))
+    assert wires(found) == {
+        ("a.off", "b.on", -1.0, 1.0), ("a.off", "c.on", 0.0, 0.0), ("a.next", "b.n", 1.0, 0.0),
+    }  # fmt: skip
+    recording = Master(found, step=0.1).run(0.3, record=["a.off", "b.off", "c.off", "b.next"])
+    assert recording["a.off"][-1] == 0.0 and recording["b.off"][-1] == 0.0
+    assert recording["c.off"][-1] == 1.0 and recording["b.next"][-1] == 4.0
+
+
+def test_units_of_connectors_convert_unless_suppressed(make) -> None:
+    gear = fmu("gearbox/ratio")
+    shaft = connectors(w_a="output Real rad/s", w_b="input Real rad/s")
+    boundary = connectors(speed="output Real rpm", plain="output")
+    for attributes, factor in (("", 30.0 / math.pi), ('suppressUnitConversion="true"', 1.0)):
+        root = system(
+            component("g", GEAR, shaft),
+            connection("g.w_a", ".speed", attributes=attributes),
+            connection("g.w_a", ".plain"),
+            inner=boundary,
+        )
+        found = ssp.read_package(make(ssd(root), {GEAR: gear}))
+        assert found.outputs["speed"].factor == pytest.approx(factor, rel=1e-15)  # one division
+        assert found.outputs["plain"].factor == 1.0
+
+
+def test_a_linear_transformation_comes_after_the_unit_conversion(make) -> None:
+    scale = '<ssc:LinearTransformation factor="2.0" offset="5.0"/>'
+    root = system(
+        component("g", GEAR),
+        connection("g.w_a", ".speed", scale),
+        inner=connectors(speed="output Real rpm"),
+    )
+    found = ssp.read_package(make(ssd(root), {GEAR: fmu("gearbox/ratio")}))
+    terminal = found.outputs["speed"]
+    assert terminal.factor == pytest.approx(60.0 / math.pi, rel=1e-15)  # one division
+    assert terminal.offset == 5.0
+
+
+def test_units_that_do_not_convert(make) -> None:
+    root = system(
+        component("g", GEAR), connection("g.w_a", ".length"),
+        inner=connectors(length="output Real m"),
+    )  # fmt: skip
+    with pytest.raises(UnitError, match=r"g.w_a - length: unit 'rad/s' .* into 'm'"):
+        ssp.read(make(ssd(root), {GEAR: fmu("gearbox/ratio")}))
+
+
+def test_signal_dictionaries_are_buses(make) -> None:
+    entries = "".join(
+        f'<ssb:DictionaryEntry name="{name}"><ssc:Real/></ssb:DictionaryEntry>' for name in "st"
+    )
+    dictionary = f'<ssb:SignalDictionary {NAMES} version="1.0">{entries}</ssb:SignalDictionary>'
+    reference = (
+        '<ssd:SignalDictionaryReference name="bus" dictionary="D">{}'
+        "</ssd:SignalDictionaryReference>"
+    )
+    inner = system(
+        component("c", A) + reference.format(connectors(s="inout", t="inout")),
+        connection("bus.s", "c.u"),
+        connection("c.y", "bus.t"),
+        name="sub",
+    )
+    declared = (
+        '<ssd:SignalDictionaries><ssd:SignalDictionary name="D" source="bus.ssb"/>'
+        "</ssd:SignalDictionaries>"
+    )
+    root = system(
+        component("a", A) + component("b", A) + reference.format(connectors(s="inout", t="inout"))
+        + inner,
+        connection("a.y", "bus.s"),
+        connection("bus.t", "b.u"),
+        after=declared,
+    )  # fmt: skip
+    found = ssp.read(make(ssd(root), {"bus.ssb": dictionary}))
+    assert wires(found) == {("a.y", "sub_c.u", 1.0, 0.0), ("sub_c.y", "b.u", 1.0, 0.0)}
+
+
+def test_a_package_inside_a_package(make, tmp_path: Path, affine: Path) -> None:
+    nested = package(
+        tmp_path / "nested.ssp",
+        ssd(
+            system(
+                component("c", "resources/a.fmu"), connection(".in", "c.u"),
+                inner=connectors(**{"in": "input"})
+                + binding(ssv(real("c.a", 2.0), real("c.b", 3.0))),
+            )
+        ),
+        {"resources/a.fmu": affine},
+    )  # fmt: skip
+    root = system(
+        component("a", A)
+        + component(
+            "box", "resources/nested.ssp", binding(ssv(real("c.b", 4.0))),
+            'type="application/x-ssp-package"',
+        ),
+        connection("a.y", "box.in"),
+    )  # fmt: skip
+    found = ssp.read(make(ssd(root), {"resources/nested.ssp": nested}))
+    assert wires(found) == {("a.y", "box_c.u", 1.0, 0.0)}
+    assert found.members["box_c"].parameters == {"a": 2.0, "b": 4.0}
+
+
+# -- parameters ------------------------------------------------------------------------------------
+
+
+def test_outer_bindings_win_over_inner_and_later_over_earlier(make) -> None:
+    two = (
+        "<ssd:ParameterBindings>"
+        + binding(ssv(real("a", 1.0), real("b", 1.0), real("u", 1.0)))
+        .removeprefix("<ssd:ParameterBindings>").removesuffix("</ssd:ParameterBindings>")
+        + '<ssd:ParameterBinding source="resources/late.ssv"/></ssd:ParameterBindings>'
+    )  # fmt: skip
+    root = system(component("c", A, two), inner=binding(ssv(real("c.u", 3.0), real("c.z", 9.0))))
+    files = {"resources/late.ssv": ssv(real("b", 2.0), real("u", 2.0))}
+    found = ssp.read_package(make(ssd(root), files))
+    assert found.system.parameters == {"c.a": 1.0, "c.b": 2.0, "c.u": 3.0}
+    assert found.ignored == ("c.z",)
+
+
+def test_mapping_names_scales_and_leaves_out(make) -> None:
+    mapping = ssm(
+        '<ssm:MappingEntry source="gain" target="a">'
+        '<ssc:LinearTransformation factor="10" offset="1"/></ssm:MappingEntry>',
+        '<ssm:MappingEntry source="gain" target="u"/>',
+    )
+    values = ssv(real("gain", 2.0), real("b", 5.0))
+    found = ssp.read_package(make(ssd(system(component("c", A, binding(values, mapping))))))
+    assert found.system.parameters == {"c.a": 21.0, "c.u": 2.0}  # b is not mapped
+    files = {"x.ssv": values, "x.ssm": mapping}
+    outside = (
+        '<ssd:ParameterBindings><ssd:ParameterBinding source="x.ssv">'
+        '<ssd:ParameterMapping source="x.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>'
+    )
+    again = ssp.read_package(make(ssd(system(component("c", A, outside))), files))
+    assert again.system.parameters == found.system.parameters
+
+
+def test_parameters_with_units(make) -> None:
+    gear = {GEAR: fmu("gearbox/ratio")}
+    values = ssv(real("J_a", 250.0, "g.m2"))
+    plain = ssm('<ssm:MappingEntry source="J_a" target="J_a" suppressUnitConversion="true"/>')
+    for mapping, expected in (("", 0.25), (plain, 250.0)):
+        root = system(component("g", GEAR, binding(values, mapping)))
+        found = ssp.read_package(make(ssd(root), gear))
+        assert found.system.parameters == {"g.J_a": expected}
+    wrong = system(component("g", GEAR, binding(ssv(real("J_a", 1.0, "rpm")))))
+    with pytest.raises(UnitError, match=r"parameter 'J_a': unit 'rpm' .* 'kg.m2'"):
+        ssp.read(make(ssd(wrong), gear))
+
+
+def test_parameters_of_a_system_reach_what_they_are_connected_to(make) -> None:
+    inner = system(
+        component("c", A) + component("d", A),
+        connection(".gain", "c.a", '<ssc:LinearTransformation factor="2" offset="0"/>'),
+        connection(".gain", "d.a"),
+        inner=connectors(gain="parameter"),
+        name="sub",
+    )
+    root = system(inner, inner=binding(ssv(real("gain", 3.0)), attributes='prefix="sub."'))
+    found = ssp.read_package(make(ssd(root)))
+    assert found.system.parameters == {"sub_c.a": 6.0, "sub_d.a": 3.0}
+
+
+def test_types_of_parameters(make) -> None:
+    values = ssv(
+        '<ssv:Parameter name="n"><ssv:Integer value="7"/></ssv:Parameter>',
+        '<ssv:Parameter name="on"><ssv:Boolean value="false"/></ssv:Parameter>',
+    )
+    mapping = ssm(
+        '<ssm:MappingEntry source="n" target="n"><ssc:IntegerMappingTransformation>'
+        '<ssc:MapEntry source="7" target="8"/></ssc:IntegerMappingTransformation>'
+        "</ssm:MappingEntry>",
+        '<ssm:MappingEntry source="on" target="on"/>',
+    )
+    found = ssp.read(make(ssd(system(component("c", A, binding(values, mapping))))))
+    recording = Master(found, step=0.1).run(0.1, record=["c.next", "c.off"])
+    assert recording["c.next"][0] == 9.0 and recording["c.off"][0] == 1.0
+
+
+def test_enumerations_go_by_item_of_the_fmu(make, affine: Path, tmp_path: Path) -> None:
+    def declare(text: str) -> str:
+        types = (
+            '<TypeDefinitions><SimpleType name="Mode"><Enumeration><Item name="slow" value="1"/>'
+            '<Item name="fast" value="4"/></Enumeration></SimpleType></TypeDefinitions>'
+        )
+        head, mark, tail = text.partition("<ModelVariables>")
+        before, name, rest = tail.partition('name="n"')
+        return head + types + mark + before + name + rest.replace(
+            "<Integer", '<Enumeration declaredType="Mode"', 1
+        ).replace("</Integer>", "</Enumeration>", 1)  # fmt: skip
+
+    modes = rewrite(affine, tmp_path / "modes.fmu", xml=declare)
+    fast = '<ssv:Parameter name="n"><ssv:Enumeration value="{}"/></ssv:Parameter>'
+    files = {"resources/modes.fmu": modes}
+    root = system(component("c", "resources/modes.fmu", binding(ssv(fast.format("fast")))))
+    assert ssp.read_package(make(ssd(root), files)).system.parameters == {"c.n": 4}
+    wrong = system(component("c", "resources/modes.fmu", binding(ssv(fast.format("lazy")))))
+    with pytest.raises(ScenarioError, match=r"parameter 'n': 'lazy' is no item of the variable's"):
+        ssp.read(make(ssd(wrong), files))
+
+
+# -- runs ------------------------------------------------------------------------------------------
+
+CELL = """
+from pythonfmu import Fmi2Causality as C, Fmi2Initial, Fmi2Slave, Real
+
+
+class {name}(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.k, self.T, self.u, self.y = 1.2, 0.25, 0.0, 0.0
+        self.register_variable(Real("k", causality=C.parameter, variability="fixed"))
+        self.register_variable(Real("T", causality=C.parameter, variability="fixed"))
+        self.register_variable(Real("u", causality=C.input))
+        self.register_variable(Real("y", causality=C.output, initial=Fmi2Initial.exact))
+
+    def do_step(self, time, size):
+        self.y = self.y + size / self.T * (self.k * max(-1.0, min(1.0, self.u)) - self.y)
+        return True
+"""
+
+
+def test_a_plain_ring_runs_exactly(make, tmp_path: Path) -> None:
+    """Twelve cells in a ring, one of them inverting, in a package without any annotation."""
+    path = slave(tmp_path, "cell", CELL, "pythonfmu")
+    inputs = connectors(u="input", y="output")
+    start = binding(ssv(real("k", -1.2), real("y", 0.5)))
+    cells = "".join(
+        component(f"c{i}", "resources/cell.fmu", inputs + (start if i == 0 else ""))
+        for i in range(12)
+    )
+    ring = [connection(f"c{i}.y", f"c{(i + 1) % 12}.u") for i in range(12)]
+    found = ssp.read(make(ssd(system(cells, *ring)), {"resources/cell.fmu": path}))
+    step, count = 0.125, 200
+    names = [f"c{i}.y" for i in range(12)]
+    recording = Master(found, "jacobi", step).run(step * count, record=names)
+    gains, y = [-1.2] + [1.2] * 11, [0.5] + [0.0] * 11
+    expected = [list(y)]
+    for _ in range(count):
+        y = [
+            y[i] + step / 0.25 * (gains[i] * max(-1.0, min(1.0, y[i - 1])) - y[i])
+            for i in range(12)
+        ]
+        expected.append(y)
+    assert np.array_equal(recording.values, np.array(expected))
+    assert np.ptp(recording.values[-100:]) > 0.5  # it oscillates for ever
+
+
+def test_a_chain_with_an_open_input_keeps_its_start_value(make) -> None:
+    root = system(
+        component("a", A, binding(ssv(real("u", 3.0)))) + component("b", A),
+        connection("a.y", "b.u"),
+    )
+    found = ssp.read(make(ssd(root)))
+    assert found.open_inputs() == ["a.u", "a.n", "a.on", "b.n", "b.on"]
+    assert Master(found, step=0.5).run(1.0, record=["b.y"])["b.y"][-1] == 3.0
+
+
+def test_a_scenario_from_a_package(make) -> None:
+    oms = (
+        '<ssd:DefaultExperiment startTime="1.0" stopTime="3.0"><ssd:Annotations>'
+        '<ssc:Annotation type="x"><x:FixedStepMaster xmlns:x="x" stepSize="0.5"/>'
+        "</ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"
+    )
+    root = system(
+        component("a", A),
+        connection(".set", "a.u", '<ssc:LinearTransformation factor="2" offset="1"/>'),
+        inner=connectors(set="input"),
+    )
+    path = make(ssd(root, oms))
+    scenario = ssp.read_scenario(path, inputs={"set": 5.0})
+    assert (scenario.start, scenario.duration, scenario.step) == (1.0, 2.0, 0.5)
+    recording = Master(scenario.system.build(None), step=scenario.step).run(
+        scenario.duration, start=scenario.start, inputs=scenario.inputs, record=["a.y"]
+    )
+    assert recording.time[-1] == 3.0 and np.all(recording["a.y"] == 11.0)
+    with pytest.raises(
+        InputError, match=r"the root system has no input 'sett'; did you mean 'set'"
+    ):
+        ssp.read_scenario(path, inputs={"sett": 5.0})
+    silent = make(ssd(root))
+    with pytest.raises(ScenarioError, match=r"says nothing about the duration; give one"):
+        ssp.read_scenario(silent)
+    with pytest.raises(ScenarioError, match=r"says nothing about the step; give one"):
+        ssp.read_scenario(silent, duration=1.0)
+
+
+def test_folders_and_other_structures_of_a_package(make, tmp_path: Path) -> None:
+    path = make(ssd(system(component("a", A))), {"Other.ssd": ssd(system(component("b", A)))})
+    assert list(ssp.read(path, ssd="Other.ssd").members) == ["b"]
+    folder = tmp_path / "unpacked"
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    assert list(ssp.read(folder).members) == ["a"]
+    assert list(ssp.read(folder / "Other.ssd").members) == ["b"]
+    with pytest.raises(
+        ScenarioError, match=r"has no New.ssd; it has Other.ssd, SystemStructure.ssd"
+    ):
+        ssp.read(path, ssd="New.ssd")
+
+
+# -- errors ----------------------------------------------------------------------------------------
+
+INTEGERS = (
+    '<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/>'
+    "</ssc:IntegerMappingTransformation>"
+)
+TWO = component("a", A) + component("b", A)
+
+
+@pytest.mark.parametrize(
+    ("root", "message"),
+    [
+        (system(component("a", "resources/none.fmu")),
+         r"component 'a' refers to 'resources/none.fmu', which the package does not hold"),
+        (system(component("a", "../x.fmu")), r"component 'a' refers to .* leaves the package"),
+        (system(component("a", "http://x/a.fmu")),
+         r"component 'a' .* only files inside the package"),
+        (system(component("a", A, attributes='implementation="ModelExchange"')),
+         r"component 'a' asks for ModelExchange; only co-simulation is run"),
+        (system(component("a", A, attributes='type="application/x-python"')),
+         r"component 'a' is of type 'application/x-python'; FMUs and SSP can be read"),
+        (system(component("a", A) * 2), r"the root system has two elements named 'a'"),
+        (system(TWO, connection("a.y", "c.u")), r"names element 'c'; there is a, b"),
+        (system(TWO, connection("a.yy", "b.u")),
+         r"connector 'yy' of a is no variable of 'affine'; did you mean 'y'"),
+        (system(TWO, connection("a.y", "b.u"), connection(".x", "b.u")),
+         r"names connector 'x' of the root system; there is none"),
+        (system(TWO, connection("a.next", "b.n", INTEGERS)),
+         r"a.next - b.n has an integer mapping, which cannot be run between FMUs"),
+        (system(component("a", A, connectors(y="output Real stone"))),
+         r"connector 'y' of 'a' has unit 'stone', which the file does not define"),
+        (system(component("a", A, binding(ssv(real("a", "much"))))), r"parameter 'a': could not"),
+        (system(component("a", A, binding(ssv('<ssv:Parameter name="a"><ssv:Binary value="00"/>'
+                                              "</ssv:Parameter>")))),
+         r"parameter 'a' is of type Binary, which cannot be given to an FMU"),
+        (system(component("a", A, binding(ssv(real("a", "1 2"))))),
+         r"parameter 'a' has 2 values, but a.a takes 1"),
+        (system(component("a", A, binding("<x/>"))), r"of a has neither source nor ParameterSet"),
+        (system(""), "holds no FMU"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_named(make, root: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        ssp.read(make(ssd(root)))
+
+
+def test_two_sources_for_one_input(make) -> None:
+    double = system(TWO, connection("a.y", "b.u"), connection("b.y", "b.u"))
+    with pytest.raises(ConnectError, match=r"b.u is already driven by a.y"):
+        ssp.read(make(ssd(double)))
+    outputs = system(TWO, connection("a.y", "b.y"))
+    with pytest.raises(ConnectError, match=r"a.y and b.y are both outputs but connected"):
+        ssp.read(make(ssd(outputs)))
+
+
+def test_bad_files(make, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"none.ssp: there is no such file"):
+        ssp.read(tmp_path / "none.ssp")
+    path = tmp_path / "broken.ssp"
+    path.write_text("not a zip archive")
+    with pytest.raises(ScenarioError, match=r"broken.ssp: is not a complete SSP archive"):
+        ssp.read(path)
+    good = ssd(system(component("a", A)))
+    for text, message in (
+        (good[:200], r"SystemStructure.ssd: cannot be read"),
+        (good.replace('version="1.0" name', 'version="3.0" name'), r"is of SSP version 3.0"),
+        (good.replace("ssd:SystemStructureDescription", "ssd:System"), r"root element is 'System'"),
+    ):
+        with pytest.raises(ScenarioError, match=message):
+            ssp.read(make(text))
+    itself = ssd(
+        system(
+            component("a", "SystemStructure.ssd", attributes='type="application/x-ssp-definition"')
+        )
+    )
+    with pytest.raises(ScenarioError, match="contains itself as a component"):
+        ssp.read(make(itself))
