@@ -350,15 +350,16 @@ def run_command(
             out=out or Path("out") / name.removesuffix(".toml").strip("./"),
             progress=told,
         )
+    for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
+        _say(f"note: {note}")
     if as_json:
         _print_json(result.to_dict())
     else:
         _print_result(result)
     failed = [label for label, check in result.checks.items() if not check.ok]
     if failed:
-        raise CheckError(
-            f"{len(failed)} of {len(result.checks)} checks failed: {'; '.join(failed)}"
-        )
+        shown = "; ".join(failed[:5]) + ("; ..." if len(failed) > 5 else "")
+        raise CheckError(f"{len(failed)} of {len(result.checks)} checks failed: {shown}")
 
 
 def _pair(text: str, option: str, form: str) -> tuple[str, str]:
@@ -400,8 +401,8 @@ def _print_result(result: Result) -> None:
                 item["name"], f"{item['value']:.4g}", str(item["limit"]), outcome, item["source"]
             )
         console.print(table)
-    for path in content["files"]:
-        console.print(path, soft_wrap=True)
+    for folder in list(dict.fromkeys(str(path.parent) for path in result.files))[-8:]:
+        console.print(f"in {folder}", soft_wrap=True)
 
 
 # -- frame -----------------------------------------------------------------------------------------

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from . import scenario as scenarios
 from .checks import CheckResult, evaluate
 from .comparison import Comparison, compare, convert_reference
-from .errors import StepError, ValueRangeError
+from .errors import StepError, UnknownNameError, ValueRangeError
 from .files import write_text
 from .master import Master
 from .provider import Provider
 from .recording import Recording
 from .scenario import Scenario
+from .system import System
 from .variants import apply
 
 Vector = NDArray[np.float64]
@@ -31,13 +32,14 @@ class RunResult:
     """One run of a scenario.
 
     Attributes:
-        scenario: what was run, with all changes applied.
+        scenario: what was run.
         variants: instance -> variant that was used.
         recording: what was recorded.
         comparisons: by name.
         checks: outcomes.
         wall_s: time that it took, without building FMUs [s].
         fmu_steps: steps of all FMUs together.
+        notes: what a changed variant made the run leave out.
     """
 
     scenario: Scenario
@@ -47,6 +49,7 @@ class RunResult:
     checks: tuple[CheckResult, ...]
     wall_s: float
     fmu_steps: int
+    notes: tuple[str, ...] = ()
 
     def plot(self, path: Path | str | None = None) -> Any:
         """Plot what the scenario names, else what is compared, else everything."""
@@ -141,10 +144,57 @@ def _every(scenario: Scenario) -> int:
     return every
 
 
+def _system(
+    scenario: Scenario,
+    provider: Provider | None,
+    instances: Mapping[str, str],
+    changed: set[str],
+    parameters: Mapping[str, Any],
+) -> tuple[System, list[str]]:
+    """The system with its values, and notes on what a changed variant does not have."""
+    notes = []
+    system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
+    for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
+        instance = name.partition(".")[0]
+        try:
+            system.set(name, value)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            notes.append(f"{name} of the scenario is left out: {instances[instance]} has none")
+    for name, value in parameters.items():
+        system.set(name, value)
+    return system, notes
+
+
+def _recorded(
+    scenario: Scenario, system: System, changed: set[str]
+) -> tuple[tuple[str, ...], list[str]]:
+    """Signals to record, and notes on what a changed variant does not have."""
+    needed = [name for item in scenario.references.values() for name in item.signals]
+    needed += [name for check in scenario.checks for name in check.signals]
+    if scenario.record is None:
+        return tuple(dict.fromkeys([*system.signals(), *needed])), []
+    kept, notes = [], []
+    for name in scenario.record:
+        instance = name.partition(".")[0]
+        try:
+            system.variables(name)
+            kept.append(name)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            reference = system.members[instance].reference
+            notes.append(f"{name} is not recorded: {reference} has none")
+    return tuple(dict.fromkeys([*kept, *needed])), notes
+
+
 def run_scenario(
     scenario: Scenario,
     provider: Provider | None,
     *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
     progress: Callable[[float], None] | None = None,
     base: Path | None = None,
 ) -> RunResult:
@@ -153,23 +203,20 @@ def run_scenario(
     Args:
         scenario: what to run.
         provider: where variants come from.
+        variants: changes on top of the scenario's. Parameters and recorded signals of the scenario
+            that a changed variant does not have are left out, with a note.
+        parameters: values on top of the scenario's.
         progress: told now and then which fraction is done.
         base: folder against which .fmu paths among the variants are taken.
 
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
     """
-    instances = apply(scenario.system.instances, scenario.variants, provider, base)
-    file = replace(scenario.system, instances=instances)
-    system = file.build(provider, scenario.parameters)
-    record = scenario.record
-    if record is not None:
-        wanted = [name for item in scenario.references.values() for name in item.signals]
-        wanted += [name for check in scenario.checks for name in check.signals]
-        record = tuple(dict.fromkeys([*record, *wanted]))
-    else:
-        extra = [name for item in scenario.references.values() for name in item.signals]
-        record = tuple(dict.fromkeys([*system.signals(), *extra]))
+    usual = apply(scenario.system.instances, scenario.variants, provider, scenario.folder)
+    instances = apply(usual, variants or {}, provider, base)
+    changed = {name for name in instances if instances[name] != usual[name]}
+    system, notes = _system(scenario, provider, instances, changed, parameters or {})
+    record, others = _recorded(scenario, system, changed)
     master = Master(system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name)
     started = time.perf_counter()
     recording = master.run(
@@ -192,6 +239,7 @@ def run_scenario(
         checks=tuple(evaluate(check, recording, comparisons) for check in scenario.checks),
         wall_s=wall,
         fmu_steps=int(recording.provenance["fmu_steps"]),
+        notes=(*notes, *others),
     )
 
 
@@ -239,8 +287,6 @@ def run(
             item = _shortened(item, duration)
         item = replace(
             item,
-            variants={**item.variants, **(variants or {})},
-            parameters={**item.parameters, **(parameters or {})},
             algorithm=algorithm or item.algorithm,
             step=step if step is not None else item.step,
             duration=duration if duration is not None else item.duration,
@@ -248,7 +294,10 @@ def run(
         place = None if out is None else Path(out) / run_name
         told = None if progress is None else _told(progress, item.name)
         try:
-            result = run_scenario(item, provider, progress=told, base=Path.cwd())
+            result = run_scenario(
+                item, provider, variants=variants, parameters=parameters, progress=told,
+                base=Path.cwd(),
+            )  # fmt: skip
         except StepError as error:
             if place is not None and error.recording is not None:
                 path = error.recording.write_parquet(place / "recording.parquet")

@@ -173,14 +173,25 @@ def _only(path: Path, table: Mapping[str, Any], known: set[str], what: str) -> N
 
 def _table_runs(path: Path, entry: Any) -> dict[str, Mapping[str, Any]]:
     """One run per row: `{column}` anywhere in the scenario stands for the row's value."""
-    if not isinstance(entry, dict) or "file" not in entry or "name" not in entry:
+    if not isinstance(entry, dict) or not {"file", "name"} <= set(entry):
         raise ScenarioError(f'{path}: [table] needs file and name, e.g. name = "SET{{set}}"')
-    file = path.parent / entry["file"]
+    _only(path, entry, {"file", "name", "join"}, "[table]")
+    rows = _rows(path.parent / entry["file"])
+    if "join" in entry:
+        file, on = path.parent / entry["join"]["file"], entry["join"]["on"]
+        others = {row[on]: row for row in _rows(file) if on in row}
+        lacking = [row.get(on) for row in rows if row.get(on) not in others]
+        if lacking:
+            raise ScenarioError(f"{file}: has no row with {on} = {lacking[0]}")
+        rows = [{**others[row[on]], **row} for row in rows]
+    return {str(_fill(str(path), entry["name"], row)): {"": row} for row in rows}
+
+
+def _rows(file: Path) -> list[dict[str, str]]:
     if not file.is_file():
         raise ScenarioError(f"{file}: there is no such file")
     with file.open(encoding="utf-8-sig", newline="") as handle:
-        rows = list(csv.DictReader(handle))
-    return {_fill(str(file), entry["name"], row): {"": row} for row in rows}
+        return list(csv.DictReader(handle))
 
 
 def _value(text: str) -> Any:
@@ -231,7 +242,7 @@ class _Reader:
         self.file, self.run = file, run
         self.folder = file.path.parent
         changes = dict(file.runs[run])
-        row = {"run": run, **changes.pop("", {})}
+        row = {"name": run, **changes.pop("", {})}
         base = {key: value for key, value in file.table.items() if key not in ("runs", "table")}
         self.table = _fill_all(str(file.path), _merge(base, changes), row)
 

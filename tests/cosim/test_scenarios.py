@@ -231,3 +231,22 @@ def test_a_shorter_run_keeps_only_the_checks_that_it_reaches(folder: Path, provi
     assert set(run("disc", provider=provider, folder=folder).checks) == {"final speed", "early"}
     short = run("disc", provider=provider, folder=folder, duration=0.05)
     assert set(short.checks) == {"early"}
+
+
+def test_what_a_changed_variant_does_not_have_is_left_out_and_noted(folder: Path, provider) -> None:
+    path = folder / "systems" / "disc.toml"
+    path.write_text(path.read_text().replace("inertia.lab_bench/disc", "inertia/pendulum"))
+    edit(folder, "load.b = 0.0", "load.b = 0.0\nload.m = 0.5")
+    edit(folder, '"load.phi"]', '"load.phi", "load.m"]')
+    whole = run("disc", provider=provider, folder=folder).runs[""]
+    assert whole.notes == () and "load.m" in whole.recording.names
+    item = run("disc", provider=provider, folder=folder, variants={"load": "disc"}).runs[""]
+    assert item.notes == (
+        "load.m of the scenario is left out: inertia/disc has none",
+        "load.m is not recorded: inertia/disc has none",
+    )
+    with pytest.raises(UnknownNameError, match=r"inertia/disc has no variable 'm'"):
+        run(
+            "disc", provider=provider, folder=folder,
+            variants={"load": "disc"}, parameters={"load.m": 1.0},
+        )  # fmt: skip
