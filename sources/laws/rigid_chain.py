@@ -413,15 +413,21 @@ class Posture:
             inverse = 1 / (u_moment[2] + rotor[i])
             torque = tau[i] - moment[2]
             joints.append((u_force, u_moment, inverse, torque))
-            kept = rotor[i] * inverse
-            mass = _symmetric(mass - (u_force * inverse) @ u_force.T)
-            cross = ca.horzcat(cross[:, :2] - (u_force * inverse) @ u_moment[:2].T, u_force * kept)
-            corner = _symmetric(inertia[:2, :2] - (u_moment[:2] * inverse) @ u_moment[:2].T)
+            # these quotients first, so that numbers known at build time round as at run time
+            kept, by_force, by_moment = (
+                rotor[i] * inverse,
+                u_force * inverse,
+                u_moment[:2] * inverse,
+            )
+            mass = _symmetric(mass - by_force @ u_force.T)
+            cross = ca.horzcat(cross[:, :2] - by_force @ u_moment[:2].T, u_force * kept)
+            corner = _symmetric(inertia[:2, :2] - by_moment @ u_moment[:2].T)
             edge = u_moment * kept
             inertia = ca.vertcat(ca.horzcat(corner, edge[:2]), edge.T)
             turning = _coriolis(w, qd[i])[:2]
-            force = force + u_force * (torque * inverse) + cross[:, :2] @ turning
-            moment = moment + u_moment * (torque * inverse) + inertia[:, :2] @ turning
+            force = force + by_force * torque + cross[:, :2] @ turning
+            passed = ca.vertcat(moment[:2] + by_moment * torque, tau[i] - kept * torque)
+            moment = passed + inertia[:, :2] @ turning
 
             # to the frame of the predecessor
             r, w_parent = link.offset, rates[i - 1] if i else base_rate

@@ -23,6 +23,7 @@ PLAIN = [
     "ur5_drive.ur5_lab/sampled",
 ]
 EVERY_EFFECT = ("ur5_arm/rigid_moving", "ur5_drive/sampled")
+ON_TOOL = ("ur5_arm/elastic+payload", "ur5_arm.ur5e/elastic+payload", "ur5_arm/ticked+payload")
 SOME = (
     "ur5_arm/kinematic+coulomb",
     "ur5_arm/rigid+hose_spring@joint_2+coulomb@joint_3+base_tilt",
@@ -52,7 +53,7 @@ def fitting() -> list[str]:
     return names
 
 
-FITTING = fitting()
+FITTING = [*fitting(), *ON_TOOL]
 
 
 def random_point(model: Oracle, rng: np.random.Generator) -> dict[str, float]:
