@@ -1,0 +1,197 @@
+"""What building and checking say when they cannot do what is asked, and what they leave behind."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from sources.effect import Effect
+from sources.model import ModelError
+from sources.packaging import native
+from sources.packaging.build import build
+from sources.packaging.cache import cache_folder
+from sources.packaging.check import check
+from sources.variant import UnknownVariantError, components, effects
+from tests.fmus import fmu
+
+COMPONENTS = ", ".join(components())
+EFFECTS = ", ".join(effects())
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (
+            "gearbox ratio",
+            "'gearbox ratio' is not a variant name; write component/fidelity, then +effect or "
+            "+effect@balance as often as wanted, e.g. gearbox/elastic+backlash",
+        ),
+        ("gearbx/ratio", f"there is no component 'gearbx'; there is {COMPONENTS}"),
+        (
+            "gearbox/rato",
+            "there is no fidelity of 'gearbox' called 'rato'; there is ratio, lossy, elastic",
+        ),
+        (
+            "gearbox.mir/ratio",
+            "component 'gearbox' has no device 'mir'; it has lab_base, lab_bench, mir250",
+        ),
+        ("gearbox/ratio+coulom", f"there is no effect 'coulom'; there is {EFFECTS}"),
+        (
+            "gearbox/ratio[mesh=ratio]",
+            "there is no slot of gearbox/ratio called 'mesh'; there is none",
+        ),
+        ("gearbox/ratio+coulomb+coulomb", None),
+    ],
+)
+def test_unknown_names_are_told_what_there_is(
+    name: str, message: str | None, tmp_path: Path
+) -> None:
+    with pytest.raises(UnknownVariantError) as caught:
+        build(name, out=tmp_path)
+    if message is None:
+        message = f"variant {name}: an effect is named twice"
+    assert str(caught.value) == message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_effect_without_its_balance_is_told_what_it_needs(tmp_path: Path) -> None:
+    with pytest.raises(ModelError) as caught:
+        build("inertia/disc+backlash", out=tmp_path)
+    backlash: Effect = effects()["backlash"].EFFECT
+    assert str(caught.value).startswith(
+        f"effect 'backlash' fits no balance of inertia/disc: it acts on {', '.join(backlash.kinds)}"
+    )
+    assert "inertia/disc offers flange (rotation)" in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_balance_is_told_which_there_are(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"'coulomb@shaft' fits no balance of inertia/disc: .*"):
+        build("inertia/disc+coulomb@shaft", out=tmp_path)
+
+
+def test_python_fmus_are_fmi_2(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"^python FMUs are FMI 2\.0 \(pythonfmu writes no other"):
+        build("inertia/disc", out=tmp_path, fmi=3, kind="python")
+
+
+def test_a_failing_compiler_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache" / "zig").symlink_to(cache_folder("zig"), target_is_directory=True)
+    monkeypatch.setenv("COSIM_CACHE", str(tmp_path / "cache"))
+    good = native.with_token
+    monkeypatch.setattr(native, "with_token", lambda *a: good(*a) + "int broken(void) { return }\n")
+    with pytest.raises(native.CompilerError) as caught:
+        build("inertia/disc", out=tmp_path / "out")
+    assert str(caught.value).startswith("compiling inertia_disc for ")
+    assert "model.c" in str(caught.value) and "expected expression" in str(caught.value)
+    assert not (tmp_path / "out").exists()
+    left = [path.name for path in (tmp_path / "cache").iterdir() if path.name != "zig"]
+    for folder in left:
+        assert list((tmp_path / "cache" / folder).iterdir()) == [], folder
+
+
+def test_a_failing_compiler_leaves_the_old_fmu(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = build("inertia/disc", out=tmp_path)
+    old = path.read_bytes()
+    monkeypatch.setattr("sources.packaging.build.sources_key", lambda: "sources have changed")
+    good = native.with_token
+    monkeypatch.setattr(native, "with_token", lambda *a: good(*a) + "#error changed\n")
+    with pytest.raises(native.CompilerError, match="changed"):
+        build("inertia/disc", out=tmp_path)
+    assert path.read_bytes() == old
+    assert [item.name for item in path.parent.iterdir()] == [path.name]
+
+
+# -- check ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    path = tmp_path / "sample.fmu"
+    path.write_bytes(fmu("inertia/disc").read_bytes())
+    assert check(path) == []
+    return path
+
+
+def rewrite(path: Path, *, without: str = "", **replaced: bytes) -> None:
+    with zipfile.ZipFile(path) as archive:
+        contents = {name: archive.read(name) for name in archive.namelist()}
+    contents.update(replaced)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in contents.items():
+            if name != without:
+                archive.writestr(name, content)
+
+
+def test_a_truncated_archive_is_not_readable(archive: Path) -> None:
+    content = archive.read_bytes()
+    archive.write_bytes(content[: len(content) // 2])
+    assert check(archive) == ["sample.fmu: not a readable .fmu archive (File is not a zip file)"]
+
+
+def test_a_missing_file_is_not_readable(tmp_path: Path) -> None:
+    (problem,) = check(tmp_path / "none.fmu")
+    assert problem.startswith("none.fmu: not a readable .fmu archive ([Errno 2]")
+
+
+@pytest.mark.parametrize("member", ["modelDescription.xml", "sources/core.c"])
+@pytest.mark.parametrize("where", [0.0, 0.5, 0.99])
+def test_a_damaged_member_is_named(archive: Path, member: str, where: float) -> None:
+    """Bytes changed inside the compressed stream: a broken stream or a wrong checksum."""
+    with zipfile.ZipFile(archive) as opened:
+        info = opened.getinfo(member)
+    content = bytearray(archive.read_bytes())
+    begin = info.header_offset + 30 + len(member)
+    place = begin + int(where * (info.compress_size - 4))
+    content[place : place + 4] = bytes(255 - byte for byte in content[place : place + 4])
+    archive.write_bytes(bytes(content))
+    (problem,) = check(archive)
+    assert problem.startswith(f"sample.fmu: the file {member} in the archive is damaged (")
+
+
+def test_an_archive_without_a_description_is_told_so(archive: Path) -> None:
+    rewrite(archive, without="modelDescription.xml")
+    assert check(archive) == ["sample.fmu: the archive has no modelDescription.xml"]
+
+
+@pytest.mark.parametrize(
+    ("member", "content", "expected"),
+    [
+        ("extra/cosim/component.json", b"{", "extra/cosim/component.json cannot be read (Expect"),
+        ("modelDescription.xml", b"<fmiModelDescription", "line 1, column 21"),
+        ("modelDescription.xml", b"", "Document is empty"),
+    ],
+)
+def test_unreadable_contents_are_problems(
+    archive: Path, member: str, content: bytes, expected: str
+) -> None:
+    rewrite(archive, **{member: content})
+    problems = check(archive)
+    assert len(problems) == 1
+    assert expected in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('unit="N.m" ', "", "variable 'tau' has no unit"),
+        ('canGetAndSetFMUstate="true" ', "", "canGetAndSetFMUstate is not declared"),
+        ('name="tau"', 'name="torque"', "port 'flange' names the unknown variable 'tau'"),
+        ('start="0.0"', "", "start"),
+    ],
+)
+def test_a_description_that_breaks_our_promises_is_a_problem(
+    archive: Path, old: str, new: str, expected: str
+) -> None:
+    with zipfile.ZipFile(archive) as opened:
+        text = opened.read("modelDescription.xml").decode()
+    assert old in text
+    rewrite(archive, **{"modelDescription.xml": text.replace(old, new).encode()})
+    assert any(expected in problem for problem in check(archive))
