@@ -7,8 +7,6 @@ named ones (`[runs.NAME]`, each a set of changes to the rest) or one per row of 
 from __future__ import annotations
 
 import copy
-import csv
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +22,7 @@ from .files import flatten, read_toml
 from .measurement import Log, read_data_set, read_log
 from .signals import Constant, Signal, Table
 from .system_file import SystemFile, read_system
+from .table import fill, table_runs
 
 KEYS = {
     "description", "question", "expected", "source", "system", "duration", "start", "step",
@@ -32,7 +31,6 @@ KEYS = {
 }  # fmt: skip
 _SOURCE_KEYS = {"file", "data", "run", "column", "columns", "time", "unit", "constant", "times",
                 "values", "interpolation"}  # fmt: skip
-_PLACE = re.compile(r"\{(\w+)\}")
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ def read_scenario(path: Path | str, name: str = "") -> ScenarioFile:
     _only(path, table, KEYS, "a scenario")
     runs: dict[str, Mapping[str, Any]] = {}
     if "table" in table:
-        runs.update(_table_runs(path, table["table"]))
+        runs.update({run: {"": row} for run, row in table_runs(path, table["table"]).items()})
     for run, changes in table.get("runs", {}).items():
         _only(path, changes, KEYS - {"runs", "table"}, f"run {run}")
         runs[run] = changes
@@ -169,56 +167,6 @@ def _only(path: Path, table: Mapping[str, Any], known: set[str], what: str) -> N
     if unknown:
         first = sorted(unknown)[0]
         raise ScenarioError(f"{path}: {what} has no key {first!r}; {listing(sorted(known), first)}")
-
-
-def _table_runs(path: Path, entry: Any) -> dict[str, Mapping[str, Any]]:
-    """One run per row: `{column}` anywhere in the scenario stands for the row's value."""
-    if not isinstance(entry, dict) or not {"file", "name"} <= set(entry):
-        raise ScenarioError(f'{path}: [table] needs file and name, e.g. name = "SET{{set}}"')
-    _only(path, entry, {"file", "name", "join"}, "[table]")
-    rows = _rows(path.parent / entry["file"])
-    if "join" in entry:
-        file, on = path.parent / entry["join"]["file"], entry["join"]["on"]
-        others = {row[on]: row for row in _rows(file) if on in row}
-        lacking = [row.get(on) for row in rows if row.get(on) not in others]
-        if lacking:
-            raise ScenarioError(f"{file}: has no row with {on} = {lacking[0]}")
-        rows = [{**others[row[on]], **row} for row in rows]
-    return {str(_fill(str(path), entry["name"], row)): {"": row} for row in rows}
-
-
-def _rows(file: Path) -> list[dict[str, str]]:
-    if not file.is_file():
-        raise ScenarioError(f"{file}: there is no such file")
-    with file.open(encoding="utf-8-sig", newline="") as handle:
-        return list(csv.DictReader(handle))
-
-
-def _value(text: str) -> Any:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def _fill(where: str, text: str, row: Mapping[str, str]) -> Any:
-    def of(match: re.Match[str]) -> str:
-        if match[1] not in row:
-            raise ScenarioError(f"{where}: nothing is called {match[0]}; {listing(row, match[1])}")
-        return row[match[1]]
-
-    filled = _PLACE.sub(of, text)
-    return _value(filled) if _PLACE.fullmatch(text) else filled
-
-
-def _fill_all(where: str, item: Any, row: Mapping[str, str]) -> Any:
-    if isinstance(item, str):
-        return _fill(where, item, row)
-    if isinstance(item, list):
-        return [_fill_all(where, entry, row) for entry in item]
-    if isinstance(item, dict):
-        return {key: _fill_all(where, entry, row) for key, entry in item.items()}
-    return item
 
 
 def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -244,7 +192,7 @@ class _Reader:
         changes = dict(file.runs[run])
         row = {"name": run, **changes.pop("", {})}
         base = {key: value for key, value in file.table.items() if key not in ("runs", "table")}
-        self.table = _fill_all(str(file.path), _merge(base, changes), row)
+        self.table = fill(str(file.path), _merge(base, changes), row)
 
     def fail(self, text: str) -> ScenarioError:
         where = f"{self.file.path}" + (f", run {self.run}" if self.run else "")
