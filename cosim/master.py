@@ -241,12 +241,12 @@ class _Run:
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.index = 0
         self.instants: list[float] = times.tolist()
+        self.bound: kernel.Kernel | None = None
 
     # -- phases ----------------------------------------------------------------------------------
 
     def execute(self, count: int, progress: Callable[[float], None] | None) -> Recording:
         self.initialize()
-        final = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.final]
         shown = max(count // 100, 1)
         try:
             advance = self.compiled() or self.interpreted()
@@ -254,8 +254,7 @@ class _Run:
                 advance(min(self.index + shown, count))
                 if progress is not None:
                     progress(self.index / count)
-            for op, a, b in final:
-                self.do(op, a, b)
+            self.finish()
         except FmuCallError as error:
             time = float(self.times[self.index])
             text = f"run stopped at t = {time:.9g} s: {error}"
@@ -265,6 +264,25 @@ class _Run:
         if progress is not None:
             progress(1.0)
         return self.recording("")
+
+    def finish(self) -> None:
+        """Operations at the end of the run."""
+        for op, a, b in self.plan.final:
+            self.do(Op(int(op)), int(a), int(b))
+
+    def restart(self) -> None:
+        """Return to the state before initialization, with the system's values set again."""
+        self.values[:] = 0.0
+        self.bond_energy[:] = 0.0
+        self.previous = [0.0] * len(self.layout.bond_output)
+        self.index = self.row = 0
+        for instance, member in zip(
+            self.instances, self.master.system.members.values(), strict=True
+        ):
+            instance.reset()
+            instance.set(member.parameters)
+        if self.bound is not None:
+            self.bound.restart()
 
     def interpreted(self) -> Callable[[int], None]:
         """The executor in Python: communication steps up to an index."""
@@ -294,6 +312,7 @@ class _Run:
             raise ValueRangeError(
                 f"executor 'c': this machine has no {error}; 'cosim fmus build' compiles it"
             ) from None
+        self.bound = bound
 
         def advance(last: int) -> None:
             status = bound.advance(last)

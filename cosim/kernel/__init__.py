@@ -193,6 +193,13 @@ class Kernel:
         """Communication steps up to `last`; 0, or the status that ended it."""
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
+    def restart(self) -> None:
+        """Begin again at the first communication point."""
+        self.run.index = self.run.row = 0
+        self.bond_previous[:] = 0.0
+        for member in self._members:
+            member.stopped = 0
+
     def failed(self) -> tuple[int, int, int]:
         """What failed: (operation code, instance, call)."""
         operation, instance, _ = (int(n) for n in self._plan.step[self.run.failed_operation])

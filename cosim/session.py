@@ -1,0 +1,125 @@
+"""A prepared run that is repeated with other values: calibration runs thousands of them.
+
+    session = Session(master, 10.0, inputs={"motor.w_ref": table}, record=["load.w"])
+    times, rows = session.run({"load.J": 0.09})
+
+Instances, plan, arrays and the binding to the compiled executor are made once. A repetition is the
+same as a new run, bit for bit. Sessions do not share anything that changes, so each thread can run
+one of its own; the compiled executor releases the interpreter lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .algorithms import compile_plan
+from .block import Block, check_values
+from .errors import FmuCallError, StepError, ValueRangeError
+from .master import Driver, Master, _Run
+
+Vector = NDArray[np.float64]
+
+
+class Session:
+    """A run of a master, ready to be repeated.
+
+    Args:
+        master: system, algorithm and communication step.
+        duration: [s], a whole number of steps.
+        inputs: as of `Master.run`.
+        record: signals to record.
+        every: record every n-th communication point.
+        start: time at which the run begins [s].
+        targets: full names of parameters and start values that `run` may be given as an array.
+    """
+
+    def __init__(
+        self,
+        master: Master,
+        duration: float,
+        *,
+        inputs: Mapping[str, Driver] | None = None,
+        record: Sequence[str],
+        every: int = 1,
+        start: float = 0.0,
+        targets: Sequence[str] = (),
+    ) -> None:
+        count = master._count(duration, every)
+        observed = list(dict.fromkeys(n for name in record for n in master._observable(name)))
+        signals = master._signals(inputs or {})
+        plan = compile_plan(master.algorithm, master.system, list(signals), observed)
+        times: Vector = start + master.step * np.arange(count + 1, dtype=np.float64)
+        external = master._external(signals, times)
+        self.master, self.names, self.count = master, tuple(observed), count
+        self.times = times[::every].copy()
+        self.targets = tuple(targets)
+        self._stack = ExitStack()
+        try:
+            self._run = _Run(master, plan, observed, external, times, every, signals, self._stack)
+            self._advance = self._run.compiled() or self._run.interpreted()
+            self._blocks = {name: self._block(name) for name in self.targets}
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _block(self, name: str) -> tuple[Block, Any]:
+        member, variables = self.master.system.variables(name)
+        position = list(self.master.system.members).index(member.name)
+        return Block(self._run.instances[position], variables), variables
+
+    def run(self, values: Mapping[str, float] | Vector | None = None) -> tuple[Vector, Vector]:
+        """Run with these values on top of the system's own.
+
+        Args:
+            values: by full name, or one per target.
+
+        Returns:
+            times, and one row per time with a column per name in `names` (a copy).
+
+        Raises:
+            ValueRangeError: outside the declared bounds.
+            StepError: an FMU failed.
+        """
+        if values is None:
+            values = {}
+        if not isinstance(values, Mapping):
+            if len(values) != len(self.targets):
+                raise ValueRangeError(f"{len(values)} values for {len(self.targets)} targets")
+            values = dict(zip(self.targets, np.asarray(values).tolist(), strict=True))
+        run = self._run
+        run.restart()
+        for name, value in values.items():
+            if name not in self._blocks:
+                self._blocks[name] = self._block(name)
+            block, variables = self._blocks[name]
+            block.set(check_values(name, variables, value))
+        run.initialize()
+        try:
+            self._advance(self.count)
+            run.finish()
+        except FmuCallError as error:
+            time = float(run.times[min(run.index, self.count)])
+            text = f"run stopped at t = {time:.9g} s: {error}"
+            raise StepError(text, error.messages, time=time) from error
+        return self.times, run.rows[: run.row].copy()
+
+    def close(self) -> None:
+        """Free the instances."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
