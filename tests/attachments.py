@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sources.function import Oracle
-from sources.model import Model, ModelError
+from sources.model import Model, misfit
 from sources.variant import build_model, effects
 
 
@@ -21,14 +21,8 @@ def attachable(plain: str) -> Iterator[str]:
     """Names of `plain` with each effect at each balance that takes it."""
     for balance in build_model(plain).balances.values():
         for effect, module in effects().items():
-            if balance.kind not in module.EFFECT.kinds:
-                continue
-            name = f"{plain}+{effect}@{balance.name}"
-            try:
-                build_model(name)
-            except ModelError:  # a signal or unit that this balance does not have
-                continue
-            yield name
+            if not misfit(module.EFFECT, balance):
+                yield f"{plain}+{effect}@{balance.name}"
 
 
 def random_point(model: Model, rng: np.random.Generator) -> dict[str, float]:
