@@ -174,11 +174,11 @@ def fmus_list(
     if as_json:
         _print_json(entries)
         return
-    table = Table("variant", "inputs", "outputs", "parameters", "description")
+    table = _table("variant", "inputs", "outputs", "parameters", "description")
     for entry in entries:
         counts = [str(len(entry[key])) for key in ("inputs", "outputs", "parameters")]
         table.add_row(entry["variant"], *counts, entry["description"])
-    Console().print(table)
+    _console().print(table)
 
 
 def _is_of(variant: str, component: str) -> bool:
@@ -292,12 +292,12 @@ def list_scenarios(as_json: AsJson = False) -> None:
             ]
         )
         return
-    table = Table("scenario", "system", "runs", "description")
+    table = _table("scenario", "system", "runs", "description")
     for file in files:
         runs = [name for name in file.runs if name]
         shown = ", ".join(runs[:4]) + (f" … ({len(runs)})" if len(runs) > 4 else "")
         table.add_row(file.name, str(file.table.get("system", "")), shown, file.text)
-    Console().print(table)
+    _console().print(table)
 
 
 @app.command("run")
@@ -380,21 +380,22 @@ def _number(text: str) -> Any:
 
 
 def _print_result(result: Result) -> None:
-    content, console = result.to_dict(), Console()
+    content, console = result.to_dict(), _console()
     console.print(
         f"{content['scenario']}: {content['simulated_s']:g} s simulated in "
         f"{content['wall_s']:.2f} s, {content['fmu_steps']} FMU-steps, {content['algorithm']} with "
-        f"{content['step']:g} s; the coupling invented {content['energy_residual_J']:.3g} J"
+        f"{content['step']:g} s; the coupling invented {content['energy_residual_J']:.3g} J",
+        soft_wrap=True,
     )
     if content["comparison"]:
-        table = Table("compared", "rms", "max", "unit", "with")
+        table = _table("compared", "rms", "max", "unit", "with")
         for key, item in content["comparison"].items():
             table.add_row(
                 key, f"{item['rms']:.4g}", f"{item['max']:.4g}", item["unit"], item["reference"]
             )
         console.print(table)
     if content["checks"]:
-        table = Table("check", "value", "limit", "", "source")
+        table = _table("check", "value", "limit", "", "source")
         for item in content["checks"]:
             outcome = "ok" if item["ok"] else "FAILED"
             table.add_row(
@@ -406,6 +407,19 @@ def _print_result(result: Result) -> None:
 
 
 # -- frame -----------------------------------------------------------------------------------------
+
+
+def _console() -> Console:
+    """Standard output; wide if nobody looks at it, so that names stay whole for other programs."""
+    return Console() if sys.stdout.isatty() else Console(width=160)
+
+
+def _table(first: str, *others: str) -> Table:
+    table = Table()
+    table.add_column(first, no_wrap=True)
+    for name in others:
+        table.add_column(name)
+    return table
 
 
 def _say(text: str) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.archive import cache_folder, open_fmu
+from cosim import archive
+from cosim.archive import open_fmu
 from cosim.errors import FmuFileError, InputError, PlatformError
 from cosim.instance import Instance
 from tests.cosim_fmus import rewrite
@@ -53,8 +54,7 @@ def test_damaged_archive(tmp_path: Path, damage) -> None:
     path = damage(fmu("gearbox/ratio"), tmp_path / "broken.fmu")
     with pytest.raises(FmuFileError, match=r"broken\.fmu: is not a complete FMU archive .* again"):
         open_fmu(path)
-    left = [p for p in (cache_folder() / "unpacked").glob(".unpack-*")]
-    assert left == []
+    assert list((archive.cache_folder() / "unpacked").glob(".unpack-*")) == []
 
 
 def test_archive_without_description(tmp_path: Path) -> None:
