@@ -22,9 +22,16 @@ LEVEL = 2
 SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
 C_H = Quantity(
-    "c_h", "m/(N.s)", "creep velocity per force, along the wheel", start=1e-6, minimum=1e-12
+    "c_h",
+    "m/(N.s)",
+    "creep velocity per force, along the wheel",
+    start=1e-6,
+    minimum=1e-12,
+    nominal=1e-6,
 )
-C_N = Quantity("c_n", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12)
+C_N = Quantity(
+    "c_n", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12, nominal=1e-6
+)
 REST = Quantity(
     "rest",
     "1",
@@ -33,7 +40,12 @@ REST = Quantity(
     minimum=1e-6,
 )
 V_CREEP = Quantity(
-    "v_creep", "m/s", "rolling speed between standstill and rolling", start=0.02, minimum=1e-6
+    "v_creep",
+    "m/s",
+    "rolling speed between standstill and rolling",
+    start=0.02,
+    minimum=1e-6,
+    nominal=0.02,
 )
 
 

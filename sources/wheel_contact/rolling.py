@@ -21,9 +21,16 @@ from .wheel import Contact, wheel
 LEVEL = 0
 SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 C_X = Quantity(
-    "c_x", "m/(N.s)", "creep velocity per force, along the wheel", start=1e-6, minimum=1e-12
+    "c_x",
+    "m/(N.s)",
+    "creep velocity per force, along the wheel",
+    start=1e-6,
+    minimum=1e-12,
+    nominal=1e-6,
 )
-C_Y = Quantity("c_y", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12)
+C_Y = Quantity(
+    "c_y", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12, nominal=1e-6
+)
 REST = Quantity(
     "rest",
     "1",
@@ -32,7 +39,12 @@ REST = Quantity(
     minimum=1e-6,
 )
 V_CREEP = Quantity(
-    "v_creep", "m/s", "rolling speed between standstill and rolling", start=0.02, minimum=1e-6
+    "v_creep",
+    "m/s",
+    "rolling speed between standstill and rolling",
+    start=0.02,
+    minimum=1e-6,
+    nominal=0.02,
 )
 
 

@@ -26,7 +26,12 @@ SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
 MU_S = Quantity("mu_s", "1", "static friction coefficient", start=0.7, minimum=1e-6)
 MU_D = Quantity("mu_d", "1", "dynamic friction coefficient", start=0.5, minimum=0.0)
 V_C = Quantity(
-    "v_c", "m/s", "critical velocity, where friction is largest", start=0.002, minimum=1e-6
+    "v_c",
+    "m/s",
+    "critical velocity, where friction is largest",
+    start=0.002,
+    minimum=1e-6,
+    nominal=2e-3,
 )
 
 

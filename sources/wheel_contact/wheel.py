@@ -48,7 +48,12 @@ from . import (
 K = Quantity("k", "N/m", "normal stiffness of tread and floor", start=1e5, minimum=1.0, nominal=1e5)
 B = Quantity("b", "N.s/m", "normal damping", start=1500.0, minimum=0.0, nominal=1e3)
 WIDTH = Quantity(
-    "width", "m", "penetration over which the normal force sets in", start=1e-4, minimum=1e-9
+    "width",
+    "m",
+    "penetration over which the normal force sets in",
+    start=1e-4,
+    minimum=1e-9,
+    nominal=1e-4,
 )
 
 
