@@ -1,0 +1,293 @@
+"""Reads a data set and the mapping of its rig to a system: the parts of a calibration problem.
+
+`dataset.toml` (docs/datasets.md has the schema) says which system describes the rig, which variables
+the sheet's parameters set, which columns drive inputs, and what each measured column is in the model.
+It is looked for in the data set's folder, above it, and among the scenarios by its `rig`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import library
+from ..errors import ScenarioError, UnknownNameError, listing
+from ..files import flatten, read_toml
+from ..measurement import DataSet, Log, read_data_set
+from ..provider import Provider
+from ..signals import Table
+from ..system_file import SystemFile, read_system
+from .problem import Channel, Parameter, Problem, Run, check_parameters
+
+Vector = NDArray[np.float64]
+KEYS = {
+    "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
+    "inputs", "starts", "channels", "parameter", "nuisance",
+}  # fmt: skip
+_CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
+            "window", "unit", "subtract"}  # fmt: skip
+_RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
+_ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
+
+
+def find_mapping(folder: Path, rig: str) -> Path:
+    """The `dataset.toml` for a data set.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    for place in (folder, folder.parent, folder.parent.parent):
+        if (place / "dataset.toml").is_file():
+            return place / "dataset.toml"
+    known = []
+    for path in sorted(library.scenarios().rglob("dataset.toml")):
+        name = str(read_toml(path).get("rig", path.parent.name))
+        if name == rig:
+            return path
+        known.append(name)
+    raise ScenarioError(
+        f"{folder}: no dataset.toml says how rig {rig!r} maps to a system; {listing(known, rig)}; "
+        "write one beside the data"
+    )
+
+
+def find_system(path: Path, name: str) -> SystemFile:
+    """The system that a mapping names.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    places = [path.parent / name] if name.endswith(".toml") else []
+    for folder in (path.parent, *path.parents, library.scenarios()):
+        places.append(folder / "systems" / f"{name}.toml")
+    for place in places:
+        if place.is_file():
+            return read_system(place)
+    known = [item.stem for item in sorted((library.scenarios() / "systems").glob("*.toml"))]
+    raise UnknownNameError(f"{path}: there is no system {name!r}; {listing(known, name)}")
+
+
+def expand(name: str) -> list[str]:
+    """Column names behind a sheet's `q_1..6` (other names stand for themselves)."""
+    match = _RANGE.fullmatch(name.replace(" ", ""))
+    if match is None:
+        return [name]
+    return [f"{match['stem']}{i}" for i in range(int(match["first"]), int(match["last"]) + 1)]
+
+
+def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
+    """`"a.b"`, a list of such, or a table variable -> factor."""
+    if isinstance(entry, str):
+        return ((entry, 1.0),)
+    if isinstance(entry, list):
+        return tuple((str(item), 1.0) for item in entry)
+    if isinstance(entry, dict):
+        return tuple((name, float(factor)) for name, factor in flatten(entry).items())
+    raise ScenarioError(f"{where}: {entry!r} names no variables")
+
+
+def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+    match = _ITEM.fullmatch(key)
+    if match is None or match["key"] not in values:
+        raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
+    value = values[match["key"]]
+    return float(value[int(match["index"])] if match["index"] else value)
+
+
+def read_problem(
+    folder: Path | str,
+    provider: Provider | None = None,
+    *,
+    mapping: Path | str | None = None,
+    system: str | None = None,
+    workers: int | None = None,
+) -> Problem:
+    """Read a data set as a calibration problem.
+
+    Args:
+        folder: with `set.toml`.
+        provider: where variants come from; builds them if not given.
+        mapping: a `dataset.toml`, looked for if not given.
+        system: another system than the mapping's, with the same instances.
+        workers: threads.
+
+    Raises:
+        ScenarioError, UnknownNameError: a file or a name in it is wrong.
+    """
+    if provider is None:
+        from ..cli import default_provider  # the only place that knows the sources
+
+        provider = default_provider()
+    folder = Path(folder)
+    data = read_data_set(folder)
+    path = Path(mapping) if mapping is not None else find_mapping(folder, data.rig)
+    return _Mapping(path, data).problem(provider, system, workers)
+
+
+class _Mapping:
+    """Joins a mapping file and a data set."""
+
+    def __init__(self, path: Path, data: DataSet) -> None:
+        self.path, self.data = path, data
+        self.table = read_toml(path)
+        unknown = set(self.table) - KEYS
+        if unknown:
+            first = sorted(unknown)[0]
+            raise ScenarioError(f"{path}: has no key {first!r}; {listing(sorted(KEYS), first)}")
+        self.noise = {
+            column: sigma for name, sigma in data.noise.items() for column in expand(name)
+        }
+        self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
+        self.logs = {name: data.log(name) for name in data.runs}
+
+    def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
+        """The problem."""
+        table = self.table
+        file = find_system(self.path, system or str(table.get("system", "")))
+        constants = {name: float(value) for name, value in
+                     flatten(table.get("parameters", {})).items()}  # fmt: skip
+        fixed = self.data.sheet.get("fixed", {})
+        for key, entry in table.get("fixed", {}).items():
+            value = _lookup(fixed, key, f"{self.path}: [fixed]")
+            constants.update({name: factor * value for name, factor in
+                              _targets(entry, f"{self.path}: {key}")})  # fmt: skip
+        channels = [self.channel(name, entry) for name, entry in table["channels"].items()]
+        present = [c for c in channels if any(self._column(c) in log.columns
+                                              for log in self.logs.values())]  # fmt: skip
+        parameters = [*self.declared(), *self.others()]
+        check_parameters(parameters)
+        return Problem(
+            self.data.name,
+            file,
+            provider,
+            parameters,
+            present,
+            [self.run(name, present) for name in self.data.runs],
+            constants=constants,
+            step=float(table["step"]),
+            algorithm=str(table.get("algorithm", "jacobi")),
+            period=float(table["period"]) if "period" in table else None,
+            workers=workers,
+        )
+
+    def _column(self, channel: Channel) -> str:
+        return str(self.table["channels"][channel.name].get("column", channel.name))
+
+    def channel(self, name: str, entry: Mapping[str, Any]) -> Channel:
+        """One measured column."""
+        where = f"{self.path}: channel {name}"
+        unknown = set(entry) - _CHANNEL
+        if unknown or "signal" not in entry:
+            raise ScenarioError(f"{where}: wrong keys {sorted(unknown)}, or no signal")
+        column = str(entry.get("column", name))
+        sigma = float(entry.get("sigma", self.noise.get(column, 0.0)))
+        rounding = float(entry.get("quantum", 0.0)) ** 2 / 12.0 * int(entry.get("roundings", 1))
+        sigma = math.sqrt(sigma**2 + rounding)
+        if not sigma > 0.0:
+            raise ScenarioError(f"{where}: its noise is not known; give sigma")
+        return Channel(
+            name,
+            str(entry.get("unit", self.units.get(column, ""))),
+            sigma,
+            str(entry["signal"]),
+            float(entry.get("gain", 1.0)),
+            float(entry.get("offset", 0.0)),
+            str(entry.get("transform", "sample")),
+            float(entry.get("window", 0.0)),
+        )
+
+    def declared(self) -> list[Parameter]:
+        """The sheet's parameters."""
+        sheet = self.data.sheet.get("parameter", {})
+        mapped = self.table.get("sheet", {})
+        found = []
+        for name, entry in sheet.items():
+            if name not in mapped:
+                raise ScenarioError(
+                    f"{self.path}: [sheet] says nothing about the sheet's parameter {name!r}"
+                )
+            targets = _targets(mapped[name], f"{self.path}: [sheet] {name}")
+            found.append(
+                Parameter(
+                    name, entry.get("unit", ""), float(entry["nominal"]), float(entry["min"]),
+                    float(entry["max"]), targets, text=entry.get("description", ""),
+                )
+            )  # fmt: skip
+        return found
+
+    def others(self) -> list[Parameter]:
+        """Parameters beyond the sheet's, and nuisance values, per run if they are."""
+        found = []
+        for role, key in (("declared", "parameter"), ("nuisance", "nuisance")):
+            for entry in self.table.get(key, []):
+                where = f"{self.path}: {key} {entry.get('name')}"
+                targets = _targets(entry["targets"], where)
+                runs = list(self.data.runs) if entry.get("per_run") else [""]
+                for run in runs:
+                    nominal = self.value(entry["nominal"], run, where)
+                    span = float(entry.get("span", 0.0))
+                    low = float(entry["min"]) if "min" in entry else nominal - span
+                    high = float(entry["max"]) if "max" in entry else nominal + span
+                    prior = float(entry["prior"]) if "prior" in entry else None
+                    name = f"{entry['name']}@{run}" if run else str(entry["name"])
+                    found.append(
+                        Parameter(
+                            name, entry.get("unit", ""), nominal, low, high, targets,
+                            role, run, prior, text=entry.get("description", ""),  # type: ignore[arg-type]
+                        )
+                    )  # fmt: skip
+        return found
+
+    def value(self, entry: Any, run: str, where: str) -> float:
+        """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`)."""
+        if isinstance(entry, (int, float)):
+            return float(entry)
+        if entry.startswith("first:"):
+            values = self.logs[run][entry.removeprefix("first:")]
+            return float(values[np.isfinite(values)][0])
+        return _lookup(self.logs[run].values, entry, where)
+
+    def run(self, name: str, channels: list[Channel]) -> Run:
+        """One run."""
+        log = self.logs[name]
+        starts: dict[str, float] = {}
+        for key, entry in self.table.get("starts", {}).items():
+            where = f"{self.path}: [starts] {key}"
+            value = self.value(key, name, where)
+            starts.update({n: factor * value for n, factor in _targets(entry, where)})
+        return Run(
+            name,
+            self.data.runs[name].purpose,
+            log.time,
+            np.column_stack([self._measured(log, c) for c in channels]),
+            {
+                target: self._input(log, target, entry)
+                for target, entry in self.table.get("inputs", {}).items()
+            },
+            starts,
+            log.values,
+        )
+
+    def _measured(self, log: Log, channel: Channel) -> Vector:
+        column = self._column(channel)
+        if column not in log.columns:
+            return np.full(log.time.shape, np.nan)
+        return log[column]
+
+    def _input(self, log: Log, target: str, entry: Any) -> Table:
+        if isinstance(entry, str):
+            entry = {"column": entry}
+        column = str(entry["column"])
+        return Table(
+            log.time,
+            log[column] * float(entry.get("gain", 1.0)),
+            unit=str(entry.get("unit", "")),
+            interpolation=entry.get("interpolation", "hold"),
+            text=f"{log.name}:{column}",
+        )

@@ -1,0 +1,543 @@
+"""A calibration problem: a system, its uncertain parameters, measured channels and runs.
+
+    problem = read_problem("data/MB-12")
+    theta = problem.nominal
+    for name, residual in problem.residuals(theta, "identification"):
+        ...
+
+Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
+nothing was measured. Simulations run in threads, each with sessions of its own.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FmuCallError, UnknownNameError, ValueRangeError, listing
+from ..master import Master
+from ..provider import Provider
+from ..session import Session
+from ..signals import Signal
+from ..system import System
+from ..system_file import SystemFile
+from ..variants import apply
+
+Vector = NDArray[np.float64]
+Role = Literal["declared", "nuisance", "effect"]
+STEP = 1e-3
+"""Step of differences over the span of a parameter."""
+COINCIDENT = 1e-3
+"""Fraction of a sample interval within which sample times and recorded times are the same (logs
+keep times rounded, often to 32 bits)."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An uncertain value.
+
+    Attributes:
+        name, unit, text: for people.
+        nominal, minimum, maximum: start value and bounds.
+        targets: (full variable name, factor) that it sets.
+        role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
+        run: name of the only run that it concerns, "" for all.
+        prior: standard deviation around the nominal value that is known beforehand, None if nothing
+            but the bounds is.
+        strength: whether 0 makes an effect absent exactly.
+        span: size of a typical change; the distance of the bounds if not given.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    minimum: float
+    maximum: float
+    targets: tuple[tuple[str, float], ...]
+    role: Role = "declared"
+    run: str = ""
+    prior: float | None = None
+    strength: bool = False
+    span: float = 0.0
+    text: str = ""
+
+    @property
+    def scale(self) -> float:
+        """Size of a typical change."""
+        return self.span or self.maximum - self.minimum
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A measured quantity and what it is in the model.
+
+    Attributes:
+        name: of the column.
+        unit: of the column.
+        sigma: standard deviation of its noise, rounding included.
+        signal: full variable name.
+        gain, offset: column = gain * signal + offset.
+        transform: `sample`; `mean` or `difference` over the `window` before the sample.
+        window: [s].
+    """
+
+    name: str
+    unit: str
+    sigma: float
+    signal: str
+    gain: float = 1.0
+    offset: float = 0.0
+    transform: str = "sample"
+    window: float = 0.0
+
+    def of(self, times: Vector, recorded: Vector, values: Vector) -> Vector:
+        """What the channel would read at `times`."""
+        if self.transform == "sample":
+            result = _at(times, recorded, values)
+        elif self.transform == "difference":
+            before = _at(times - self.window, recorded, values)
+            result = (_at(times, recorded, values) - before) / self.window
+        else:
+            steps = np.diff(recorded) * 0.5 * (values[1:] + values[:-1])
+            integral = np.concatenate([[0.0], np.cumsum(steps)])
+            first = np.maximum(times - self.window, recorded[0])
+            width = np.maximum(times - first, 1e-12)
+            mean = np.interp(times, recorded, integral) - np.interp(first, recorded, integral)
+            result = np.where(times > first, mean / width, values[0])
+        return self.gain * result + self.offset
+
+
+def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
+    if times.shape == recorded.shape:
+        interval = recorded[1] - recorded[0] if recorded.size > 1 else 1.0
+        if np.max(np.abs(times - recorded)) <= COINCIDENT * interval:
+            return values
+    return np.interp(times, recorded, values)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A measured run.
+
+    Attributes:
+        name: of the run.
+        purpose: `identification` or `validation`.
+        times: sample times [s].
+        data: one row per sample, one column per channel of the problem; gaps are NaN.
+        inputs: what drives the system's open inputs.
+        starts: full variable name -> start value that is known for this run.
+        values: entries of the run in its description.
+    """
+
+    name: str
+    purpose: str
+    times: Vector
+    data: Vector
+    inputs: Mapping[str, Signal]
+    starts: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Sensitivity(NamedTuple):
+    """Derivatives of a run's model values over sigma.
+
+    Attributes:
+        run: its name.
+        columns: indices of the parameters that concern it.
+        values: (samples, channels, columns); NaN where nothing was measured.
+    """
+
+    run: str
+    columns: NDArray[np.intp]
+    values: Vector
+
+
+class Problem:
+    """A system with parameters, channels and runs.
+
+    Args:
+        name: of the data set.
+        file: the system.
+        provider: where variants come from.
+        parameters, channels, runs: see there.
+        constants: full variable name -> value for all runs.
+        step: communication step [s].
+        algorithm: of the master.
+        period: time between recorded points [s]; the sample interval if not given.
+        instances: name -> variant, the system's own if not given.
+        workers: threads.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        file: SystemFile,
+        provider: Provider | None,
+        parameters: Sequence[Parameter],
+        channels: Sequence[Channel],
+        runs: Sequence[Run],
+        *,
+        constants: Mapping[str, float] | None = None,
+        step: float,
+        algorithm: str = "jacobi",
+        period: float | None = None,
+        instances: Mapping[str, str] | None = None,
+        workers: int | None = None,
+    ) -> None:
+        self.name, self.file, self.provider = name, file, provider
+        self.parameters, self.channels = tuple(parameters), tuple(channels)
+        self.runs = tuple(runs)
+        self.constants = dict(constants or {})
+        self.step, self.algorithm, self.period = step, algorithm, period
+        self.instances = dict(instances or file.instances)
+        self.workers = workers or os.cpu_count() or 1
+        self.evaluations = 0
+        self._by_name = {run.name: run for run in self.runs}
+        self._idle: dict[str, list[Session]] = {run.name: [] for run in self.runs}
+        self._lock = threading.Lock()
+        self._system: System | None = None
+        self._known = {p.name: index for index, p in enumerate(self.parameters)}
+
+    # -- values ------------------------------------------------------------------------------------
+
+    def _column(self, of: str) -> Vector:
+        return np.array([getattr(p, of) for p in self.parameters], dtype=np.float64)
+
+    @property
+    def nominal(self) -> Vector:
+        """Start values of the parameters."""
+        return self._column("nominal")
+
+    @property
+    def lower(self) -> Vector:
+        """Lower bounds."""
+        return self._column("minimum")
+
+    @property
+    def upper(self) -> Vector:
+        """Upper bounds."""
+        return self._column("maximum")
+
+    @property
+    def scale(self) -> Vector:
+        """Typical changes."""
+        return self._column("scale")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, `name@run` where they concern one run."""
+        return tuple(p.name for p in self.parameters)
+
+    def index(self, name: str) -> int:
+        """Position of a parameter.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        if name not in self._known:
+            raise UnknownNameError(f"{self.name}: {listing(self._known, name)} as parameter")
+        return self._known[name]
+
+    def run(self, name: str) -> Run:
+        """A run by its name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        if name not in self._by_name:
+            raise UnknownNameError(f"{self.name}: {listing(self._by_name, name)} as run")
+        return self._by_name[name]
+
+    def chosen(self, purpose: str | Iterable[str] | None) -> list[Run]:
+        """Runs of a purpose, runs by name, or all."""
+        if purpose is None:
+            return list(self.runs)
+        if isinstance(purpose, str):
+            return [run for run in self.runs if run.purpose == purpose]
+        return [self.run(name) for name in purpose]
+
+    def columns(self, run: str) -> NDArray[np.intp]:
+        """Indices of the parameters that concern a run."""
+        return np.array(
+            [i for i, p in enumerate(self.parameters) if p.run in ("", run)], dtype=np.intp
+        )
+
+    # -- simulation --------------------------------------------------------------------------------
+
+    def system(self) -> System:
+        """The system with the constants set; parameters that a variant lacks are left out."""
+        if self._system is None:
+            file = replace(self.file, instances=self.instances, parameters={})
+            system = file.build(self.provider)
+            for name, value in {**self.file.parameters, **self.constants}.items():
+                if name.partition(".")[0] in self.instances:
+                    try:
+                        system.set(name, value)
+                    except UnknownNameError:
+                        if self.instances == self.file.instances:
+                            raise
+            self._system = system
+        return self._system
+
+    def _has(self, name: str) -> bool:
+        try:
+            self.system().variables(name)
+        except UnknownNameError:
+            return False
+        return True
+
+    def session(self, run: Run) -> Session:
+        """A new prepared run."""
+        system = self.system()
+        master = Master(system, self.algorithm, self.step)
+        interval = self.period or float(np.median(np.diff(run.times)))
+        every = max(round(interval / self.step), 1)
+        size = every * self.step
+        first = float(run.times[0])
+        count = math.ceil((float(run.times[-1]) - first) / size - COINCIDENT)
+        return Session(
+            master,
+            count * size,
+            inputs=run.inputs,
+            record=list(dict.fromkeys(channel.signal for channel in self.channels)),
+            every=every,
+            start=first if abs(first) > COINCIDENT * interval else 0.0,
+        )
+
+    def values(self, theta: Vector, run: Run | str) -> dict[str, float]:
+        """Full variable name -> value for a run."""
+        run = self.run(run) if isinstance(run, str) else run
+        found = {name: value for name, value in run.starts.items() if self._has(name)}
+        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
+            if parameter.run in ("", run.name):
+                found.update({name: factor * value for name, factor in parameter.targets})
+        return found
+
+    def simulate(self, theta: Vector, run: Run | str) -> Vector:
+        """What the channels would read: one row per sample.
+
+        Raises:
+            StepError: an FMU failed.
+            ValueRangeError: a value outside the bounds that its FMU declares.
+        """
+        run = self.run(run) if isinstance(run, str) else run
+        with self._lock:
+            self.evaluations += 1
+            idle = self._idle[run.name]
+            session = idle.pop() if idle else self.session(run)
+        try:
+            times, rows = session.run(self.values(theta, run))
+        except FmuCallError:
+            session.close()
+            raise
+        with self._lock:
+            self._idle[run.name].append(session)
+        place = {name: column for column, name in enumerate(session.names)}
+        return np.column_stack(
+            [c.of(run.times, times, rows[:, place[c.signal]]) for c in self.channels]
+        )
+
+    def _map(self, function: Any, items: Sequence[Any]) -> list[Any]:
+        if self.workers == 1 or len(items) < 2:
+            return [function(item) for item in items]
+        with ThreadPoolExecutor(self.workers) as pool:
+            return list(pool.map(function, items))
+
+    @property
+    def sigma(self) -> Vector:
+        """Noise of the channels."""
+        return np.array([channel.sigma for channel in self.channels])
+
+    def residuals(
+        self, theta: Vector, purpose: str | Iterable[str] | None = "identification"
+    ) -> list[tuple[str, Vector]]:
+        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all)."""
+        runs = self.chosen(purpose)
+        self.system()
+        models = self._map(lambda run: self.simulate(theta, run), runs)
+        return [
+            (run.name, (run.data - model) / self.sigma)
+            for run, model in zip(runs, models, strict=True)
+        ]
+
+    def jacobian(
+        self,
+        theta: Vector,
+        purpose: str | Iterable[str] | None = "identification",
+        *,
+        columns: Sequence[int] | None = None,
+        central: bool = True,
+        relative: float = STEP,
+    ) -> list[Sensitivity]:
+        """Derivatives of the model values over sigma, by differences inside the bounds.
+
+        Args:
+            theta: where.
+            purpose: runs.
+            columns: parameters, all if not given.
+            central: differences on both sides.
+            relative: step over the span of a parameter.
+        """
+        runs = self.chosen(purpose)
+        self.system()
+        tasks: list[tuple[Run, int, float]] = []
+        wanted = set(range(len(self.parameters)) if columns is None else columns)
+        owned = {
+            run.name: [int(i) for i in self.columns(run.name) if int(i) in wanted] for run in runs
+        }
+        sides = {i: self._sides(theta, i, central, relative) for i in wanted}
+        for run in runs:
+            if any(0.0 in sides[i] for i in owned[run.name]):
+                tasks.append((run, -1, 0.0))
+            tasks += [(run, i, h) for i in owned[run.name] for h in sides[i] if h]
+
+        def simulate(task: tuple[Run, int, float]) -> Vector:
+            run, index, change = task
+            moved = theta.copy()
+            if index >= 0:
+                moved[index] += change
+            return self.simulate(moved, run)
+
+        results = self._map(simulate, tasks)
+        found = {(t[0].name, t[1], t[2]): r for t, r in zip(tasks, results, strict=True)}
+        output = []
+        for run in runs:
+            gap = np.where(np.isfinite(run.data), 0.0, np.nan)
+            mine = owned[run.name]
+            values = np.empty((*run.data.shape, len(mine)))
+            for place, i in enumerate(mine):
+                low, high = sides[i]
+                first = found[run.name, i if low else -1, low]
+                second = found[run.name, i if high else -1, high]
+                values[:, :, place] = (second - first) / (high - low) / self.sigma + gap
+            output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values))
+        return output
+
+    def _sides(
+        self, theta: Vector, index: int, central: bool, relative: float
+    ) -> tuple[float, float]:
+        """The two changes between which a difference is taken; 0 is the point itself."""
+        parameter, value = self.parameters[index], float(theta[index])
+        change = relative * parameter.scale
+        above, below = parameter.maximum - value, value - parameter.minimum
+        if central and above >= change and below >= change:
+            return -change, change
+        return (0.0, change) if above >= change or above >= below else (-change, 0.0)
+
+    # -- changes -----------------------------------------------------------------------------------
+
+    def _with(self, **changes: Any) -> Problem:
+        arguments = {
+            "name": self.name, "file": self.file, "provider": self.provider,
+            "parameters": self.parameters, "channels": self.channels, "runs": self.runs,
+            "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
+            "period": self.period, "instances": self.instances, "workers": self.workers,
+            **changes,
+        }  # fmt: skip
+        return Problem(**arguments)
+
+    def hold(self, values: Mapping[str, float]) -> Problem:
+        """The problem with these parameters held at these values, no longer parameters."""
+        constants, runs = dict(self.constants), {run.name: run for run in self.runs}
+        for name, value in values.items():
+            parameter = self.parameters[self.index(name)]
+            items = {target: factor * value for target, factor in parameter.targets}
+            if parameter.run:
+                run = runs[parameter.run]
+                runs[run.name] = replace(run, starts={**run.starts, **items})
+            else:
+                constants.update(items)
+        kept = [p for p in self.parameters if p.name not in values]
+        return self._with(parameters=kept, constants=constants, runs=list(runs.values()))
+
+    def only(self, runs: Iterable[str]) -> Problem:
+        """The problem with some of its runs."""
+        names = set(runs)
+        return self._with(
+            runs=[run for run in self.runs if run.name in names],
+            parameters=[p for p in self.parameters if not p.run or p.run in names],
+        )
+
+    def with_parameters(self, parameters: Sequence[Parameter]) -> Problem:
+        """The problem with other parameters."""
+        return self._with(parameters=parameters)
+
+    def with_data(self, data: Mapping[str, Vector]) -> Problem:
+        """The problem with other measured values, by run."""
+        runs = [replace(run, data=data.get(run.name, run.data)) for run in self.runs]
+        return self._with(runs=runs)
+
+    def with_effects(self, changes: Mapping[str, str]) -> Problem:
+        """The problem on a system with changed variants.
+
+        Parameters that only the new variants have become parameters of the problem: strengths start
+        at 0, which reproduces this problem, the others at the FMU's values.
+
+        Args:
+            changes: instance (component, slot) -> short form as of `cosim run --set`, e.g.
+                `{"load": "+coulomb"}`.
+
+        Raises:
+            VariantError, UnknownNameError: it does not fit.
+        """
+        instances = apply(self.instances, changes, self.provider)
+        changed = self._with(instances=instances)
+        old, new = self.system(), changed.system()
+        added: list[Parameter] = []
+        for name, member in new.members.items():
+            if instances[name] == self.instances[name]:
+                continue
+            before = old.members[name].description.variables
+            strengths = set(member.description.extra.get("strengths", ()))
+            for variable in member.description.variables.values():
+                if (
+                    variable.causality != "parameter"
+                    or variable.type != "Float64"
+                    or variable.size != 1
+                    or variable.name in before
+                    or variable.name.startswith("solver.")
+                    or f"{name}.{variable.name}" in changed.constants
+                ):
+                    continue
+                start = float(variable.start[0] or 0.0) if variable.start else 0.0
+                span = abs(start) or variable.nominal or 1.0
+                low = -100.0 * span if variable.minimum is None else variable.minimum
+                high = 100.0 * span if variable.maximum is None else variable.maximum
+                strength = variable.name in strengths
+                added.append(
+                    Parameter(
+                        f"{name}.{variable.name}", variable.symbol, 0.0 if strength else start,
+                        low, high, ((f"{name}.{variable.name}", 1.0),), "effect",
+                        strength=strength, span=span, text=variable.text,
+                    )
+                )  # fmt: skip
+        return changed._with(parameters=[*self.parameters, *added])
+
+    def close(self) -> None:
+        """Free the sessions; the problem can still be used."""
+        with self._lock:
+            for idle in self._idle.values():
+                while idle:
+                    idle.pop().close()
+
+
+def check_parameters(parameters: Iterable[Parameter]) -> None:
+    """Refuse bounds that are empty or do not hold the nominal value.
+
+    Raises:
+        ValueRangeError: with the parameter.
+    """
+    for p in parameters:
+        if not p.minimum <= p.nominal <= p.maximum or not p.minimum < p.maximum:
+            raise ValueRangeError(
+                f"parameter {p.name}: nominal {p.nominal:g} is not within {p.minimum:g} to "
+                f"{p.maximum:g} {p.unit}"
+            )
