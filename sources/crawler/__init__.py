@@ -20,8 +20,8 @@ Y_S = Quantity("y_S", "m", "world position of the body point S")
 TAU2 = Quantity("tau2", "N.m", "torque that the drive of the right track wheel has to deliver")
 TAU3 = Quantity("tau3", "N.m", "torque that the drive of the left track wheel has to deliver")
 
-POSE_X = Quantity("pose_x", "m", "world position of O1, the state behind x")
-POSE_Y = Quantity("pose_y", "m", "world position of O1, the state behind y")
+POSE_X = Quantity("pose_x", "m", "world position of O1, the state behind x", nominal=1.0)
+POSE_Y = Quantity("pose_y", "m", "world position of O1, the state behind y", nominal=1.0)
 POSE_BETA = Quantity("pose_beta", "rad", "heading, the state behind beta")
 
 R = Quantity(

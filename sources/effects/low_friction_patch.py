@@ -24,7 +24,7 @@ REDUCTION = Quantity(
     maximum=1.0,
     strength=True,
 )
-X_P = Quantity("x_p", "m", "world position of the centre", start=1.0)
+X_P = Quantity("x_p", "m", "world position of the centre", start=0.5)
 Y_P = Quantity("y_p", "m", "world position of the centre")
 RADIUS = Quantity("radius", "m", "radius of the patch", start=0.3, minimum=1e-3)
 

@@ -25,8 +25,8 @@ PHI = Quantity(
 BETA_RATE = Quantity("betad", "rad/s", "steering rates", size=3)
 PHI_RATE = Quantity("phid", "rad/s", "spin rates", size=3)
 
-POSE_X = Quantity("pose_x", "m", "state behind x")
-POSE_Y = Quantity("pose_y", "m", "state behind y")
+POSE_X = Quantity("pose_x", "m", "state behind x", nominal=1.0)
+POSE_Y = Quantity("pose_y", "m", "state behind y", nominal=1.0)
 POSE_THETA = Quantity("pose_theta", "rad", "state behind theta")
 VEL_X = Quantity("vel_x", "m/s", "state behind xd")
 VEL_Y = Quantity("vel_y", "m/s", "state behind yd")
