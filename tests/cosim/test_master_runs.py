@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench import WIRES, bench
+from tests.cosim.bench import WIRES, bench
 
 from cosim.errors import (
     AlgebraicLoopError,

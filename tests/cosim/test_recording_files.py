@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bench import bench
+from tests.cosim.bench import bench
 
 from cosim.comparison import Reference, compare
 from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError, ValueRangeError

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
-from bench import bench
+from tests.cosim.bench import bench
 
 from cosim.errors import (
     ConnectError,
