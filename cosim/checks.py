@@ -16,7 +16,7 @@ from .recording import Recording
 Vector = NDArray[np.float64]
 CHECK_KEYS = {
     "name", "source", "of", "signal", "signals", "comparison", "after", "before", "expected",
-    "relative", "limit",
+    "relative", "limit", "minus", "per", "quantity", "case", "reference",
 }  # fmt: skip
 
 _SIGNAL: dict[str, Callable[[Vector], float]] = {
@@ -44,8 +44,14 @@ class Check:
         comparison: name of the comparison, "" if the measure is of signals.
         after, before: times between which it is taken [s].
         expected: subtracted from the measure (its magnitude is then checked), None if nothing.
-        relative: divide by the expected value.
+        relative: divide the deviation by the expected value.
         low, high: the limit, inclusive.
+        minus: signal that is subtracted from the signal before it is measured, "" for none.
+        per: divides the measure.
+        quantity, case: checks of one quantity appear together in the overview of all runs, one
+            column per case; "" if it does not appear there.
+        reference: what the expected value is called there, or the upper limit if nothing is
+            expected; "" leaves the limit out.
     """
 
     name: str
@@ -59,11 +65,24 @@ class Check:
     relative: bool
     low: float
     high: float
+    minus: str = ""
+    per: float | None = None
+    quantity: str = ""
+    case: str = ""
+    reference: str = ""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Signals that have to be recorded for it."""
+        return (*self.signals, self.minus) if self.minus else self.signals
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """A check's outcome; `value` must lie within `limit` (an upper bound, or [low, high])."""
+    """A check's outcome; `value` must lie within `limit` (an upper bound, or [low, high]).
+
+    `unit` is that of `value`; `measured` is the measure before the expected value was subtracted.
+    """
 
     name: str
     value: float
@@ -72,6 +91,7 @@ class CheckResult:
     source: str
     measured: float
     unit: str
+    measured_unit: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """As in `cosim run --json`."""
@@ -112,6 +132,12 @@ def read_check(entry: Mapping[str, Any], references: Mapping[str, Reference]) ->
         wanted = ("energy_residual",)
     if of not in wanted:
         raise ValueError(f"{what}: of = {of!r} is not one of {', '.join(wanted)}")
+    minus = str(entry.get("minus", ""))
+    if minus and len(signals) != 1:
+        raise ValueError(f"{what}: minus goes with one signal")
+    per = float(entry["per"]) if "per" in entry else None
+    if per is not None and not per > 0.0:
+        raise ValueError(f"{what}: per = {per} must be positive")
     limit = entry["limit"]
     expected = float(entry["expected"]) if "expected" in entry else None
     if isinstance(limit, list):
@@ -132,6 +158,11 @@ def read_check(entry: Mapping[str, Any], references: Mapping[str, Reference]) ->
         relative=bool(entry.get("relative", False)),
         low=low,
         high=high,
+        minus=minus,
+        per=per,
+        quantity=str(entry.get("quantity", "")),
+        case=str(entry.get("case", "")),
+        reference=str(entry.get("reference", "")),
     )
 
 
@@ -166,6 +197,8 @@ def _measure(
     inside = (recording.time >= check.after) & (recording.time <= check.before)
     _some(check, inside)
     columns = [recording[name][inside] for name in check.signals]
+    if check.minus:
+        columns[0] = columns[0] - recording[check.minus][inside]
     unit = recording.units.get(check.signals[0], "")
     if len(columns) == 1:
         return _SIGNAL[check.of](columns[0]), unit
@@ -185,7 +218,9 @@ def evaluate(
         UnknownNameError: a signal was not recorded.
     """
     measured, unit = _measure(check, recording, comparisons)
-    value = measured
+    if check.per is not None:
+        measured, unit = measured / check.per, "1"
+    value, measured_unit = measured, unit
     if check.expected is not None:
         value = abs(measured - check.expected)
         if check.relative:
@@ -199,4 +234,5 @@ def evaluate(
         source=check.source,
         measured=measured,
         unit=unit,
+        measured_unit=measured_unit,
     )

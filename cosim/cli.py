@@ -54,6 +54,8 @@ class Platform(StrEnum):
     all = "all"
 
 
+SHOWN = 40
+"""Comparisons and passed checks that are printed; more are in result.json only."""
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to stdout.")]
 
 
@@ -387,20 +389,32 @@ def _print_result(result: Result) -> None:
         f"{content['step']:g} s; the coupling invented {content['energy_residual_J']:.3g} J",
         soft_wrap=True,
     )
-    if content["comparison"]:
+    for quantity in result.overview if len(result.runs) > 1 else ():
+        head, rows = quantity.rows()
+        table = _table(*head)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    if 0 < len(content["comparison"]) <= SHOWN:
         table = _table("compared", "rms", "max", "unit", "with")
         for key, item in content["comparison"].items():
             table.add_row(
                 key, f"{item['rms']:.4g}", f"{item['max']:.4g}", item["unit"], item["reference"]
             )
         console.print(table)
-    if content["checks"]:
+    shown = content["checks"]
+    if len(shown) > SHOWN:
+        shown = [item for item in shown if not item["ok"]]
+        console.print(
+            f"{len(content['checks']) - len(shown)} of {len(content['checks'])} checks ok"
+        )
+    if shown:
         table = _table("check", "value", "limit", "", "source")
-        for item in content["checks"]:
+        for item in shown:
             outcome = "ok" if item["ok"] else "FAILED"
-            table.add_row(
-                item["name"], f"{item['value']:.4g}", str(item["limit"]), outcome, item["source"]
-            )
+            limit = item["limit"]
+            bound = f"{limit:.4g}" if isinstance(limit, float) else str(limit)
+            table.add_row(item["name"], f"{item['value']:.4g}", bound, outcome, item["source"])
         console.print(table)
     for folder in list(dict.fromkeys(str(path.parent) for path in result.files))[-8:]:
         console.print(f"in {folder}", soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,13 @@ class Comparison:
     reference: str
     times: Vector
     differences: Vector
+
+
+def circle(times: Vector, start: Sequence[float], centre: Sequence[float], rate: float) -> Vector:
+    """Points, one row per time, of a motion about a centre at a constant rate [rad/s]."""
+    x, y = start[0] - centre[0], start[1] - centre[1]
+    c, s = np.cos(rate * times), np.sin(rate * times)
+    return np.column_stack([centre[0] + c * x - s * y, centre[1] + s * x + c * y])
 
 
 def _unit(recording: Recording, reference: Reference) -> str:

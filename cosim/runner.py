@@ -18,6 +18,8 @@ from .comparison import Comparison, compare, convert_reference
 from .errors import StepError, UnknownNameError, ValueRangeError
 from .files import write_text
 from .master import Master
+from .overview import Quantity, overview
+from .plots import plot_overview, plot_run
 from .provider import Provider
 from .recording import Recording
 from .scenario import Scenario
@@ -52,7 +54,12 @@ class RunResult:
     notes: tuple[str, ...] = ()
 
     def plot(self, path: Path | str | None = None) -> Any:
-        """Plot what the scenario names, else what is compared, else everything."""
+        """Plot what the scenario describes or names, else what is compared, else everything."""
+        if self.scenario.plots:
+            item = self.scenario
+            return plot_run(
+                self.recording, item.plots, item.references, self.comparisons, item.name, path
+            )
         references = {
             name: (reference.times, values, reference.text)
             for reference in self.scenario.references.values()
@@ -100,6 +107,16 @@ class Result:
             for run, result in self.runs.items()
             for check in result.checks
         }
+
+    @property
+    def overview(self) -> list[Quantity]:
+        """What the runs say of the same quantities, side by side."""
+        return overview(
+            {
+                run: tuple(zip(result.scenario.checks, result.checks, strict=True))
+                for run, result in self.runs.items()
+            }
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As `cosim run --json` prints it."""
@@ -172,11 +189,12 @@ def _recorded(
 ) -> tuple[tuple[str, ...], list[str]]:
     """Signals to record, and notes on what a changed variant does not have."""
     needed = [name for item in scenario.references.values() for name in item.signals]
-    needed += [name for check in scenario.checks for name in check.signals]
+    needed += [name for check in scenario.checks for name in check.needs]
+    shown = [name for axes in scenario.plots for name in axes.needs]
     if scenario.record is None:
         return tuple(dict.fromkeys([*system.signals(), *needed])), []
     kept, notes = [], []
-    for name in scenario.record:
+    for name in (*scenario.record, *shown):
         instance = name.partition(".")[0]
         try:
             system.variables(name)
@@ -315,6 +333,11 @@ def run(
     runs = {"": next(iter(results.values()))} if len(chosen) == 1 else results
     final = Result(file.name + (f"/{single}" if single else ""), runs, tuple(files))
     if out is not None:
+        quantities = final.overview
+        if quantities and len(runs) > 1:
+            path = Path(out) / "overview.png"
+            plot_overview(quantities, file.text or file.name, path)
+            files.append(path)
         path = Path(out) / "result.json"
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")

@@ -16,10 +16,11 @@ import numpy as np
 
 from . import library
 from .checks import CHECK_KEYS, Check, read_check
-from .comparison import Reference
+from .comparison import Reference, circle
 from .errors import ScenarioError, UnknownNameError, listing
 from .files import flatten, read_toml
 from .measurement import Log, read_data_set, read_log
+from .plots import Axes, read_axes
 from .signals import Constant, Signal, Table
 from .system_file import SystemFile, read_system
 from .table import fill, table_runs
@@ -27,10 +28,11 @@ from .table import fill, table_runs
 KEYS = {
     "description", "question", "expected", "source", "system", "duration", "start", "step",
     "algorithm", "tolerance", "variants", "parameters", "inputs", "record", "compare", "checks",
-    "runs", "table", "plot",
+    "runs", "table", "plot", "plots",
 }  # fmt: skip
 _SOURCE_KEYS = {"file", "data", "run", "column", "columns", "time", "unit", "constant", "times",
                 "values", "interpolation"}  # fmt: skip
+_CIRCLE_KEYS = {"start", "centre", "rate"}
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Scenario:
         references: what is compared, by name.
         checks: what must hold.
         plot: signals to plot, None for the compared ones, else all.
+        plots: axes of the plot with labels, instead of `plot`.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Scenario:
     references: Mapping[str, Reference]
     checks: tuple[Check, ...]
     plot: tuple[str, ...] | None
+    plots: tuple[Axes, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -244,7 +248,18 @@ class _Reader:
             references=references,
             checks=tuple(checks),
             plot=tuple(table["plot"]) if "plot" in table else None,
+            plots=tuple(self.axes(entry) for entry in table.get("plots", [])),
         )
+
+    def axes(self, entry: Any) -> Axes:
+        try:
+            axes = read_axes(entry)
+            for name in axes.comparisons:
+                if name not in self.table.get("compare", {}):
+                    raise ValueError(f"plot {axes.label!r}: there is no comparison {name!r}")
+            return axes
+        except ValueError as error:
+            raise self.fail(str(error)) from error
 
     def optional(self, table: Mapping[str, Any], key: str) -> float | None:
         return float(table[key]) if key in table else None
@@ -329,9 +344,12 @@ class _Reader:
     def reference(self, name: str, entry: Any) -> Reference:
         if not isinstance(entry, dict) or not {"signal", "signals"} & set(entry):
             raise self.fail(f"compare {name}: signal is missing")
-        keys = _SOURCE_KEYS | {"signal", "signals", "offset", "scale"}
+        keys = _SOURCE_KEYS | {"signal", "signals", "offset", "scale", "circle", "name"}
         _only(self.file.path, entry, keys, f"compare {name}")
         signals = tuple(entry.get("signals", [entry.get("signal")]))
+        text = str(entry.get("name", ""))
+        if "circle" in entry:
+            return self.circle(name, entry["circle"], signals, text)
         columns = entry.get("columns", [entry.get("column", name)])
         if len(columns) != len(signals):
             raise self.fail(
@@ -353,5 +371,16 @@ class _Reader:
             np.asarray(parts[0][0], dtype=np.float64),
             (values - float(offset)) * float(entry.get("scale", 1.0)),
             parts[0][2],
-            ", ".join(part[3] for part in parts),
+            text or ", ".join(part[3] for part in parts),
         )
+
+    def circle(self, name: str, entry: Any, signals: tuple[str, ...], text: str) -> Reference:
+        what = f"compare {name}"
+        _only(self.file.path, entry, _CIRCLE_KEYS, f"{what}, circle")
+        if len(signals) != 2 or set(entry) != _CIRCLE_KEYS:
+            raise self.fail(f"{what}: a circle takes two signals, start, centre and rate")
+        period = self.optional(self.table.get("record", {}), "period") or self.number("step")
+        count = round(self.number("duration") / period)
+        times = self.number("start", 0.0) + period * np.arange(count + 1, dtype=np.float64)
+        points = circle(times - times[0], entry["start"], entry["centre"], float(entry["rate"]))
+        return Reference(signals, times, points, "", text or f"{what}: circle")
