@@ -50,11 +50,11 @@ _UNARY = {
     ca.OP_SQRT: "_sqrt({})",
     ca.OP_EXP: "_exp({})",
     ca.OP_LOG: "_log({})",
-    ca.OP_SIN: "_math.sin({})",
-    ca.OP_COS: "_math.cos({})",
-    ca.OP_TAN: "_math.tan({})",
-    ca.OP_ASIN: "_math.asin({})",
-    ca.OP_ACOS: "_math.acos({})",
+    ca.OP_SIN: "_sin({})",
+    ca.OP_COS: "_cos({})",
+    ca.OP_TAN: "_tan({})",
+    ca.OP_ASIN: "_asin({})",
+    ca.OP_ACOS: "_acos({})",
     ca.OP_ATAN: "_math.atan({})",
     ca.OP_SINH: "_sinh({})",
     ca.OP_COSH: "_cosh({})",
@@ -65,8 +65,8 @@ _UNARY = {
     ca.OP_CEIL: "_ceil({})",
     ca.OP_SIGN: "_sign({})",
     ca.OP_NOT: "float(not {})",
-    ca.OP_LOG1P: "_math.log1p({})",
-    ca.OP_EXPM1: "_math.expm1({})",
+    ca.OP_LOG1P: "_log1p({})",
+    ca.OP_EXPM1: "_expm1({})",
 }
 
 

@@ -54,8 +54,37 @@ def _guarded(function: Any, *values: float) -> float:
 
 def _pow(a: float, b: float) -> float:
     if a == 0.0 and b < 0.0:
-        return _math.inf
-    return _guarded(_math.pow, a, b)
+        return _math.copysign(_math.inf, a) if _odd(b) else _math.inf
+    try:
+        return _math.pow(a, b)
+    except OverflowError:
+        return -_math.inf if a < 0.0 and _odd(b) else _math.inf
+    except ValueError:
+        return _math.nan
+
+
+def _odd(b: float) -> bool:
+    return _math.isfinite(b) and abs(_math.fmod(b, 2.0)) == 1.0
+
+
+def _sin(a: float) -> float:
+    return _math.sin(a) if -_math.inf < a < _math.inf else _math.nan
+
+
+def _cos(a: float) -> float:
+    return _math.cos(a) if -_math.inf < a < _math.inf else _math.nan
+
+
+def _tan(a: float) -> float:
+    return _math.tan(a) if -_math.inf < a < _math.inf else _math.nan
+
+
+def _asin(a: float) -> float:
+    return _math.asin(a) if -1.0 <= a <= 1.0 else _math.nan
+
+
+def _acos(a: float) -> float:
+    return _math.acos(a) if -1.0 <= a <= 1.0 else _math.nan
 
 
 def _exp(a: float) -> float:
@@ -63,7 +92,7 @@ def _exp(a: float) -> float:
 
 
 def _sinh(a: float) -> float:
-    return _guarded(_math.sinh, a)
+    return _math.copysign(_guarded(_math.sinh, a), a)
 
 
 def _cosh(a: float) -> float:
@@ -72,6 +101,14 @@ def _cosh(a: float) -> float:
 
 def _log(a: float) -> float:
     return -_math.inf if a == 0.0 else _guarded(_math.log, a)
+
+
+def _log1p(a: float) -> float:
+    return -_math.inf if a == -1.0 else _guarded(_math.log1p, a)
+
+
+def _expm1(a: float) -> float:
+    return _guarded(_math.expm1, a)
 
 
 def _sqrt(a: float) -> float:
@@ -83,11 +120,11 @@ def _fmod(a: float, b: float) -> float:
 
 
 def _floor(a: float) -> float:
-    return float(_math.floor(a)) if _math.isfinite(a) else a
+    return _math.copysign(_math.floor(a), a) if _math.isfinite(a) else a
 
 
 def _ceil(a: float) -> float:
-    return float(_math.ceil(a)) if _math.isfinite(a) else a
+    return _math.copysign(_math.ceil(a), a) if _math.isfinite(a) else a
 
 
 def _sign(a: float) -> float:
