@@ -36,7 +36,7 @@ class Variable:
         role: input, state, parameter, discrete (held between samples) or output.
         start: start value.
         symbol: the CasADi symbol (outputs: the defining expression).
-        of_effect: declared by an effect, not by the fidelity.
+        of_effect: name of the strength of the effect that declared it, "" for the fidelity's own.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Variable:
     role: Role
     start: float
     symbol: SX
-    of_effect: bool = False
+    of_effect: str = ""
 
 
 @dataclass
@@ -136,7 +136,7 @@ class Model:
         device: str = "",
         prefix: str = "",
         parent: Model | None = None,
-        of_effect: bool = False,
+        of_effect: str = "",
     ) -> None:
         self.component = component
         self.fidelity = fidelity
@@ -438,7 +438,7 @@ class Model:
         the same as without them.
         """
         chosen = [variable for variable in self.variables.values() if variable.role == role]
-        return sorted(chosen, key=lambda variable: variable.of_effect)
+        return sorted(chosen, key=lambda variable: bool(variable.of_effect))
 
 
 E_STORED = Quantity("E_stored", "J", "energy stored in the component")
@@ -520,6 +520,7 @@ class EffectModel:
         name = attachment.effect.name
         own = f"{attachment.balance}.{name}" if attachment.balance else name
         self._prefix = f"{balance.name}.{name}" if grouped else own
+        self._strength = f"{own}.{attachment.effect.strength.name}"
         self._model = self._declaring(model, self._prefix)
         self._parameters = self._declaring(model, own)
         self.kind = balance.kind
@@ -528,7 +529,11 @@ class EffectModel:
 
     def _declaring(self, model: Model, prefix: str) -> Model:
         return Model(
-            model.component, model.fidelity, prefix=prefix, parent=self._root, of_effect=True
+            model.component,
+            model.fidelity,
+            prefix=prefix,
+            parent=self._root,
+            of_effect=self._strength,
         )
 
     @property

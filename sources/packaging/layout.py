@@ -28,12 +28,14 @@ class Entry:
         part: which section of the layout.
         quantity: declaration (unit, bounds, text).
         start: start value.
+        strength: name of the strength of the effect that it belongs to, "" if to none.
     """
 
     name: str
     part: Part
     quantity: Quantity
     start: float = 0.0
+    strength: str = ""
 
 
 def _derivative_unit(unit: str) -> str:
@@ -70,12 +72,22 @@ def solver_entries(model: Model) -> list[Entry]:
     ]
 
 
+def owners(entries: list[Entry]) -> list[int]:
+    """Per state the value reference of the strength of its effect, 0 if it has none."""
+    reference = {entry.name: index for index, entry in enumerate(entries)}
+    return [
+        reference[entry.strength] if entry.strength else 0
+        for entry in entries
+        if entry.part == "state"
+    ]
+
+
 def layout(model: Model) -> list[Entry]:
     """All variables: time, states, derivatives, inputs, outputs, parameters, sampled, solver."""
     time = Quantity("time", "s", "simulation time")
     entries = [Entry("time", "time", time)]
     states = model.of_role("state")
-    entries += [Entry(v.name, "state", v.quantity, v.start) for v in states]
+    entries += [Entry(v.name, "state", v.quantity, v.start, v.of_effect) for v in states]
     entries += [
         Entry(
             f"der({v.name})",

@@ -19,7 +19,7 @@ from ..function import Functions
 from ..model import Model
 from .cache import cache_folder, write_atomically
 from .elimination import eliminate
-from .layout import Entry
+from .layout import Entry, owners
 
 C_SOURCES = Path(__file__).parent / "c"
 _COMPILERS = threading.BoundedSemaphore(os.cpu_count() or 1)
@@ -120,6 +120,7 @@ def model_source(model: Model, functions: Functions, entries: list[Entry], ident
             str(int(e.part == "parameter" and e.quantity.variability == "fixed")) for e in entries
         )
         + "};",
+        f"static const int OWNER[] = {{{', '.join(map(str, [*owners(entries), 0]))}}};",
         f"static const double NOMINAL[] = {{{', '.join(map(_number, [*nominal, 1.0]))}}};",
     ]
     if functions.updates:

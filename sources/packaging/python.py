@@ -18,7 +18,7 @@ from ..model import Model
 from ..variant import Name
 from . import runtime
 from .elimination import eliminate
-from .layout import Entry
+from .layout import Entry, owners
 
 _BINARY = {
     ca.OP_ADD: "{} + {}",
@@ -140,6 +140,7 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
         f"MAXIMUM = {bounds([e.quantity.maximum for e in entries], infinity)}",
         f"FIXED = {fixed!r}",
         f"NOMINAL = {nominal!r}",
+        f"OWNER = {owners(entries)!r}",
     ]
     factor = ["def f_factor(j, d, w):", *(f"    {s}" for s in elimination.factor), "    return"]
     factor = [

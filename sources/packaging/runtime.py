@@ -22,6 +22,7 @@ MINIMUM: Any = None
 MAXIMUM: Any = None
 FIXED: Any = None
 NOMINAL: Any = None
+OWNER: Any = None
 UPDATES: Any = None
 f_outputs: Any = None
 f_derivatives: Any = None
@@ -445,6 +446,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             new, e = method(t, hs, x)
             error = 0.0
             for i in range(NX):
+                if OWNER[i] and v[OWNER[i]] == 0.0:
+                    continue
                 ratio = abs(e[i]) / (tolerance * (NOMINAL[i] + abs(x[i])))
                 if not ratio <= error:
                     error = ratio

@@ -322,6 +322,7 @@ static int adaptive(Instance *c, double t1) {
     else dopri5(v, t, hs, x, e);
     double error = 0;
     for (int i = 0; i < NX; i++) {
+      if (OWNER[i] && v[OWNER[i]] == 0) continue; /* state of an effect that is absent */
       const double scale = v[TOLERANCE] * (NOMINAL[i] + fabs(v[IX + i]));
       const double ratio = fabs(e[i]) / scale;
       if (!(ratio <= error)) error = ratio; /* a NaN ends up here too */
