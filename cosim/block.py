@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .description import Variable
-from .errors import FmuFileError, ValueRangeError
+from .errors import FmuCallError, FmuFileError, ValueRangeError
 
 if TYPE_CHECKING:
     from .instance import Instance
@@ -106,8 +106,27 @@ class Block:
             self.values[:] = values
         for part in self.parts:
             if part.buffer is not self.values:
-                part.buffer[:] = self.values[part.slots]
+                numbers = self.values[part.slots]
+                if part.buffer.dtype.kind in "iu" and not _fit(numbers, part.buffer.dtype).all():
+                    raise self.unfit(part)
+                part.buffer[:] = numbers
             self._instance.set_part(part)
+
+    def unfit(self, part: Part) -> FmuCallError:
+        """The error for values that do not fit an integer type."""
+        numbers = self.values[part.slots]
+        bad = int(np.flatnonzero(~_fit(numbers, part.buffer.dtype))[0])
+        name = self.names[int(np.arange(self.values.size)[part.slots][bad])]
+        return self._instance.refusal(
+            f"setting {name}: {numbers[bad]:g} does not fit type {part.type}"
+        )
+
+
+def _fit(numbers: Vector, dtype: Any) -> NDArray[np.bool_]:
+    """Whether numbers can be cut to integers of this type."""
+    limits, cut = np.iinfo(dtype), np.trunc(numbers)
+    # float(max) of 64 bits rounds up to the first number that does not fit
+    return np.asarray((cut >= float(limits.min)) & (cut < float(limits.max) + 1.0))
 
 
 def check_values(where: str, variables: Sequence[Variable], value: Any) -> Vector:

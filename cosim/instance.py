@@ -179,6 +179,11 @@ class Instance:
             messages,
         )
 
+    def refusal(self, what: str) -> FmuCallError:
+        """The error for a value that is not given to the FMU at all."""
+        when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
+        return FmuCallError(f"{self.label}: {what}{when}")
+
     def take_messages(self) -> tuple[str, ...]:
         """What the FMU logged since the last call."""
         return logs.take(self._key)

@@ -324,15 +324,19 @@ class _Run:
 
     def fail(self, bound: kernel.Kernel, status: int) -> None:
         """Raise what the executor in Python would have raised."""
-        code, index, call = bound.failed()
-        if Op(code) is Op.RECORD:
+        op, instance, part = bound.failed()
+        if instance is None:
             self.record()
-        if Op(code) is Op.STEP:
-            instance = self.instances[index]
+            return
+        if op is Op.STEP:
             instance.time = self.instants[self.index]
             raise instance.failed_step(self.master.step, status)
-        instance, part = bound.part(call)
-        raise instance.failed_access(Op(code) is Op.GET, part, status)
+        if op is Op.GET or self.index:  # it has stepped: where it is by its own count
+            last = self.index if op is Op.GET else self.index - 1
+            instance.time = self.instants[last] + self.master.step
+        if status == kernel.UNFIT:
+            raise self.inputs[self.instances.index(instance)].unfit(part)
+        raise instance.failed_access(op is Op.GET, part, status)
 
     def initialize(self) -> None:
         """Initialize all instances together: exchange connected values until nothing changes."""

@@ -12,7 +12,8 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..instance import Instance
-from ..plan import Plan
+from ..plan import Op, Plan
 
 SOURCE = Path(__file__).with_name("kernel.c")
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
@@ -35,29 +36,59 @@ _TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Boolean2": 6
 
 class _Call(ct.Structure):
     _fields_ = (
-        ("get", _P), ("set", _P), ("references", _P), ("buffer", _P), ("slots", _P),
+        ("component", _P), ("function", _P), ("references", _P), ("buffer", _P), ("slots", _P),
         ("n_references", _I64), ("n_values", _I64), ("type", _I32), ("version", _I32),
     )  # fmt: skip
 
 
 class _Member(ct.Structure):
+    _fields_ = (("component", _P), ("step", _P))
+
+
+class _Instruction(ct.Structure):
+    _fields_ = (("operation", _I64), ("first", _I64), ("last", _I64))
+
+
+class _Copy(ct.Structure):
+    _fields_ = (("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64))
+
+
+class _Term(ct.Structure):
     _fields_ = (
-        ("component", _P), ("step", _P), ("first_output", _I64), ("last_output", _I64),
-        ("first_input", _I64), ("last_input", _I64), ("version", _I32), ("stopped", _I32),
+        ("sign", _D), ("previous", _D), ("output", _I64), ("input", _I64), ("bond", _I64),
     )  # fmt: skip
 
 
 class _Run(ct.Structure):
     _fields_ = (
-        ("members", _P), ("calls", _P), ("values", _P), ("operations", _P), ("n_operations", _I64),
-        ("times", _P), ("step", _D), ("external", _P), ("external_slot", _P), ("n_external", _I64),
-        ("copy_source", _P), ("copy_target", _P), ("copy_gain", _P), ("copy_offset", _P),
-        ("record_source", _P), ("record_gain", _P), ("record_offset", _P), ("n_record", _I64),
-        ("every", _I64), ("row", _I64), ("rows", _P), ("bond_index", _P), ("bond_output", _P),
-        ("bond_input", _P), ("bond_sign", _P), ("bond_previous", _P), ("bond_energy", _P),
-        ("n_bond_terms", _I64), ("index", _I64), ("failed_operation", _I64), ("failed_call", _I64),
-        ("failed_status", _I64),
+        ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
+        ("n_instructions", _I64), ("times", _P), ("step", _D), ("external", _P),
+        ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
+        ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
+        ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
+        ("next_record", _I64), ("failed_call", _I64), ("failed_member", _I64),
     )  # fmt: skip
+
+
+class _Code(IntEnum):
+    """Operations of the compiled executor."""
+
+    EXTERNAL = 0
+    RECORD = 1
+    COPY = 2
+    SCALE = 3
+    CALL2 = 4
+    CALL3 = 5
+    CONVERT_SET = 6
+    CONVERT_GET = 7
+    STEP2 = 8
+    STEP3 = 9
+    ENERGY = 10
+
+
+UNFIT = 7
+"""Status of a set call that was not made, because a number does not fit the variable's type."""
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term)
 
 
 def library_name() -> str:
@@ -87,8 +118,8 @@ def _load(path: str) -> Any:
     library = ct.CDLL(path)
     library.cosim_run.argtypes, library.cosim_run.restype = [_P, _I64], ct.c_int
     library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], _I64
-    sizes = [library.cosim_size(what) for what in range(3)]
-    expected = [ct.sizeof(kind) for kind in (_Run, _Member, _Call)]
+    sizes = [library.cosim_size(what) for what in range(len(_STRUCTURES))]
+    expected = [ct.sizeof(kind) for kind in _STRUCTURES]
     if sizes != expected:
         raise OSError(f"{path}: its structures have sizes {sizes}, expected {expected}")
     return library
@@ -134,59 +165,87 @@ class Kernel:
             raise FileNotFoundError(library_name())
         self._library = _load(str(path))
         layout = plan.layout
-        calls: list[_Call] = []
-        self._parts: list[tuple[Instance, Any]] = []
         self._keep: list[Any] = [instances, outputs, inputs]
-        members = []
-        for index, instance in enumerate(instances):
-            spans = []
-            for block, span in ((outputs[index], layout.outputs), (inputs[index], layout.inputs)):
+        self._parts: list[tuple[Op, Instance, Any]] = []
+        self._instances = instances
+        calls: list[_Call] = []
+        spans: dict[tuple[Op, int], tuple[int, int]] = {}
+        for op, blocks, slots in (
+            (Op.SET, inputs, layout.inputs),
+            (Op.GET, outputs, layout.outputs),
+        ):
+            for index, (instance, block) in enumerate(zip(instances, blocks, strict=True)):
                 first = len(calls)
                 for part in block.parts:
-                    calls.append(self._call(instance, block, part, int(span[index, 0])))
-                    self._parts.append((instance, part))
-                spans += [first, len(calls)]
-            version = instance.binding.version
-            step_address = instance.functions[f"fmi{version}DoStep"]
-            members.append(_Member(instance.address, step_address, *spans, version, 0))
-        self._members = (_Member * len(members))(*members)
-        self._calls = (_Call * max(len(calls), 1))(*calls)
-        self.bond_previous = np.zeros(len(layout.bond_output))
-        arrays = {
-            "values": values, "operations": plan.step, "times": times, "external": external,
-            "external_slot": layout.external, "copy_source": layout.copy_source,
-            "copy_target": layout.copy_target, "copy_gain": layout.copy_gain,
-            "copy_offset": layout.copy_offset, "record_source": layout.record_source,
-            "record_gain": layout.record_gain, "record_offset": layout.record_offset, "rows": rows,
-            "bond_index": layout.bond_index, "bond_output": layout.bond_output,
-            "bond_input": layout.bond_input, "bond_sign": layout.bond_sign,
-            "bond_previous": self.bond_previous, "bond_energy": bond_energy,
-        }  # fmt: skip
-        for name, array in arrays.items():
-            if not array.flags.c_contiguous or array.dtype not in (np.float64, np.int64):
-                raise TypeError(f"{name} is not a contiguous array of float64 or int64")
-        self._keep.append(arrays)
+                    calls.append(self._call(op, instance, block, part, int(slots[index, 0])))
+                    self._parts.append((op, instance, part))
+                spans[op, index] = (first, len(calls))
         self.run = _Run(
-            members=ct.addressof(self._members), calls=ct.addressof(self._calls),
-            n_operations=len(plan.step), step=step, n_external=external.shape[1],
-            n_record=rows.shape[1], every=every, n_bond_terms=len(layout.bond_output),
-            **{name: array.ctypes.data for name, array in arrays.items()},
+            members=self._structures(_Member, (_member(instance) for instance in instances)),
+            calls=self._structures(_Call, calls),
+            values=self._array(values),
+            times=self._array(times),
+            step=step,
+            external=self._array(external),
+            external_slot=self._array(layout.external),
+            n_external=external.shape[1],
+            copies=self._structures(
+                _Copy,
+                zip(
+                    layout.copy_gain.tolist(), layout.copy_offset.tolist(),
+                    layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True,
+                ),
+            ),
+            records=self._structures(
+                _Copy,
+                zip(
+                    layout.record_gain.tolist(), layout.record_offset.tolist(),
+                    layout.record_source.tolist(), range(rows.shape[1]), strict=True,
+                ),
+            ),
+            n_record=rows.shape[1],
+            every=every,
+            rows=self._array(rows),
+            terms=self._structures(
+                _Term,
+                zip(
+                    layout.bond_sign.tolist(), [0.0] * len(layout.bond_sign),
+                    layout.bond_output.tolist(), layout.bond_input.tolist(),
+                    layout.bond_index.tolist(), strict=True,
+                ),
+            ),
+            bond_energy=self._array(bond_energy),
+            n_terms=len(layout.bond_output),
+            carried=_carried(plan),
         )  # fmt: skip
-        self._plan = plan
+        instructions = _instructions(plan, spans, calls, instances)
+        self.run.instructions = self._structures(_Instruction, instructions)
+        self.run.n_instructions = len(instructions)
 
-    def _call(self, instance: Instance, block: Block, part: Any, base: int) -> _Call:
-        direct = part.buffer is block.values
+    def _array(self, array: NDArray[Any]) -> int:
+        """Address of an array of 8-byte numbers, which is kept alive."""
+        if not array.flags.c_contiguous or array.dtype not in (np.float64, np.int64):
+            raise TypeError("not a contiguous array of float64 or int64")
+        self._keep.append(array)
+        return int(array.ctypes.data)
+
+    def _structures(self, kind: type[ct.Structure], rows: Iterable[Any]) -> int:
+        """Address of C structures with these contents, which are kept alive."""
+        items = [row if isinstance(row, kind) else kind(*row) for row in rows]
+        array = (kind * max(len(items), 1))(*items)
+        self._keep.append(array)
+        return ct.addressof(array)
+
+    def _call(self, op: Op, instance: Instance, block: Block, part: Any, base: int) -> _Call:
         slots = 0
-        if not direct:
+        if part.buffer is not block.values:
             within = np.arange(block.values.size)[part.slots]
-            absolute = np.ascontiguousarray(within + base, dtype=np.int64)
-            self._keep.append(absolute)
-            slots = absolute.ctypes.data
-        functions = instance.functions
+            slots = self._array(np.ascontiguousarray(within + base, dtype=np.int64))
+        names = instance.binding.SET if op is Op.SET else instance.binding.GET
         return _Call(
-            functions[instance.binding.GET[part.type]], functions[instance.binding.SET[part.type]],
-            part.references.ctypes.data, part.buffer.ctypes.data, slots, part.references.size,
-            part.buffer.size, _TYPE_CODES[part.type], instance.binding.version,
+            instance.address, instance.functions[names[part.type]], part.references.ctypes.data,
+            part.buffer.ctypes.data, slots, part.references.size, part.buffer.size,
+            _TYPE_CODES[part.type], instance.binding.version,
         )  # fmt: skip
 
     def advance(self, last: int) -> int:
@@ -195,16 +254,71 @@ class Kernel:
 
     def restart(self) -> None:
         """Begin again at the first communication point."""
-        self.run.index = self.run.row = 0
-        self.bond_previous[:] = 0.0
-        for member in self._members:
-            member.stopped = 0
+        self.run.index = self.run.row = self.run.next_record = 0
 
-    def failed(self) -> tuple[int, int, int]:
-        """What failed: (operation code, instance, call)."""
-        operation, instance, _ = (int(n) for n in self._plan.step[self.run.failed_operation])
-        return operation, instance, int(self.run.failed_call)
+    def failed(self) -> tuple[Op, Instance | None, Any]:
+        """What failed: operation, the instance and, for get and set calls, the part of its block.
 
-    def part(self, call: int) -> tuple[Instance, Any]:
-        """Instance and block part of a call."""
-        return self._parts[call]
+        A recorded value that is not finite belongs to no instance.
+        """
+        call, member = int(self.run.failed_call), int(self.run.failed_member)
+        if call >= 0:
+            return self._parts[call]
+        if member >= 0:
+            return Op.STEP, self._instances[member], None
+        return Op.RECORD, None, None
+
+
+def _member(instance: Instance) -> _Member:
+    return _Member(instance.address, instance.functions[f"fmi{instance.binding.version}DoStep"])
+
+
+def _instructions(
+    plan: Plan,
+    spans: dict[tuple[Op, int], tuple[int, int]],
+    calls: Sequence[_Call],
+    instances: Sequence[Instance],
+) -> list[tuple[int, int, int]]:
+    """The operations of a step, in order; neighbours of one kind become one."""
+    found: list[tuple[int, int, int]] = []
+
+    def add(code: _Code, first: int, last: int) -> None:
+        if found and found[-1][0] == code and found[-1][2] == first:
+            found[-1] = (code, found[-1][1], last)
+        else:
+            found.append((code, first, last))
+
+    layout = plan.layout
+    plain = (layout.copy_gain == 1.0) & (layout.copy_offset == 0.0)
+    for row in plan.step.tolist():
+        op, a, b = Op(row[0]), row[1], row[2]
+        if op is Op.COPY:
+            for index in range(a, b):
+                add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
+        elif op is Op.STEP:
+            add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+        elif op in (Op.SET, Op.GET):
+            for index in range(*spans[op, a]):
+                code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3
+                if calls[index].slots:
+                    code = _Code.CONVERT_SET if op is Op.SET else _Code.CONVERT_GET
+                add(code, index, index + 1)
+        else:
+            found.append((_Code[op.name], a, b))
+    return found
+
+
+def _carried(plan: Plan) -> bool:
+    """Whether the outputs that a step ends with are those that the next one notes for its bonds.
+
+    So it is if energy is added after the last get call, and noted before the first one.
+    """
+    codes = plan.step[:, 0].tolist()
+    gets = [index for index, code in enumerate(codes) if code == Op.GET]
+    notes = [index for index, code in enumerate(codes) if code == Op.RECORD]
+    sums = [index for index, code in enumerate(codes) if code == Op.ENERGY]
+    return (
+        len(notes) == len(sums) == 1
+        and notes[0] < min(gets, default=len(codes))
+        and sums[0] > max(gets, default=-1)
+    )
