@@ -193,15 +193,17 @@ def _draw_paths(
 ) -> None:
     inside = _window(item, recording.time)
     unit, seen = "", set()
-    for number, pair in enumerate(item.paths):
+    for pair in item.paths:
         reference = _reference(references, pair)
-        scale = _Scale(recording.units.get(pair[0], ""), item.unit)
-        unit = scale.unit
         if reference is not None and reference.text not in seen:
+            scale = _Scale(recording.units.get(pair[0], ""), item.unit)
             seen.add(reference.text)
             points = scale(convert_reference(recording, reference))[_window(item, reference.times)]
             axis.plot(points[:, 0], points[:, 1], label=reference.text, **MEASURED)  # type: ignore[arg-type]
             axis.plot(points[-1:, 0], points[-1:, 1], "o", color="black", markersize=6)
+    for number, pair in enumerate(item.paths):
+        scale = _Scale(recording.units.get(pair[0], ""), item.unit)
+        unit = scale.unit
         x, y = (scale(recording[name])[inside] for name in pair)
         name = item.names[number] if item.names else ", ".join(pair)
         (line,) = axis.plot(x, y, _LINES[number % 4], linewidth=1.2, label=name)

@@ -301,6 +301,10 @@ class _Reader:
             if "values" not in entry:
                 raise self.fail(f"{what}: times without values")
             return entry["times"], entry["values"], entry.get("unit", ""), f"{what}: table"
+        if "constant" in entry:
+            times = self.grid()
+            value = np.full_like(times, float(entry["constant"]))
+            return times, value, entry.get("unit", ""), f"{what}: constant"
         if "file" not in entry and "data" not in entry:
             raise self.fail(
                 f"{what}: give constant, times and values, file and column, or data and column"
@@ -374,13 +378,17 @@ class _Reader:
             text or ", ".join(part[3] for part in parts),
         )
 
+    def grid(self) -> Any:
+        """Times of the recorded points."""
+        period = self.optional(self.table.get("record", {}), "period") or self.number("step")
+        count = round(self.number("duration") / period)
+        return self.number("start", 0.0) + period * np.arange(count + 1, dtype=np.float64)
+
     def circle(self, name: str, entry: Any, signals: tuple[str, ...], text: str) -> Reference:
         what = f"compare {name}"
         _only(self.file.path, entry, _CIRCLE_KEYS, f"{what}, circle")
         if len(signals) != 2 or set(entry) != _CIRCLE_KEYS:
             raise self.fail(f"{what}: a circle takes two signals, start, centre and rate")
-        period = self.optional(self.table.get("record", {}), "period") or self.number("step")
-        count = round(self.number("duration") / period)
-        times = self.number("start", 0.0) + period * np.arange(count + 1, dtype=np.float64)
+        times = self.grid()
         points = circle(times - times[0], entry["start"], entry["centre"], float(entry["rate"]))
         return Reference(signals, times, points, "", text or f"{what}: circle")
