@@ -98,3 +98,10 @@ def test_nothing_is_nan_at_rest(variant: str) -> None:
         seeds = [np.ones_like(np.asarray(item, dtype=float)) for item in args]
         for result in oracle.functions.directional(*args, *seeds):
             assert np.isfinite(np.asarray(result)).all()
+
+
+def test_six_dof_base_stays_cheap() -> None:
+    """About 5 us per internal step ask for at most some 1500 and 10000 operations."""
+    functions = Oracle(build_model("mobile_base/six_dof")).functions
+    assert functions.derivatives.n_instructions() < 1500
+    assert functions.jacobian.n_instructions() < 10000
