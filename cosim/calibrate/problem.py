@@ -153,11 +153,14 @@ class Sensitivity(NamedTuple):
         run: its name.
         columns: indices of the parameters that concern it.
         values: (samples, channels, columns); NaN where nothing was measured.
+        roughness: half the difference between the derivatives on both sides, where both were
+            taken, else zeros; large where the model jumps.
     """
 
     run: str
     columns: NDArray[np.intp]
     values: Vector
+    roughness: Vector
 
 
 class Problem:
@@ -395,7 +398,7 @@ class Problem:
         }
         sides = {i: self._sides(theta, i, central, relative) for i in wanted}
         for run in runs:
-            if any(0.0 in sides[i] for i in owned[run.name]):
+            if central or any(0.0 in sides[i] for i in owned[run.name]):
                 tasks.append((run, -1, 0.0))
             tasks += [(run, i, h) for i in owned[run.name] for h in sides[i] if h]
 
@@ -413,12 +416,16 @@ class Problem:
             gap = np.where(np.isfinite(run.data), 0.0, np.nan)
             mine = owned[run.name]
             values = np.empty((*run.data.shape, len(mine)))
+            rough = np.zeros_like(values)
             for place, i in enumerate(mine):
                 low, high = sides[i]
                 first = found[run.name, i if low else -1, low]
                 second = found[run.name, i if high else -1, high]
                 values[:, :, place] = (second - first) / (high - low) / self.sigma + gap
-            output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values))
+                if low and high:
+                    bend = first + second - 2.0 * found[run.name, -1, 0.0]
+                    rough[:, :, place] = bend / (high - low) / self.sigma + gap
+            output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))
         return output
 
     def _sides(

@@ -1,0 +1,441 @@
+"""Bounded weighted least squares over all identification runs.
+
+Levenberg-Marquardt in parameters scaled by their spans, so that combinations that the runs cannot
+tell apart stay where they began. Limits whose integrators stop tick by tick make the cost stepwise:
+the Jacobian is taken over wide steps first, and a search along its main directions, which needs no
+derivatives, ends the fit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ..errors import FmuCallError
+from .problem import Problem, Sensitivity
+
+Vector = NDArray[np.float64]
+BLOCK = 1.0
+"""Length of the blocks over which residuals may be correlated [s]."""
+STEPS = (2e-2, 5e-3, 1e-2)
+"""Steps of differences over the span, from the first iterations to the last."""
+REUSED = 0.02
+"""A Jacobian is used again after a step that lowered the cost by this fraction."""
+DISTRUST = 4.0
+"""Multiple of the disagreement of both sides that is taken off the information of a run."""
+KNOWN = 0.25
+"""A combination is identifiable if its standard deviation is below this fraction of the span."""
+PURPOSE = "identification"
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A direction of parameters that the runs do not determine.
+
+    Attributes:
+        weights: parameter -> change, in spans, along the direction (unit length).
+        deviation: standard deviation along it that the data leave, in spans.
+    """
+
+    weights: dict[str, float]
+    deviation: float
+
+    def __str__(self) -> str:
+        main = sorted(self.weights.items(), key=lambda item: -abs(item[1]))
+        return " ".join(f"{value:+.2f}*{name}" for name, value in main if abs(value) > 0.15)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Calibrated parameters.
+
+    Attributes:
+        problem: what was fitted.
+        theta: values of all parameters.
+        covariance: of the parameters; sandwich over blocks, so correlated residuals count.
+        low, high: 95 % intervals, cut at the bounds.
+        identifiable: per parameter whether the data say more than the bounds.
+        combinations: what the runs cannot tell apart.
+        at_bound: parameters that ended at a bound.
+        cost: half the sum of squared residuals over sigma, priors included.
+        count: residuals.
+        iterations, evaluations: of the fit.
+        jacobian, residuals: at the solution, by run.
+    """
+
+    problem: Problem
+    theta: Vector
+    covariance: Vector
+    low: Vector
+    high: Vector
+    identifiable: NDArray[np.bool_]
+    combinations: tuple[Combination, ...]
+    at_bound: tuple[str, ...]
+    cost: float
+    count: int
+    iterations: int
+    evaluations: int
+    jacobian: list[Sensitivity] = field(repr=False)
+    residuals: list[tuple[str, Vector]] = field(repr=False)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameter -> value."""
+        return dict(zip(self.problem.names, self.theta.tolist(), strict=True))
+
+    @property
+    def deviation(self) -> Vector:
+        """Standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+class Normal:
+    """Normal equations in scaled parameters, gathered run by run.
+
+    Where the model jumps (an integrator that stops a tick earlier), differences over a small step
+    are noise that looks like information. What the derivatives on both sides do not agree on is
+    taken off the run's matrix, and the run's gradient is reduced with it.
+
+    Attributes:
+        matrix, gradient: J^T J and J^T r, with priors.
+        scores: J^T r of each block (rows), for the sandwich.
+        rough: whether any run jumps.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        theta: Vector,
+        sensitivities: Iterable[Sensitivity],
+        residuals: Iterable[tuple[str, Vector]],
+        weight: Callable[[Vector], Vector] | None = None,
+        block: float = BLOCK,
+    ) -> None:
+        size, scale = theta.size, problem.scale
+        self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
+        self.rough = False
+        scores = []
+        for item, (name, residual) in zip(sensitivities, residuals, strict=True):
+            run = problem.run(name)
+            columns = item.columns
+            derivative = item.values * scale[columns]
+            good = np.isfinite(residual) & np.isfinite(derivative).all(axis=2)
+            errors = np.where(good, residual, 0.0)
+            factor = np.where(good, 1.0 if weight is None else weight(errors), 0.0)
+            derivative = np.where(good[:, :, None], derivative, 0.0)
+            flat = derivative.reshape(-1, columns.size)
+            matrix = (flat * factor.reshape(-1, 1)).T @ flat
+            bend = np.where(good[:, :, None], item.roughness * scale[columns], 0.0)
+            bend = bend.reshape(-1, columns.size)
+            reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
+            if share is not None:
+                self.rough |= bool(np.trace(reliable) < 0.99 * np.trace(matrix))
+            self.matrix[np.ix_(columns, columns)] += reliable
+            per_sample = np.einsum("tcp,tc->tp", derivative, factor * errors)
+            index = ((run.times - run.times[0]) / block).astype(np.intp)
+            sums = np.zeros((int(index[-1]) + 1, size))
+            for place, column in enumerate(columns):
+                sums[:, column] = np.bincount(index, per_sample[:, place], sums.shape[0])
+            if share is not None:
+                sums[:, columns] = sums[:, columns] @ share.T
+            scores.append(sums)
+            self.gradient += sums.sum(axis=0)
+        self.scores = np.concatenate(scores) if scores else np.zeros((0, size))
+        for i, p in enumerate(problem.parameters):
+            if p.prior:
+                ratio = scale[i] / p.prior
+                self.matrix[i, i] += ratio**2
+                self.gradient[i] -= ratio * (theta[i] - p.nominal) / p.prior
+
+
+def _reliable(matrix: Vector, bend: Vector) -> tuple[Vector, Vector | None]:
+    """The part of J^T J that both sides agree on, and the factor on J^T r (None for all of it)."""
+    if not np.any(bend):
+        return matrix, None
+    values, vectors = np.linalg.eigh(matrix - DISTRUST * bend)
+    kept = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    whole, directions = np.linalg.eigh(matrix)
+    small = whole <= 1e-12 * max(whole[-1], 1e-300)
+    inverse = (directions / np.where(small, np.inf, whole)) @ directions.T
+    return kept, kept @ inverse
+
+
+def gradient(
+    problem: Problem,
+    theta: Vector,
+    sensitivities: Iterable[Sensitivity],
+    residuals: Iterable[tuple[str, Vector]],
+    weight: Callable[[Vector], Vector] | None = None,
+) -> Vector:
+    """J^T r in scaled parameters, with priors."""
+    result = np.zeros(theta.size)
+    scale = problem.scale
+    for item, (_, residual) in zip(sensitivities, residuals, strict=True):
+        good = np.isfinite(residual) & np.isfinite(item.values).all(axis=2)
+        errors = np.where(good, residual, 0.0)
+        if weight is not None:
+            errors = errors * weight(errors)
+        values = np.where(good[:, :, None], item.values, 0.0)
+        result[item.columns] += np.einsum("tcp,tc->p", values, errors) * scale[item.columns]
+    for i, p in enumerate(problem.parameters):
+        if p.prior:
+            result[i] -= scale[i] / p.prior * (theta[i] - p.nominal) / p.prior
+    return result
+
+
+def cost_of(
+    problem: Problem, theta: Vector, residuals: Iterable[tuple[str, Vector]], cap: float = math.inf
+) -> float:
+    """Half the sum of squares; residuals beyond `cap` sigma count linearly (Huber)."""
+    total = 0.0
+    for _, residual in residuals:
+        size = np.abs(residual[np.isfinite(residual)])
+        total += float(
+            np.sum(np.where(size <= cap, 0.5 * size**2, cap * size - 0.5 * cap**2))
+            if math.isfinite(cap)
+            else 0.5 * np.sum(size**2)
+        )
+    for value, p in zip(theta.tolist(), problem.parameters, strict=True):
+        if p.prior:
+            total += 0.5 * ((value - p.nominal) / p.prior) ** 2
+    return total
+
+
+class _Fit:
+    def __init__(
+        self,
+        problem: Problem,
+        purpose: str | Iterable[str],
+        theta: Vector,
+        begun: int | None = None,
+    ) -> None:
+        self.problem = problem
+        self.purpose = purpose if isinstance(purpose, str) else list(purpose)
+        self.theta = np.clip(theta, problem.lower, problem.upper)
+        self.cap = math.inf
+        self.iterations = 0
+        self.begun = problem.evaluations if begun is None else begun
+        self.residuals = problem.residuals(self.theta, self.purpose)
+        self.cost = cost_of(problem, self.theta, self.residuals)
+
+    def set_cap(self, cap: float) -> None:
+        self.cap = cap
+        self.cost = cost_of(self.problem, self.theta, self.residuals, cap)
+
+    def weight(self, errors: Vector) -> Vector:
+        return np.minimum(1.0, self.cap / np.maximum(np.abs(errors), 1e-300))
+
+    def normal(self, relative: float, central: bool) -> Normal:
+        self.jacobian = self.problem.jacobian(
+            self.theta, self.purpose, central=central, relative=relative
+        )
+        weight = self.weight if math.isfinite(self.cap) else None
+        return Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+
+    def attempt(self, theta: Vector) -> bool:
+        """Go there if it is better."""
+        if np.array_equal(theta, self.theta):
+            return False
+        try:
+            residuals = self.problem.residuals(theta, self.purpose)
+        except FmuCallError:
+            return False
+        cost = cost_of(self.problem, theta, residuals, self.cap)
+        if not cost < self.cost:
+            return False
+        self.theta, self.residuals, self.cost = theta, residuals, cost
+        return True
+
+    def step(self, normal: Normal, damping: float) -> Vector:
+        """Damped Gauss-Newton step inside the bounds."""
+        p = self.problem
+        free = np.ones(self.theta.size, dtype=bool)
+        change = np.zeros(self.theta.size)
+        for _ in range(self.theta.size):
+            matrix = normal.matrix[np.ix_(free, free)]
+            ridge = damping * np.trace(normal.matrix) / self.theta.size + 1e-9
+            change[:] = 0.0
+            change[free] = np.linalg.solve(
+                matrix + ridge * np.eye(matrix.shape[0]), normal.gradient[free]
+            )
+            wanted = self.theta + change * p.scale
+            outside = free & (
+                ((self.theta <= p.lower) & (wanted < p.lower))
+                | ((self.theta >= p.upper) & (wanted > p.upper))
+            )
+            if not outside.any():
+                break
+            free &= ~outside
+        return np.clip(self.theta + change * p.scale, p.lower, p.upper)
+
+    def descend(self, relative: float, limit: int, tolerance: float) -> None:
+        """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
+
+        A Jacobian costs as many simulations as there are parameters, a step one; so a Jacobian is
+        used again as long as steps with it pay.
+        """
+        damping = 1e-6
+        for _ in range(limit):
+            self.iterations += 1
+            normal = self.normal(relative, central=False)
+            first = self.cost
+            for _ in range(8):
+                if self.attempt(self.step(normal, damping)):
+                    damping = max(damping * 0.1, 1e-12)
+                    break
+                damping = max(damping, 1e-9) * 10.0
+            else:
+                return
+            before = first
+            while before - self.cost > REUSED * before:
+                before = self.cost
+                normal.gradient = self.gradient()
+                if not self.attempt(self.step(normal, damping)):
+                    break
+            if first - self.cost <= tolerance * max(first, 1.0):
+                return
+
+    def gradient(self) -> Vector:
+        """J^T r with the last Jacobian and the present residuals."""
+        weight = self.weight if math.isfinite(self.cap) else None
+        return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
+
+    def polish(self, rounds: int = 2, worth: float = 0.5) -> None:
+        """Search along the main directions of the normal matrix, without derivatives."""
+        p = self.problem
+        for _ in range(rounds):
+            normal = self.normal(STEPS[-1], central=True)
+            before = self.cost
+            self.attempt(self.step(normal, 1e-9))
+            if not normal.rough:
+                return
+            values, vectors = np.linalg.eigh(normal.matrix)
+            for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
+                if value < 1.0 / KNOWN**2:
+                    continue
+                size = 1.0 / math.sqrt(value)
+                for sign in (1.0, -1.0):
+                    length = size
+                    while self.attempt(
+                        np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
+                    ):
+                        length *= 2.0
+                    if length > size:
+                        break
+            if before - self.cost < worth:
+                return
+
+
+def fit(
+    problem: Problem,
+    theta: Vector | None = None,
+    purpose: str | Iterable[str] = PURPOSE,
+    *,
+    limit: int = 25,
+    polish: bool = True,
+    robust: bool = True,
+) -> Estimate:
+    """Estimate the parameters of a problem.
+
+    Args:
+        problem: what to fit.
+        theta: where to begin, the nominal values if not given.
+        purpose: runs to fit.
+        limit: iterations at each size of difference steps.
+        polish: end with a search without derivatives.
+        robust: begin with large residuals counted linearly; off when `theta` is close.
+    """
+    begun = problem.evaluations
+    run = _Fit(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
+    if robust:
+        run = _Fit(problem, _calmest(run), run.theta)
+        sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
+        typical = float(np.median(np.abs(sizes))) if sizes.size else 1.0
+        run.set_cap(max(3.0, typical))
+        run.descend(STEPS[0], 3, 0.05)
+        run.set_cap(3.0)
+        run.descend(STEPS[1], 3, 0.01)
+        run = _Fit(problem, purpose, run.theta, begun)
+        run.set_cap(3.0)
+        run.descend(STEPS[1], 4, 0.01)
+        run.set_cap(math.inf)
+    run.descend(STEPS[1], limit, 1e-4)
+    if polish:
+        run.polish()
+    return _estimate(run)
+
+
+def _calmest(run: _Fit) -> list[str]:
+    """The half of the runs that fit best so far: those without limits and runaway errors."""
+    worth = [(float(np.nanmean(np.minimum(np.abs(r), 1e6))), name) for name, r in run.residuals]
+    return [name for _, name in sorted(worth)[: max((len(worth) + 1) // 2, 1)]]
+
+
+def _estimate(run: _Fit) -> Estimate:
+    problem = run.problem
+    normal = run.normal(STEPS[-1], central=True)
+    count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
+    scale = problem.scale
+    values, vectors = np.linalg.eigh(normal.matrix)
+    poor = values < 1.0 / KNOWN**2
+    combinations = tuple(
+        Combination(
+            dict(zip(problem.names, _signed(vectors[:, i]).tolist(), strict=True)),
+            float(1.0 / math.sqrt(max(values[i], 1e-12))),
+        )
+        for i in np.flatnonzero(poor)
+    )
+    # along directions that the data leave open, the bounds are all that is known
+    prior = 12.0
+    inverse = (vectors / (values + np.where(poor, prior, 0.0))) @ vectors.T
+    blocks = max(int(np.any(normal.scores != 0.0, axis=1).sum()), 1)
+    freedom = max(blocks - int(np.sum(~poor)), 1)
+    middle = normal.scores.T @ normal.scores * blocks / freedom
+    sandwich = inverse @ middle @ inverse
+    spread = max(2.0 * run.cost / max(count - int(np.sum(~poor)), 1), 1.0)
+    plain = inverse * spread
+    # a few blocks can seem to agree by chance: never below what white residuals give
+    factor = np.sqrt(
+        np.maximum(np.diag(plain), np.diag(sandwich)) / np.maximum(np.diag(sandwich), 1e-300)
+    )
+    covariance = sandwich * np.outer(factor, factor) * np.outer(scale, scale)
+    half = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(covariance))
+    near = 1e-6 * scale
+    at_bound = [
+        p.name
+        for p, value, margin in zip(problem.parameters, run.theta, near, strict=True)
+        if value <= p.minimum + margin or value >= p.maximum - margin
+    ]
+    return Estimate(
+        problem=problem,
+        theta=run.theta,
+        covariance=covariance,
+        low=np.maximum(run.theta - half, problem.lower),
+        high=np.minimum(run.theta + half, problem.upper),
+        identifiable=np.sqrt(np.diag(covariance)) < KNOWN * scale,
+        combinations=combinations,
+        at_bound=tuple(at_bound),
+        cost=run.cost,
+        count=count,
+        iterations=run.iterations,
+        evaluations=problem.evaluations - run.begun,
+        jacobian=run.jacobian,
+        residuals=run.residuals,
+    )
+
+
+def _signed(vector: Vector) -> Vector:
+    return vector * np.sign(vector[np.argmax(np.abs(vector))])
+
+
+def channel_rms(problem: Problem, residuals: Iterable[tuple[str, Vector]]) -> dict[str, float]:
+    """Root mean square of the residuals over sigma, by channel."""
+    stacked = np.concatenate([values for _, values in residuals])
+    with np.errstate(invalid="ignore"):
+        means = np.sqrt(np.nanmean(stacked**2, axis=0))
+    return dict(zip((c.name for c in problem.channels), means.tolist(), strict=True))
