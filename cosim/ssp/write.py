@@ -349,7 +349,7 @@ class _Writer:
                 values = " ".join(text(bool(item)) for item in items)
             elif type_ == "String":
                 values = str(items[0])
-            else:
+            else:  # enumerations too: libcosim and Ecos stop at an item's name
                 values = " ".join(text(int(item)) for item in items)
             real = type_ in ("Real", "Float64", "Float32")
             unit = units.name(variable.unit) if real and variable.unit is not None else None
