@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,8 @@ from .errors import (
     listing,
 )
 from .instance import Instance
-from .plan import Op, Plan
+from .loops import Newton
+from .plan import PARTS, Loop, Mean, Op, Plan
 from .recording import Recording
 from .signals import Signal, as_signal
 from .system import System
@@ -40,6 +41,12 @@ Vector = NDArray[np.float64]
 Driver = Signal | float | Callable[[Vector], ArrayLike]
 SWEEPS = 100
 """Exchanges during initialization before a loop is said not to settle."""
+LOOPED = 1e-9
+"""The same where loops are solved: they are to 1e-10, and other outputs follow from them."""
+PATIENCE = 25
+"""Exchanges before algebraic loops are solved by Newton's method during initialization."""
+RUNAWAY = 1e12
+"""Size of a value from which on exchanges are given up."""
 SETTLED = 1e-12
 """Relative change at which an algebraic loop counts as settled during initialization."""
 
@@ -56,6 +63,7 @@ class Master:
         executor: `c` (compiled), `python` (the reference), or `auto` (compiled if this machine
             has the library).
         scenario: name that recordings carry.
+        options: of the algorithm.
     """
 
     system: System
@@ -64,6 +72,7 @@ class Master:
     tolerance: float | None = None
     scenario: str = ""
     executor: str = "auto"
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def run(
         self,
@@ -94,12 +103,16 @@ class Master:
         wanted = self.system.signals() if record is None else record
         observed = list(dict.fromkeys(n for name in wanted for n in self._observable(name)))
         signals = self._signals(inputs or {})
-        plan = compile_plan(self.algorithm, self.system, list(signals), observed)
+        plan = self.compile(list(signals), observed)
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         external = self._external(signals, times)
         with ExitStack() as stack:
             run = _Run(self, plan, observed, external, times, every, signals, stack)
             return run.execute(count, progress)
+
+    def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
+        """The plan of the algorithm with its options."""
+        return compile_plan(self.algorithm, self.system, external, observed, self.options)
 
     # -- checks ----------------------------------------------------------------------------------
 
@@ -175,6 +188,7 @@ class Master:
             "system": self.system.name,
             "scenario": self.scenario,
             "algorithm": self.algorithm,
+            "options": {key: _plain(value) for key, value in self.options.items()},
             "step_s": self.step,
             "instances": {
                 member.name: {
@@ -191,6 +205,10 @@ class Master:
             "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
             "versions": {name: _version(name) for name in ("cosim", "numpy")},
         }
+
+
+def _plain(value: Any) -> Any:
+    return dict(value) if isinstance(value, Mapping) else value
 
 
 def _version(package: str) -> str:
@@ -242,6 +260,9 @@ class _Run:
         self.index = 0
         self.instants: list[float] = times.tolist()
         self.bound: kernel.Kernel | None = None
+        self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
+        self.history = np.zeros((len(plan.means), 3))
+        self.started = False
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -255,12 +276,11 @@ class _Run:
                 if progress is not None:
                     progress(self.index / count)
             self.finish()
-        except FmuCallError as error:
+        except (FmuCallError, AlgebraicLoopError) as error:
             time = float(self.times[self.index])
             text = f"run stopped at t = {time:.9g} s: {error}"
-            raise StepError(
-                text, error.messages, time=time, recording=self.recording(text)
-            ) from error
+            messages = error.messages if isinstance(error, FmuCallError) else ()
+            raise StepError(text, messages, time=time, recording=self.recording(text)) from error
         if progress is not None:
             progress(1.0)
         return self.recording("")
@@ -276,6 +296,9 @@ class _Run:
         self.bond_energy[:] = 0.0
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
+        self.started = False
+        for newton in self.newtons:
+            newton.valid[0] = 0
         for instance, member in zip(
             self.instances, self.master.system.members.values(), strict=True
         ):
@@ -307,6 +330,7 @@ class _Run:
             bound = kernel.Kernel(
                 self.plan, self.instances, self.outputs, self.inputs, self.values, self.times,
                 self.master.step, self.external, self.rows, self.bond_energy, self.every,
+                self.newtons, self.history,
             )  # fmt: skip
         except FileNotFoundError as error:
             raise ValueRangeError(
@@ -324,6 +348,8 @@ class _Run:
 
     def fail(self, bound: kernel.Kernel, status: int) -> None:
         """Raise what the executor in Python would have raised."""
+        if status == kernel.UNSETTLED:
+            raise self.unsolved(int(bound.run.failed_loop))
         op, instance, part = bound.failed()
         if instance is None:
             self.record()
@@ -345,22 +371,104 @@ class _Run:
             instance.enter_initialization(start, stop, self.master.tolerance)
             block.get()  # inputs that nothing sets keep the FMU's start values
         sweep = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.initial]
-        before = np.full_like(self.values, np.nan)
-        for _ in range(SWEEPS):
-            for op, a, b in sweep:
-                self.do(op, a, b)
-            if np.array_equal(before, self.values):
-                break
-            change = np.abs(self.values - before)
-            before = self.values.copy()
-        else:
-            size = np.maximum(np.abs(self.values), 1.0)
-            if not np.all(change <= SETTLED * size):
-                raise AlgebraicLoopError(self._unsettled(change))
+        begin = self.values.copy()
+        settled, change = self.exchange(sweep, PATIENCE if self.newtons else SWEEPS, SETTLED)
+        if not settled and self.newtons:
+            self.values[:] = begin
+            self.exchange(sweep, 1, SETTLED)
+            solving = [(Op(int(op)), int(a), int(b)) for op, a, b in self.plan.solving]
+            settled, change = self.exchange(solving, SWEEPS, LOOPED)
+            for index in range(len(self.instances)):
+                self.do(Op.COPY, *self.layout.copies[index].tolist())
+                self.do(Op.SET, index, 0)
+        if not settled:
+            raise AlgebraicLoopError(self._unsettled(change))
         for instance in self.instances:
             instance.exit_initialization()
         for block in self.outputs:
             block.get()
+        self.started = True
+
+    def exchange(
+        self, sweep: list[tuple[Op, int, int]], sweeps: int, tolerance: float
+    ) -> tuple[bool, Vector]:
+        """Exchange connected values until nothing changes: whether they settled, last change."""
+        before = np.full_like(self.values, np.nan)
+        change, size = before, np.ones_like(before)
+        for _ in range(sweeps):
+            for op, a, b in sweep:
+                self.do(op, a, b)
+            if np.array_equal(before, self.values):
+                return True, change
+            change, size = np.abs(self.values - before), np.maximum(np.abs(self.values), 1.0)
+            before = self.values.copy()
+            if tolerance > SETTLED and bool(np.all(change <= tolerance * size)):
+                return True, change
+            if self.newtons and np.any(size > RUNAWAY):
+                return False, change
+        return bool(np.all(change <= tolerance * size)), change
+
+    def solve(self, index: int) -> None:
+        """Solve an algebraic loop."""
+        loop, newton, values = self.plan.loops[index], self.newtons[index], self.values
+        sweep = [(Op(int(op)), int(a), int(b)) for op, a, b in loop.sweep]
+
+        def around(z: list[float]) -> list[float]:
+            values[loop.sources] = z
+            for op, a, b in sweep:
+                self.do(op, a, b)
+            found: list[float] = values[loop.sources].tolist()
+            return found
+
+        z = values[loop.sources].tolist()
+        if not newton.valid[0] and not self.started:
+            around(z)
+            jacobian = self.around_derivative(loop)
+            if jacobian is not None:
+                newton.keep(jacobian)
+        if not newton.solve(around, z):
+            raise self.unsolved(index)
+        values[loop.sources] = z  # the solution; solving again then changes nothing
+
+    def around_derivative(self, loop: Loop) -> Vector | None:
+        """dG/dz of a loop from the FMUs' directional derivatives; None if one has none."""
+        layout = self.layout
+        members = dict.fromkeys(a for op, a, _ in loop.sweep.tolist() if op == Op.GET)
+        for a in members:
+            instance = self.instances[a]
+            if not instance.description.can("providesDirectionalDerivatives"):
+                return None
+        jacobian = np.zeros((loop.sources.size, loop.sources.size))
+        for column in range(loop.sources.size):
+            tangent = np.zeros(self.values.size)
+            tangent[loop.sources[column]] = 1.0
+            for a in members:
+                first, last = layout.copies[a]
+                targets, sources = layout.copy_target[first:last], layout.copy_source[first:last]
+                tangent[targets] = tangent[sources] * layout.copy_gain[first:last]
+                seeded = [int(slot) for slot in targets if tangent[slot] != 0.0]
+                fetched = range(*layout.outputs[a].tolist())
+                if not seeded:
+                    tangent[fetched.start : fetched.stop] = 0.0
+                    continue
+                name = len(layout.instances[a]) + 1
+                tangent[fetched.start : fetched.stop] = self.instances[a].directional_derivative(
+                    [layout.names[slot][name:] for slot in fetched],
+                    [layout.names[slot][name:] for slot in seeded],
+                    tangent[seeded],
+                )
+            jacobian[:, column] = tangent[loop.sources]
+        return jacobian if np.isfinite(jacobian).all() else None
+
+    def unsolved(self, index: int) -> AlgebraicLoopError:
+        """The error for a loop without a solution."""
+        names = ", ".join(self.layout.names[slot] for slot in self.plan.loops[index].sources)
+        return AlgebraicLoopError(
+            f"{self.master.system.name}: an algebraic loop has no solution that Newton's method "
+            f"finds (unknown: {names}) at t = {self.instants[self.index]:.9g} s\n"
+            f"algebraic loop:\n{self.plan.loops[index].text}\n"
+            "Take a component with a state in the loop (an elastic gearbox, a compliant contact)"
+        )
 
     def _unsettled(self, change: Vector) -> str:
         system = self.master.system
@@ -401,6 +509,33 @@ class _Run:
                 self.record()
             case Op.ENERGY:
                 self.account()
+            case Op.SOLVE:
+                self.solve(a)
+            case Op.NOTE:
+                self.history[:, 1:] = self.history[:, :-1].copy()
+                self.history[:, 0] = [values[mean.source] for mean in self.plan.means]
+            case Op.EXTRAPOLATE:
+                for mean, past in zip(self.plan.means[a:b], self.history[a:b], strict=True):
+                    values[mean.target] = self.mean(mean, past.tolist()) * mean.gain + mean.offset
+            case Op.SUBSTEP:
+                parts, part = divmod(b, PARTS)
+                size = self.master.step
+                time = self.instants[self.index] + part * size / parts
+                self.instances[a].step(time, size / parts)
+
+    def mean(self, mean: Mean, past: list[float]) -> float:
+        """Mean over the step of the polynomial through the last values of a source."""
+        now = float(self.values[mean.source])
+        order = min(mean.order, self.index + mean.ahead)
+        if mean.ahead:
+            if order == 1:
+                return 0.5 * (now + past[0])
+            return (5.0 * now + 8.0 * past[0] - past[1]) / 12.0
+        if order == 0:
+            return past[0]
+        if order == 1:
+            return 1.5 * past[0] - 0.5 * past[1]
+        return (23.0 * past[0] - 16.0 * past[1] + 5.0 * past[2]) / 12.0
 
     def record(self) -> None:
         layout, values = self.layout, self.values

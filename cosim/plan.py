@@ -9,7 +9,7 @@ all there is are arrays of numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -31,6 +31,14 @@ class Op(IntEnum):
     STEP = 4  # instance a goes one communication step
     GET = 5  # fetch outputs of instance a
     ENERGY = 6  # add the energy that went over each bond in this step
+    SOLVE = 7  # solve algebraic loop a
+    NOTE = 8  # remember the outputs that are extrapolated
+    EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step * gain + offset
+    SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
+    ITERATE = 11  # all instances step, again and again, until inputs fit outputs (Python only)
+
+
+PARTS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,58 @@ class Layout:
 
 
 @dataclass(frozen=True)
+class Loop:
+    """An algebraic loop, cut at some outputs.
+
+    Attributes:
+        sources: slots of the outputs at which it is cut, the unknowns.
+        sweep: operations that pass on their values once around the loop and fetch them again.
+        text: the loop port by port.
+    """
+
+    sources: Integers
+    sweep: Integers
+    text: str
+
+
+@dataclass(frozen=True)
+class Mean:
+    """An input that gets the mean of a polynomial through its source's values.
+
+    Attributes:
+        source, target: slots.
+        gain, offset: target = gain * mean + offset.
+        order: of the polynomial.
+        ahead: the source is at the end of the step already (interpolation).
+    """
+
+    source: int
+    target: int
+    gain: float
+    offset: float
+    order: int
+    ahead: bool
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Settings of the algorithms that repeat steps.
+
+    Attributes:
+        tolerance: relative change of exchanged values at which they count as settled; of step
+            control, the error of one step.
+        sweep: operations that make outputs consistent with inputs at one instant.
+        smooth: per copy, whether its values are continuous in time.
+        energy: step control: energy that the coupling may invent, relative to what it passes on.
+    """
+
+    tolerance: float
+    sweep: Integers
+    smooth: NDArray[np.bool_]
+    energy: float = np.inf
+
+
+@dataclass(frozen=True)
 class Plan:
     """Operations over a layout.
 
@@ -82,6 +142,11 @@ class Plan:
         initial: one sweep over the instances during initialization, repeated until nothing changes.
         step: one communication step.
         final: at the end of the run.
+        loops: what SOLVE solves.
+        solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
+            loops solved.
+        means: what EXTRAPOLATE sets.
+        iteration: what ITERATE and step control need.
     """
 
     algorithm: str
@@ -89,6 +154,10 @@ class Plan:
     initial: Integers
     step: Integers
     final: Integers
+    loops: tuple[Loop, ...] = ()
+    solving: Integers = field(default_factory=lambda: operations(()))
+    means: tuple[Mean, ...] = ()
+    iteration: Iteration | None = None
 
 
 def operations(items: Iterable[Sequence[int]]) -> Integers:
@@ -198,6 +267,6 @@ def exchange(layout: Layout, index: int) -> list[tuple[int, ...]]:
     return [(Op.COPY, first, last), (Op.SET, index)]
 
 
-def final_operations() -> Integers:
-    """Operations at the end of a run."""
-    return operations([(Op.EXTERNAL,), (Op.RECORD,)])
+def final_operations(consistent: Sequence[tuple[int, ...]] = ()) -> Integers:
+    """Operations at the end of a run; `consistent` are those before recording."""
+    return operations([(Op.EXTERNAL,), *consistent, (Op.RECORD,)])

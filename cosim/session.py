@@ -18,9 +18,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .algorithms import compile_plan
 from .block import Block, check_values
-from .errors import FmuCallError, StepError, ValueRangeError
+from .errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
 from .master import Driver, Master, _Run
 
 Vector = NDArray[np.float64]
@@ -53,7 +52,7 @@ class Session:
         count = master._count(duration, every)
         observed = list(dict.fromkeys(n for name in record for n in master._observable(name)))
         signals = master._signals(inputs or {})
-        plan = compile_plan(master.algorithm, master.system, list(signals), observed)
+        plan = master.compile(list(signals), observed)
         times: Vector = start + master.step * np.arange(count + 1, dtype=np.float64)
         external = master._external(signals, times)
         self.master, self.names, self.count = master, tuple(observed), count
@@ -103,10 +102,11 @@ class Session:
         try:
             self._advance(self.count)
             run.finish()
-        except FmuCallError as error:
+        except (FmuCallError, AlgebraicLoopError) as error:
             time = float(run.times[min(run.index, self.count)])
             text = f"run stopped at t = {time:.9g} s: {error}"
-            raise StepError(text, error.messages, time=time) from error
+            messages = error.messages if isinstance(error, FmuCallError) else ()
+            raise StepError(text, messages, time=time) from error
         return self.times, run.rows[: run.row].copy()
 
     def close(self) -> None:

@@ -6,27 +6,52 @@ Instances behind others see the end values of the step, so a chain in the order 
 feedthrough passes a signal on without delay. First order in the communication step; the result
 depends on the order.
 
-Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (sequential scheme).
+Options:
+    extrapolation: order 1 or 2 gives continuous inputs the mean over the step of the polynomial
+        through the last outputs; where the source has stepped already and has no direct
+        feedthrough, its new value counts too (weights of Adams and Moulton). Second order.
+
+Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (sequential scheme); Busch,
+Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..coupling import means
+from ..loops import consistent, find_loops
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 from ..system import System
 
 
-def compile_plan(system: System, external: Sequence[str], observed: Sequence[str]) -> Plan:
+def compile_plan(
+    system: System, external: Sequence[str], observed: Sequence[str], *, extrapolation: int = 0
+) -> Plan:
     """Compile a system."""
     layout = lay_out(system, external, observed)
     position = {name: index for index, name in enumerate(layout.instances)}
-    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), (Op.RECORD,)]
+    extrapolated, spans = means(system, layout, extrapolation, system.order())
+    loops = find_loops(system, layout)
+    fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
+    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *fresh, (Op.RECORD,)]
+    if extrapolated:
+        step.append((Op.NOTE,))
     for name in system.order():
         index = position[name]
-        step += exchange(layout, index)
-        step += [(Op.STEP, index), (Op.GET, index)]
+        copy, set_ = exchange(layout, index)
+        step.append(copy)
+        if spans[index][0] < spans[index][1]:
+            step.append((Op.EXTRAPOLATE, *spans[index]))
+        step += [set_, (Op.STEP, index), (Op.GET, index)]
     step.append((Op.ENERGY,))
     return Plan(
-        "gauss_seidel", layout, initial_sweep(system, layout), operations(step), final_operations()
+        "gauss_seidel",
+        layout,
+        initial_sweep(system, layout),
+        operations(step),
+        final_operations(fresh),
+        tuple(loop for _, loop in loops),
+        operations(consistent(system, layout, loops, only_loops=False)),
+        tuple(extrapolated),
     )

@@ -5,30 +5,60 @@
 First order in the communication step. An output with direct feedthrough is that of the held inputs,
 so a chain of n such instances delays a signal by n steps. Independent of the order of instances.
 
-Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (parallel scheme).
+Options:
+    extrapolation: order 1 or 2 gives continuous inputs the mean over the step of the polynomial
+        through the last outputs (weights of Adams and Bashforth), and outputs with direct
+        feedthrough are fetched anew at t_k; second order in the communication step.
+    substeps: instance -> n, for instances that go n steps per communication step and exchange at
+        each; what comes from slower instances is held.
+
+Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (parallel scheme); Busch,
+Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from ..coupling import factors, means, side_by_side
+from ..loops import consistent, find_loops
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..system import System
 
 
-def compile_plan(system: System, external: Sequence[str], observed: Sequence[str]) -> Plan:
+def compile_plan(
+    system: System,
+    external: Sequence[str],
+    observed: Sequence[str],
+    *,
+    extrapolation: int = 0,
+    substeps: Mapping[str, int] | None = None,
+) -> Plan:
     """Compile a system."""
     layout = lay_out(system, external, observed)
     everyone = range(len(layout.instances))
-    step = [
-        (Op.EXTERNAL,),
-        (Op.RECORD,),
-        (Op.COPY, 0, len(layout.copy_source)),
-        *[(Op.SET, index) for index in everyone],
-        *[(Op.STEP, index) for index in everyone],
-        *[(Op.GET, index) for index in everyone],
-        (Op.ENERGY,),
-    ]
+    parts = factors(system, substeps)
+    extrapolated, spans = means(system, layout, extrapolation)
+    loops = find_loops(system, layout)
+    fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
+    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *fresh, (Op.RECORD,)]
+    if extrapolated:
+        step.append((Op.NOTE,))
+    if max(parts.values()) > 1:
+        step += side_by_side(layout, parts, spans)
+    else:
+        step.append((Op.COPY, 0, len(layout.copy_source)))
+        if extrapolated:
+            step.append((Op.EXTRAPOLATE, 0, len(extrapolated)))
+        step += [(op, index) for op in (Op.SET, Op.STEP, Op.GET) for index in everyone]
+    step.append((Op.ENERGY,))
     return Plan(
-        "jacobi", layout, initial_sweep(system, layout), operations(step), final_operations()
+        "jacobi",
+        layout,
+        initial_sweep(system, layout),
+        operations(step),
+        final_operations(fresh),
+        tuple(loop for _, loop in loops),
+        operations(consistent(system, layout, loops, only_loops=False)),
+        tuple(extrapolated),
     )

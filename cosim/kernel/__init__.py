@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..instance import Instance
+from ..loops import Newton
 from ..plan import Op, Plan
 
 SOURCE = Path(__file__).with_name("kernel.c")
@@ -59,6 +60,20 @@ class _Term(ct.Structure):
     )  # fmt: skip
 
 
+class _Loop(ct.Structure):
+    _fields_ = (
+        ("sources", _P), ("inverse", _P), ("valid", _P), ("work", _P), ("n", _I64),
+        ("first", _I64), ("last", _I64),
+    )  # fmt: skip
+
+
+class _Mean(ct.Structure):
+    _fields_ = (
+        ("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64), ("order", _I64),
+        ("ahead", _I64),
+    )  # fmt: skip
+
+
 class _Run(ct.Structure):
     _fields_ = (
         ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
@@ -66,7 +81,8 @@ class _Run(ct.Structure):
         ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
-        ("next_record", _I64), ("failed_call", _I64), ("failed_member", _I64),
+        ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P), ("n_means", _I64),
+        ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
     )  # fmt: skip
 
 
@@ -84,11 +100,17 @@ class _Code(IntEnum):
     STEP2 = 8
     STEP3 = 9
     ENERGY = 10
+    SOLVE = 11
+    NOTE = 12
+    EXTRAPOLATE = 13
+    SUBSTEP = 14
 
 
 UNFIT = 7
 """Status of a set call that was not made, because a number does not fit the variable's type."""
-_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term)
+UNSETTLED = 8
+"""Status of an algebraic loop that has no solution or does not settle."""
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean)
 
 
 def library_name() -> str:
@@ -144,6 +166,8 @@ class Kernel:
         times, external: communication points and the external inputs there.
         rows: where observed values go.
         bond_energy: where the bonds' energy goes.
+        newtons: one per algebraic loop.
+        history: of extrapolated inputs.
     """
 
     def __init__(
@@ -159,6 +183,8 @@ class Kernel:
         rows: NDArray[np.float64],
         bond_energy: NDArray[np.float64],
         every: int,
+        newtons: Sequence[Newton] = (),
+        history: NDArray[np.float64] | None = None,
     ) -> None:
         path = find()
         if path is None:
@@ -218,9 +244,32 @@ class Kernel:
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
-        instructions = _instructions(plan, spans, calls, instances)
-        self.run.instructions = self._structures(_Instruction, instructions)
+        instructions = _instructions(plan, plan.step, spans, calls, instances)
         self.run.n_instructions = len(instructions)
+        loops = []
+        for loop, newton in zip(plan.loops, newtons, strict=True):
+            first = len(instructions)
+            instructions += _instructions(plan, loop.sweep, spans, calls, instances)
+            loops.append(
+                _Loop(
+                    self._array(loop.sources),
+                    self._array(newton.inverse),
+                    self._array(newton.valid),
+                    self._array(np.zeros(5 * newton.n + 2 * newton.n**2)),
+                    newton.n,
+                    first,
+                    len(instructions),
+                )
+            )
+        self.run.loops = self._structures(_Loop, loops)
+        self.run.instructions = self._structures(_Instruction, instructions)
+        self.run.means = self._structures(
+            _Mean,
+            ((m.gain, m.offset, m.source, m.target, m.order, m.ahead) for m in plan.means),
+        )
+        self.run.n_means = len(plan.means)
+        if history is not None:
+            self.run.history = self._array(history)
 
     def _array(self, array: NDArray[Any]) -> int:
         """Address of an array of 8-byte numbers, which is kept alive."""
@@ -275,11 +324,12 @@ def _member(instance: Instance) -> _Member:
 
 def _instructions(
     plan: Plan,
+    rows: NDArray[np.int64],
     spans: dict[tuple[Op, int], tuple[int, int]],
     calls: Sequence[_Call],
     instances: Sequence[Instance],
 ) -> list[tuple[int, int, int]]:
-    """The operations of a step, in order; neighbours of one kind become one."""
+    """The operations of these rows, in order; neighbours of one kind become one."""
     found: list[tuple[int, int, int]] = []
 
     def add(code: _Code, first: int, last: int) -> None:
@@ -290,13 +340,15 @@ def _instructions(
 
     layout = plan.layout
     plain = (layout.copy_gain == 1.0) & (layout.copy_offset == 0.0)
-    for row in plan.step.tolist():
+    for row in rows.tolist():
         op, a, b = Op(row[0]), row[1], row[2]
         if op is Op.COPY:
             for index in range(a, b):
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
             add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+        elif op is Op.SUBSTEP:
+            found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
         elif op in (Op.SET, Op.GET):
             for index in range(*spans[op, a]):
                 code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3
@@ -314,7 +366,7 @@ def _carried(plan: Plan) -> bool:
     So it is if energy is added after the last get call, and noted before the first one.
     """
     codes = plan.step[:, 0].tolist()
-    gets = [index for index, code in enumerate(codes) if code == Op.GET]
+    gets = [index for index, code in enumerate(codes) if code in (Op.GET, Op.SOLVE)]
     notes = [index for index, code in enumerate(codes) if code == Op.RECORD]
     sums = [index for index, code in enumerate(codes) if code == Op.ENERGY]
     return (

@@ -16,8 +16,13 @@
 #endif
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
-enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY };
-enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7 }; /* beyond the statuses of FMI */
+enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP };
+enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8 }; /* beyond the statuses of FMI */
+enum { PARTS = 1 << 16, ITERATIONS = 60 }; /* as in cosim/plan.py and cosim/loops.py */
+#define SETTLED 1e-10
+#define CONTRACTION 0.25
+#define INCREMENT 1e-6
 
 /* One get or set call: n variables of one type of one instance. */
 typedef struct {
@@ -51,6 +56,21 @@ typedef struct {
   int64_t bond; /* terms of a bond follow each other */
 } Term;
 
+/* An algebraic loop, z = G(z), cut at some outputs: see cosim/loops.py. */
+typedef struct {
+  const int64_t *sources;    /* slots of z */
+  double *inverse;           /* of I - dG/dz */
+  int64_t *valid;            /* whether it is good for anything */
+  double *work;              /* 5 n + 2 n n numbers */
+  int64_t n, first, last;    /* instructions of a sweep */
+} Loop;
+
+/* An input that gets the mean of a polynomial over the step: see cosim/coupling.py. */
+typedef struct {
+  double gain, offset;
+  int64_t source, target, order, ahead;
+} Mean;
+
 typedef struct {
   const Member *members;
   const Call *calls;
@@ -71,7 +91,11 @@ typedef struct {
   int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
   int64_t index;       /* communication step under way */
   int64_t next_record; /* the next one to be kept */
-  int64_t failed_call, failed_member; /* -1: none; neither: a recorded value is not finite */
+  const Loop *loops;
+  const Mean *means;
+  double *history; /* per mean the source at the beginnings of this step and the two before */
+  int64_t n_means;
+  int64_t failed_loop, failed_call, failed_member; /* -1: none; neither: a recorded value is not finite */
 } Run;
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
@@ -209,12 +233,136 @@ static void add_energy(Run *run) {
   }
 }
 
-/* One communication step; 0 or the status that ended it. */
-static int execute(Run *run) {
-  const Instruction *const end = run->instructions + run->n_instructions;
+/* Inputs from the mean over the step of the polynomial through the last values of their source. */
+static void extrapolate(Run *run, int64_t first, int64_t last) {
+  for (int64_t i = first; i < last; i++) {
+    const Mean *m = run->means + i;
+    const double *h = run->history + 3 * i, now = run->values[m->source];
+    const int64_t known = run->index + (m->ahead ? 1 : 0);
+    const int64_t order = m->order < known ? m->order : known;
+    double mean;
+    if (m->ahead)
+      mean = order == 1 ? 0.5 * (now + h[0]) : (5.0 * now + 8.0 * h[0] - h[1]) / 12.0;
+    else
+      mean = order == 0 ? h[0] : order == 1 ? 1.5 * h[0] - 0.5 * h[1]
+             : (23.0 * h[0] - 16.0 * h[1] + 5.0 * h[2]) / 12.0;
+    run->values[m->target] = mean * m->gain + m->offset;
+  }
+}
+
+static const Member *substep(const Run *run, const Member *m, int64_t code, int *status) {
+  const double parts = (double)(code / PARTS / 4), part = (double)(code / 4 % PARTS);
+  const double t = run->times[run->index] + part * run->step / parts, h = run->step / parts;
+  return code % 4 == 2 ? step2(m, m + 1, t, h, status) : step3(m, m + 1, t, h, status);
+}
+
+static int execute(Run *run, int64_t first, int64_t last);
+
+/* G(z), once around a loop. */
+static int sweep(Run *run, const Loop *loop, const double *z, double *value) {
+  for (int64_t i = 0; i < loop->n; i++) run->values[loop->sources[i]] = z[i];
+  const int status = execute(run, loop->first, loop->last);
+  if (status > 1) return status;
+  for (int64_t i = 0; i < loop->n; i++) value[i] = run->values[loop->sources[i]];
+  return 0;
+}
+
+static double larger(double a, double b) { return b > a ? b : a; }
+
+/* Gauss-Jordan elimination with partial pivoting of n rows of 2 n numbers; whether it worked. */
+static int invert(double *rows, int64_t n) {
+  for (int64_t k = 0; k < n; k++) {
+    int64_t best = k;
+    for (int64_t i = k + 1; i < n; i++)
+      if (fabs(rows[2 * n * i + k]) > fabs(rows[2 * n * best + k])) best = i;
+    const double pivot = rows[2 * n * best + k];
+    if (!(1e-13 < fabs(pivot) && fabs(pivot) < INFINITY)) return 0;
+    for (int64_t j = 0; j < 2 * n; j++) {
+      const double other = rows[2 * n * k + j];
+      rows[2 * n * k + j] = rows[2 * n * best + j];
+      rows[2 * n * best + j] = other;
+    }
+    for (int64_t j = 0; j < 2 * n; j++) rows[2 * n * k + j] /= pivot;
+    for (int64_t i = 0; i < n; i++) {
+      const double factor = rows[2 * n * i + k];
+      if (i == k || factor == 0.0) continue;
+      for (int64_t j = 0; j < 2 * n; j++) rows[2 * n * i + j] -= factor * rows[2 * n * k + j];
+    }
+  }
+  return 1;
+}
+
+/* The inverse of I - dG/dz by differences around z, where G(z) = value. */
+static int difference(Run *run, const Loop *loop, const double *z, const double *value, double *moved, double *there,
+                      double *rows) {
+  const int64_t n = loop->n;
+  for (int64_t j = 0; j < n; j++) {
+    const double increment = INCREMENT * larger(1.0, fabs(z[j]));
+    for (int64_t i = 0; i < n; i++) moved[i] = z[i];
+    moved[j] += increment;
+    const int status = sweep(run, loop, moved, there);
+    if (status > 1) return status;
+    for (int64_t i = 0; i < n; i++) {
+      rows[2 * n * i + j] = (i == j ? 1.0 : 0.0) - (there[i] - value[i]) / increment;
+      rows[2 * n * i + n + j] = i == j ? 1.0 : 0.0;
+    }
+  }
+  *loop->valid = invert(rows, n);
+  if (!*loop->valid) return UNSETTLED;
+  for (int64_t i = 0; i < n; i++)
+    for (int64_t j = 0; j < n; j++) loop->inverse[n * i + j] = rows[2 * n * i + n + j];
+  return 0;
+}
+
+/* The change of z for a rest G(z) - z, and its relative size. */
+static double newton_step(const Loop *loop, const double *z, const double *value, double *change) {
+  double size = 0.0;
+  for (int64_t i = 0; i < loop->n; i++) {
+    double total = 0.0;
+    for (int64_t j = 0; j < loop->n; j++) total += loop->inverse[loop->n * i + j] * (value[j] - z[j]);
+    change[i] = total;
+    const double relative = fabs(total) / larger(1.0, fabs(z[i]));
+    if (!(relative <= size)) size = relative;
+  }
+  return size;
+}
+
+/* Newton's method with a Jacobian that is kept as long as it contracts. */
+static int solve(Run *run, const Loop *loop) {
+  const int64_t n = loop->n;
+  double *const z = loop->work, *const value = z + n, *const change = value + n, *const moved = change + n;
+  double *const there = moved + n, *const rows = there + n;
+  double last = 0.0;
+  run->failed_loop = loop - run->loops;
+  for (int64_t i = 0; i < n; i++) z[i] = run->values[loop->sources[i]];
+  for (int iteration = 0; iteration < ITERATIONS; iteration++) {
+    int status = sweep(run, loop, z, value);
+    if (status > 1) return status;
+    const int renewed = !*loop->valid;
+    if (renewed && (status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
+    double size = newton_step(loop, z, value, change);
+    if (size <= SETTLED && !renewed) {
+      for (int64_t i = 0; i < n; i++) run->values[loop->sources[i]] = z[i];
+      return 0;
+    }
+    if (!renewed && last > 0.0 && !(size <= CONTRACTION * last)) {
+      if ((status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
+      size = newton_step(loop, z, value, change);
+    }
+    if (!(size < INFINITY)) break;
+    for (int64_t i = 0; i < n; i++) z[i] += change[i];
+    last = size;
+  }
+  *loop->valid = 0;
+  return UNSETTLED;
+}
+
+/* Instructions from first to before last; 0 or the status that ended them. */
+static int execute(Run *run, int64_t first, int64_t last) {
+  const Instruction *const end = run->instructions + last;
   const Call *const calls = run->calls, *call = 0;
   const Member *const members = run->members, *member = 0;
-  for (const Instruction *in = run->instructions; in < end; in++) {
+  for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
     switch (in->operation) {
     case EXTERNAL:
@@ -249,6 +397,24 @@ static int execute(Run *run) {
     case ENERGY:
       add_energy(run);
       break;
+    case SOLVE:
+      status = solve(run, run->loops + in->first);
+      if (status > 1) return status; /* the instruction inside has said what failed */
+      break;
+    case NOTE:
+      for (int64_t i = 0; i < run->n_means; i++) {
+        double *const h = run->history + 3 * i;
+        h[2] = h[1];
+        h[1] = h[0];
+        h[0] = run->values[run->means[i].source];
+      }
+      break;
+    case EXTRAPOLATE:
+      extrapolate(run, in->first, in->last);
+      break;
+    case SUBSTEP:
+      member = substep(run, members + in->first, in->last, &status);
+      break;
     }
     if (status > 1) {
       run->failed_call = call ? call - calls : -1;
@@ -262,7 +428,7 @@ static int execute(Run *run) {
 /* Communication steps from run->index up to `last`; 0 or the status that ended it. */
 EXPORT int cosim_run(Run *run, int64_t last) {
   for (; run->index < last; run->index++) {
-    const int status = execute(run);
+    const int status = execute(run, 0, run->n_instructions);
     if (status) return status;
   }
   return 0;
@@ -270,6 +436,7 @@ EXPORT int cosim_run(Run *run, int64_t last) {
 
 /* The layout that this library was compiled for, to be compared with the caller's. */
 EXPORT int64_t cosim_size(int what) {
-  const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term)};
+  const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term),
+                          sizeof(Loop), sizeof(Mean)};
   return (int64_t)sizes[what];
 }

@@ -141,11 +141,8 @@ def test_algebraic_loop_settles_or_is_refused(affine: Path) -> None:
     # y = 0.5 u + 1, u = -0.8 y + 1; settled to 1e-12 by definition of the initialization
     assert recording["a.y"][0] == pytest.approx(1.5 / 1.4, rel=1e-11)
     with pytest.raises(AlgebraicLoopError) as caught:
-        Master(ring(-2.5), step=0.1).run(0.1)
-    text = str(caught.value)
-    assert "do not settle in 100 exchanges at t = 0 s" in text
-    assert "a.u is direct feedthrough to a.y" in text and "a.y is connected to b.u" in text
-    assert "Take a component with a state in the loop" in text
+        Master(ring(2.0), step=0.1).run(0.1)
+    assert "a.u is direct feedthrough to a.y" in str(caught.value)
 
 
 def test_integers_and_booleans_of_both_versions(affine: Path, foreign3: Path) -> None:

@@ -1,0 +1,106 @@
+"""Algebraic loops: two gains in a ring, and arm and base by wrench and acceleration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.errors import AlgebraicLoopError, StepError
+from cosim.loops import invert
+from cosim.master import Master
+from cosim.system import System
+
+EXECUTORS = ["python", "c"]
+
+
+def ring(affine: Path, first: float, second: float) -> System:
+    system = System("ring")
+    system.add("a", str(affine), {"a": first, "b": 1.0})
+    system.add("b", str(affine), {"a": second, "b": 1.0})
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    return system
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize(("first", "second"), [(0.5, -0.8), (0.5, -2.5), (3.0, 4.0)])
+def test_a_ring_of_gains_is_solved_at_every_point(
+    affine: Path, algorithm: str, executor: str, first: float, second: float
+) -> None:
+    master = Master(ring(affine, first, second), algorithm, 0.1, executor=executor)
+    recording = master.run(0.8)
+    exact = (first + 1.0) / (1.0 - first * second)  # y0 = a u0 + 1, u0 = b y0 + 1
+    # solved to a relative Newton step of 1e-10 by definition, plain exchange to 1e-12
+    np.testing.assert_allclose(recording["a.y"], exact, rtol=1e-10)
+    if (first, second) == (0.5, -0.8):
+        assert {f"{value:.10f}" for value in recording["a.y"]} == {"1.0714285714"}
+
+
+def test_a_loop_without_solution_is_refused_port_by_port(affine: Path) -> None:
+    with pytest.raises(AlgebraicLoopError) as caught:
+        Master(ring(affine, 0.5, 2.0), step=0.1).run(0.1)
+    text = str(caught.value)
+    assert "no solution that Newton's method finds" in text and "at t = 0 s" in text
+    assert "a.u is direct feedthrough to a.y" in text and "a.y is connected to b.u" in text
+    assert "Take a component with a state in the loop" in text
+
+
+ARM_AND_BASE = [
+    ("arm.wrench", "base.arm_bias"),
+    *[(f"base.mount_{name}", f"arm.mount_{name}")
+      for name in ("position", "quaternion", "velocity", "rate", "acceleration",
+                   "angular_acceleration")],
+]  # fmt: skip
+
+
+def arm_and_base(provider) -> System:
+    """Arm on base, coupled by wrench and acceleration instead of the arm's inertia."""
+    system = System("arm on base", provider)
+    system.add("base", "mobile_base/six_dof")
+    system.add("arm", "ur5_arm/rigid_moving")
+    for source, target in ARM_AND_BASE:
+        system.connect(source, target)
+    return system
+
+
+def test_arm_and_base_diverge_by_plain_exchange(provider, monkeypatch) -> None:
+    monkeypatch.setattr("cosim.loops.ITERATIONS", 0)
+    with pytest.raises(AlgebraicLoopError, match="algebraic loop"):
+        Master(arm_and_base(provider), step=1e-3, executor="python").run(1e-3)
+
+
+def test_arm_and_base_by_newton_move_as_with_the_arms_inertia(provider) -> None:
+    torque = {f"arm.tau[{i + 1}]": value for i, value in enumerate([3.0, 40.0, 20.0, 1, 1, 0.5])}
+    wrench = Master(arm_and_base(provider), step=1e-3, executor="c").run(0.05, inputs=torque)
+    plain = Master(arm_and_base(provider), step=1e-3, executor="python").run(0.05, inputs=torque)
+    np.testing.assert_array_equal(wrench.values, plain.values)
+
+    inertia = System("reference", provider)
+    inertia.add("base", "mobile_base/six_dof")
+    inertia.add("arm", "ur5_arm/rigid_moving")
+    for source, target in [*ARM_AND_BASE[1:], ("arm.arm_bias", "base.arm_bias"),
+                           ("arm.arm_inertia", "base.arm_inertia")]:  # fmt: skip
+        inertia.connect(source, target)
+    reference = Master(inertia, step=1e-3).run(0.05, inputs=torque)
+    # after initialization both solve the same equations: [F; M] = inertia * acceleration + bias
+    for name in ("base.mount_acceleration[1]", "base.mount_angular_acceleration[2]"):
+        assert wrench[name][0] == pytest.approx(reference[name][0], abs=1e-8)
+
+
+def test_inverse() -> None:
+    matrix = np.random.default_rng(1).normal(size=(7, 7))
+    found = invert(matrix.tolist())
+    np.testing.assert_allclose(np.array(found) @ matrix, np.eye(7), atol=1e-12)  # condition < 1e3
+    assert invert([[1.0, 2.0], [2.0, 4.0]]) is None
+
+
+def test_a_loop_that_is_lost_on_the_way_ends_the_run(affine: Path) -> None:
+    system = ring(affine, 0.5, 0.5)
+    system.set("a.fail_at", 0.35)
+    with pytest.raises(StepError) as caught:
+        Master(system, step=0.1).run(0.8)
+    assert caught.value.recording is not None
+    assert caught.value.recording.time[-1] == pytest.approx(0.3)  # the last point before
