@@ -18,6 +18,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
@@ -391,9 +392,9 @@ def _print_result(result: Result) -> None:
     )
     for quantity in result.overview if len(result.runs) > 1 else ():
         head, rows = quantity.rows()
-        table = _table(*head)
+        table = _table(*map(escape, head))
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*map(escape, row))
         console.print(table)
     if 0 < len(content["comparison"]) <= SHOWN:
         table = _table("compared", "rms", "max", "unit", "with")

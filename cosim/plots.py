@@ -124,12 +124,12 @@ def plot_run(
 
     paths = [item for item in axes if item.paths]
     courses = [item for item in axes if not item.paths]
-    width = 5.0 * bool(paths) + 7.0 * bool(courses)
+    width = 5.0 * bool(paths) + 8.0 * bool(courses)
     height = max(2.2 * len(courses), 4.2 * len(paths)) + 0.6
     figure = Figure(figsize=(width, height), layout="constrained")
     columns: Any = (figure, figure)
     if paths and courses:
-        columns = figure.subfigures(1, 2, width_ratios=(5.0, 7.0))
+        columns = figure.subfigures(1, 2, width_ratios=(5.0, 8.0))
     if paths:
         for axis, item in zip(_column(columns[0], len(paths), False), paths, strict=True):
             _draw_paths(axis, item, recording, tuple(references.values()))
@@ -181,10 +181,12 @@ def _reference(references: Sequence[Reference], signals: tuple[str, ...]) -> Ref
     return next((item for item in references if item.signals == signals), None)
 
 
-def _finish(axis: MatplotlibAxes) -> None:
+def _finish(axis: MatplotlibAxes, *, beside: bool) -> None:
     axis.grid(True, alpha=0.3)
     count = len(axis.get_legend_handles_labels()[0])
-    if 0 < count <= 12:
+    if 0 < count <= 12 and beside:
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
+    elif 0 < count <= 12:
         axis.legend(loc="best", fontsize="small")
 
 
@@ -212,7 +214,7 @@ def _draw_paths(
     axis.set_xlabel(_label("x", unit))
     axis.set_ylabel(_label("y", unit))
     axis.set_title(item.label, fontsize="medium")
-    _finish(axis)
+    _finish(axis, beside=False)
 
 
 def _draw_courses(
@@ -248,7 +250,7 @@ def _draw_courses(
             line += 1
     axis.set_ylabel(_label(item.label, unit))
     axis.margins(x=0.01)
-    _finish(axis)
+    _finish(axis, beside=True)
 
 
 def _draw_comparisons(
@@ -268,7 +270,7 @@ def _draw_comparisons(
         )
     axis.set_ylabel(_label(item.label, unit))
     axis.margins(x=0.01)
-    _finish(axis)
+    _finish(axis, beside=True)
 
 
 # -- all runs --------------------------------------------------------------------------------------

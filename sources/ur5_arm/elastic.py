@@ -4,8 +4,9 @@
     M(q) q'' + C(q, q') q' + g(q) + J_out q'' = K (theta - q) + D (theta' - q')
 
 theta is the gear's output without its twist, as the motor encoder sees it: the outputs `q`, `qd`
-and the port of the joints belong to it, the tool to the links (`q_link`, `qd_link`). Mount as in
-`rigid`.
+and the port of the joints belong to it, the tool to the links (`q_link`, `qd_link`). The states are
+theta and the twist theta - q, so that a pose to start from is the same as in the other fidelities.
+Mount as in `rigid`.
 
 Not modelled: hysteresis and stiffening of the gear, elastic links, motion of the mount.
 
@@ -58,8 +59,10 @@ J_OUT = Quantity(
     minimum=0.0,
     nominal=1e-3,
 )
-LINK_ANGLE = Quantity("link_angle", "rad", "state: angles of the links", start=ANGLE.start, size=6)
-LINK_SPEED = Quantity("link_speed", "rad/s", "state: speeds of the links", size=6)
+TWIST = Quantity(
+    "twist", "rad", "state: twist of the gears, motor's side less link", nominal=1e-3, size=6
+)
+TWIST_RATE = Quantity("twist_rate", "rad/s", "state: rate of the twist", nominal=0.1, size=6)
 Q_LINK = Quantity("q_link", "rad", "angles of the links behind the gears", size=6)
 QD_LINK = Quantity("qd_link", "rad/s", "speeds of the links behind the gears", size=6)
 
@@ -69,9 +72,9 @@ def equations(m: Model) -> None:
     mount = at_rest(read_mount(m))
     tau, added = m.input(TAU), m.input(J_ADDED)
     stiffness, damping = m.parameter(K), m.parameter(D)
-    theta, q = m.state(ANGLE), m.state(LINK_ANGLE)
-    thetad, qd = m.state(SPEED), m.state(LINK_SPEED)
-    twist, rate = theta - q, thetad - qd
+    theta, thetad = m.state(ANGLE), m.state(SPEED)
+    twist, rate = m.state(TWIST), m.state(TWIST_RATE)
+    q, qd = theta - twist, thetad - rate
     hub = added + m.parameter(J_HUB)
     driving = tau + joint_efforts(m, thetad, theta, tau)
     gear = m.balance("gear", "compliance", deflection=twist, rate=rate, stiffness=stiffness)
@@ -79,10 +82,11 @@ def equations(m: Model) -> None:
     arm = links(m, mount, q, qd)
     output = m.parameter(J_OUT) * ca.SX.ones(6)
     dynamics = arm.accelerate(through, output)
+    acceleration = (driving - through) / hub
     m.derivative(theta, thetad)
-    m.derivative(q, qd)
-    m.derivative(thetad, (driving - through) / hub)
-    m.derivative(qd, dynamics.acceleration)
+    m.derivative(twist, rate)
+    m.derivative(thetad, acceleration)
+    m.derivative(rate, acceleration - dynamics.acceleration)
     output_motion(m, mount, theta, thetad, arm.posture, tau)
     m.output(Q_LINK, q)
     m.output(QD_LINK, qd)

@@ -64,10 +64,9 @@ def random_point(model: Oracle, rng: np.random.Generator) -> dict[str, float]:
             value = variable.start + rng.normal() * (variable.quantity.nominal or 1.0)
             values[variable.name] = abs(value) if variable.quantity.name == "J_added" else value
     # what stiff springs hold together stays together
-    for near, far in (("link_angle", "angle"), ("link_speed", "speed"), ("q_set", "q")):
-        for k in range(1, 7):
-            if f"{near}[{k}]" in values:
-                values[f"{near}[{k}]"] = values[f"{far}[{k}]"] + 1e-3 * rng.normal()
+    for k in range(1, 7):
+        if f"q_set[{k}]" in values:
+            values[f"q_set[{k}]"] = values[f"q[{k}]"] + 1e-3 * rng.normal()
     return values
 
 
