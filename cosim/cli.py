@@ -206,20 +206,24 @@ def fmus_build(
 
     Example: `cosim fmus build gearbox/elastic+backlash --fmi 3 --out fmus`
     """
-    build = _sources("packaging.build").build
+    build_many = _sources("packaging.build").build_many
     folder = out or (library.fmus() if library.in_checkout() else Path("fmus"))
     with _bad_names():
         names = list(variants or _sources("packaging.catalog").names())
-        for name in names:  # bad names are found before anything is built
+        for name in variants or ():  # bad names are found before anything is built
             _sources("variant").build_model(name)
     if kind is Kind.python and fmi == 3:
         raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
-    paths = []
-    for name in names:
-        with _bad_names():
-            path = build(name, out=folder, fmi=fmi, kind=kind.value, platform=platform.value)
-        _say(f"{name}: {path}")
-        paths.append({"variant": name, "file": str(path)})
+    with _bad_names():
+        built = build_many(
+            names,
+            out=folder,
+            fmi=fmi,
+            kind=kind.value,
+            platform=platform.value,
+            progress=lambda name, path: _say(f"{name}: {path}"),
+        )
+    paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
     if as_json:
         _print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
     else:
