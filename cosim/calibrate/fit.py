@@ -104,7 +104,8 @@ class Normal:
     Attributes:
         matrix, gradient: J^T J and J^T r, with priors.
         scores: J^T r of each block (rows), for the sandwich.
-        rough: whether any run jumps.
+        rough: runs that jump.
+        calm: the matrix of the others.
     """
 
     def __init__(
@@ -118,7 +119,8 @@ class Normal:
     ) -> None:
         size, scale = theta.size, problem.scale
         self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
-        self.rough = False
+        self.rough: list[str] = []
+        calm = np.zeros((size, size))
         scores = []
         for item, (name, residual) in zip(sensitivities, residuals, strict=True):
             run = problem.run(name)
@@ -134,7 +136,9 @@ class Normal:
             bend = bend.reshape(-1, columns.size)
             reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
             if share is not None:
-                self.rough |= bool(np.trace(reliable) < 0.99 * np.trace(matrix))
+                self.rough += [name] * bool(np.trace(reliable) < 0.99 * np.trace(matrix))
+            if name not in self.rough:
+                calm[np.ix_(columns, columns)] += matrix
             self.matrix[np.ix_(columns, columns)] += reliable
             per_sample = np.einsum("tcp,tc->tp", derivative, factor * errors)
             index = ((run.times - run.times[0]) / block).astype(np.intp)
@@ -145,6 +149,7 @@ class Normal:
                 sums[:, columns] = sums[:, columns] @ share.T
             scores.append(sums)
             self.gradient += sums.sum(axis=0)
+        self.calm = calm
         self.scores = np.concatenate(scores) if scores else np.zeros((0, size))
         for i, p in enumerate(problem.parameters):
             if p.prior:
@@ -235,6 +240,15 @@ class _Fit:
             self.theta, self.purpose, central=central, relative=relative
         )
         weight = self.weight if math.isfinite(self.cap) else None
+        normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+        if not normal.rough:
+            return normal
+        for place, item in enumerate(self.jacobian):
+            if item.run in normal.rough:
+                part = normal.calm[np.ix_(item.columns, item.columns)]
+                self.jacobian[place] = self.problem.directional(
+                    self.theta, item.run, np.linalg.eigh(part)[1], relative=relative
+                )
         return Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
     def attempt(self, theta: Vector) -> bool:
@@ -305,7 +319,7 @@ class _Fit:
         weight = self.weight if math.isfinite(self.cap) else None
         return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
-    def polish(self, rounds: int = 2, worth: float = 0.5) -> None:
+    def polish(self, rounds: int = 1, worth: float = 0.5) -> None:
         """Search along the main directions of the normal matrix, without derivatives."""
         p = self.problem
         for _ in range(rounds):

@@ -428,6 +428,58 @@ class Problem:
             output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))
         return output
 
+    def directional(
+        self, theta: Vector, run: Run | str, directions: Vector, *, relative: float = STEP
+    ) -> Sensitivity:
+        """Derivatives of one run along directions, given back along the parameters.
+
+        Where the model jumps, differences along parameters do not cancel in a combination that has
+        no effect at all; differences along the combination do.
+
+        Args:
+            theta: where.
+            run: which.
+            directions: orthonormal columns over the run's parameters, in spans.
+            relative: step in spans.
+        """
+        run = self.run(run) if isinstance(run, str) else run
+        columns = self.columns(run.name)
+        scale = self.scale[columns]
+
+        def simulate(change: Vector) -> Vector:
+            moved = theta.copy()
+            moved[columns] += change * scale
+            return self.simulate(np.clip(moved, self.lower, self.upper), run)
+
+        low, high = self.lower[columns] - theta[columns], self.upper[columns] - theta[columns]
+        steps: list[tuple[float, float]] = []
+        for direction in directions.T:
+            room = []
+            for sign in (1.0, -1.0):
+                way = sign * direction * scale
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    limits = np.where(way > 0, high / way, np.where(way < 0, low / way, np.inf))
+                room.append(float(np.min(limits)))
+            if min(room) >= 0.1 * relative:
+                size = min(relative, *room)
+                steps.append((-size, size))
+            else:
+                steps.append((0.0, relative) if room[0] > room[1] else (-relative, 0.0))
+        changes = [h * d for d, pair in zip(directions.T, steps, strict=True) for h in pair if h]
+        results = iter(self._map(simulate, [np.zeros(columns.size), *changes]))
+        base = next(results)
+        gap = np.where(np.isfinite(run.data), 0.0, np.nan)
+        slopes = np.empty((*run.data.shape, columns.size))
+        bends = np.zeros_like(slopes)
+        for place, (first, second) in enumerate(steps):
+            below = next(results) if first else base
+            above = next(results) if second else base
+            slopes[:, :, place] = (above - below) / (second - first) / self.sigma + gap
+            if first and second:
+                bends[:, :, place] = (above + below - 2 * base) / (second - first) / self.sigma
+        back = directions.T / scale
+        return Sensitivity(run.name, columns, slopes @ back, bends @ back)
+
     def _sides(
         self, theta: Vector, index: int, central: bool, relative: float
     ) -> tuple[float, float]:
