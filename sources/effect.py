@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .quantity import Quantity
 
 if TYPE_CHECKING:
-    from .model import EffectModel
+    from .effect_model import EffectModel
 
 SX = Any
 

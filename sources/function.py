@@ -136,10 +136,7 @@ class Oracle:
         self.functions = build_functions(model)
         self.state_names = [v.name for v in model.of_role("state")]
         self.output_names = [v.name for v in model.of_role("output")]
-        self._roles = [
-            model.of_role(role)
-            for role in ("state", "discrete", "input", "parameter")
-        ]
+        self._roles = [model.of_role(role) for role in ("state", "discrete", "input", "parameter")]
         self._input_rates = build_input_rates(model)
 
     def arguments(self, values: Mapping[str, float] | None = None, t: float = 0.0) -> list[Any]:

@@ -8,114 +8,26 @@ is collected here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import casadi as ca
 
 from .component import Component, Port, Solver
-from .effect import KINDS, Effect, Law
+from .declarations import SX, Attachment, Balance, Clock, ModelError, Role, Variable, misfit
+from .effect import KINDS
 from .quantity import Quantity
-from .units import parse
 
-SX = Any
-Role = Literal["input", "state", "parameter", "discrete", "output"]
-
-
-class ModelError(ValueError):
-    """A description that cannot become a model; the text names the culprit and the way out."""
-
-
-@dataclass
-class Variable:
-    """One scalar variable of a variant.
-
-    Attributes:
-        name: full name, `prefix.name[index]`.
-        quantity: its declaration.
-        role: input, state, parameter, discrete (held between samples) or output.
-        start: start value.
-        symbol: the CasADi symbol (outputs: the defining expression).
-        of_effect: name of the strength of the effect that declared it, "" for the fidelity's own.
-    """
-
-    name: str
-    quantity: Quantity
-    role: Role
-    start: float
-    symbol: SX
-    of_effect: str = ""
-
-
-@dataclass
-class Clock:
-    """A sample clock: ticks at `k * period`, k = 0, 1, ...; the updates act simultaneously.
-
-    Clocks due at the same instant act in the order in which they were declared, later ones seeing
-    what earlier ones wrote.
-    """
-
-    name: str
-    period: SX
-    updates: dict[str, SX] = field(default_factory=dict)
-
-
-@dataclass
-class Balance:
-    """The sum of an equation that effects may add to.
-
-    Attributes:
-        group: name shared with the like balances of parts that share parameters
-            (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
-        effort: what the attached effects add (scalar or vector SX; 0 without effects).
-        mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
-            rotational inertia about the reference point (3x3) [kg.m2]; only of kind `body`.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    signals: dict[str, SX]
-    effort: SX
-    group: str = ""
-    mass: SX = 0.0
-    first_moment: SX = None
-    inertia: SX = None
-
-
-@dataclass(frozen=True)
-class Attachment:
-    """An effect that a variant asks for: `name` or `name@balance`."""
-
-    effect: Effect
-    law: Law
-    balance: str = ""
-
-    @property
-    def spelling(self) -> str:
-        """As in a variant's name."""
-        return f"{self.effect.name}@{self.balance}" if self.balance else self.effect.name
-
-
-def misfit(effect: Effect, balance: Balance) -> str:
-    """Why an effect cannot act on a balance, "" if it can."""
-    if balance.kind not in effect.kinds:
-        return (
-            f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
-            f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
-        )
-    if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
-        return (
-            f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
-            f"is in {balance.unit or '1'}"
-        )
-    lacking = [need for need in effect.needs if need not in balance.signals]
-    if lacking:
-        return (
-            f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
-            f"{balance.name!r} does not offer"
-        )
-    return ""
+__all__ = [
+    "SX",
+    "Attachment",
+    "Balance",
+    "Clock",
+    "Model",
+    "ModelError",
+    "Role",
+    "Variable",
+    "misfit",
+]
 
 
 class Model:
@@ -351,6 +263,8 @@ class Model:
                 place = full if attachment.balance == full else balance.group
                 root._attached[attachment.spelling] = place
             if place in (full, balance.group):
+                from .effect_model import EffectModel  # it builds on this module
+
                 attachment.law(EffectModel(self, attachment, balance, grouped=place != full))
         return balance
 
@@ -444,7 +358,6 @@ class Model:
 E_STORED = Quantity("E_stored", "J", "energy stored in the component")
 P_IN = Quantity("P_in", "W", "power that enters through ports and sources")
 P_LOSS = Quantity("P_loss", "W", "power that leaves as heat")
-EFFECT_LOSS = Quantity("P_loss", "W", "power that the effect takes out as heat")
 
 
 class _Part(Model):
@@ -503,123 +416,5 @@ class _Part(Model):
         return self.results[quantity.name]
 
 
-class EffectModel:
-    """What an effect's law sees: the balance it acts on and its own quantities.
-
-    Names are prefixed with the effect's name (`coulomb.tau_c`), or with balance and effect where
-    the variant names the balance (`flange_b.coulomb.tau_c`). An effect on a group of balances has
-    one set of parameters (`caster.swivel.coulomb.tau_c`) and the rest once per balance.
-    """
-
-    def __init__(
-        self, model: Model, attachment: Attachment, balance: Balance, *, grouped: bool = False
-    ) -> None:
-        self._root = model._root
-        self._balance = balance
-        self._grouped = grouped
-        name = attachment.effect.name
-        own = f"{attachment.balance}.{name}" if attachment.balance else name
-        self._prefix = f"{balance.name}.{name}" if grouped else own
-        self._strength = f"{own}.{attachment.effect.strength.name}"
-        self._model = self._declaring(model, self._prefix)
-        self._parameters = self._declaring(model, own)
-        self.kind = balance.kind
-        self.unit = balance.unit or "1"
-        self.size = int(balance.effort.numel())
-
-    def _declaring(self, model: Model, prefix: str) -> Model:
-        return Model(
-            model.component,
-            model.fidelity,
-            prefix=prefix,
-            parent=self._root,
-            of_effect=self._strength,
-        )
-
-    @property
-    def t(self) -> SX:
-        """Simulation time [s]."""
-        return self._root.time
-
-    def signal(self, name: str) -> SX:
-        """A signal of the balance, see `effect.KINDS`."""
-        return self._balance.signals[name]
-
-    def offers(self, name: str) -> bool:
-        """Whether the balance has this optional signal."""
-        return name in self._balance.signals
-
-    def parameter(self, quantity: Quantity) -> SX:
-        """Declare a parameter of the effect."""
-        known = self._root._vectors.get(self._parameters._full(quantity.name))
-        if self._grouped and known is not None:
-            return known
-        return self._parameters.parameter(quantity)
-
-    def state(self, quantity: Quantity) -> SX:
-        """Declare a continuous state of the effect."""
-        return self._model.state(quantity)
-
-    def derivative(self, state: SX, expression: SX) -> None:
-        """Set the derivative of a state."""
-        self._model.derivative(state, expression)
-
-    def discrete(self, quantity: Quantity) -> SX:
-        """Declare a sampled value of the effect."""
-        return self._model.discrete(quantity)
-
-    def clock(self, name: str, period: SX | float) -> Clock:
-        """Declare a sample clock."""
-        return self._model.clock(name, period)
-
-    def update(self, clock: Clock, discrete: SX, expression: SX) -> None:
-        """At each tick, replace the discrete variable."""
-        self._model.update(clock, discrete, expression)
-
-    def output(self, quantity: Quantity, expression: SX) -> SX:
-        """Declare an output of the effect."""
-        return self._model.output(quantity, expression)
-
-    def add(self, effort: SX) -> None:
-        """Add an effort to the balance (6 elements, force and moment, for kind `body`).
-
-        One element counts for every shaft, winding or signal of a balance of several.
-        """
-        effort = ca.SX(effort)
-        if effort.numel() == 1 and self.kind != "body":
-            effort = ca.repmat(effort, self.size, 1)
-        if effort.numel() != self.size:
-            raise ModelError(
-                f"effect {self._prefix!r} adds {effort.numel()} elements to balance "
-                f"{self._balance.name!r}, which has {self.size}"
-            )
-        self._balance.effort = self._balance.effort + effort
-
-    def add_mass(self, mass: SX, position: SX, inertia: SX) -> None:
-        """Add a rigid mass [kg] at a position (3) [m], with its inertia about its centre (3x3)."""
-        position = ca.SX(position)
-        self._balance.mass = self._balance.mass + mass
-        self._balance.first_moment = self._balance.first_moment + mass * position
-        steiner = mass * (ca.dot(position, position) * ca.SX.eye(3) - position @ position.T)
-        self._balance.inertia = self._balance.inertia + inertia + steiner
-
-    def loss(self, power: SX) -> None:
-        """Report loss power [W]: output `P_loss` of the effect and part of the component's.
-
-        The elements of a vector (a balance of several shafts) are added up.
-        """
-        power = _total(power)
-        self._model.output(EFFECT_LOSS, power)
-        self._model.loss("P_loss", power)
-
-    def stored_energy(self, energy: SX) -> None:
-        """Add energy [J] that the effect stores."""
-        self._root.stored.append(_total(energy))
-
-    def supply(self, power: SX) -> None:
-        """Add power [W] that the effect brings in from outside."""
-        self._root.inflows.append(_total(power))
-
-
-def _total(power: SX) -> SX:
+def total(power: SX) -> SX:
     return ca.sum1(ca.vec(ca.SX(power)))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 TILT = Quantity("tilt", "rad", "angle from the level, 0 = absent", start=0.01, strength=True)

@@ -13,7 +13,7 @@ Source: inner resistance behind a lossless chopper.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 R_B = Quantity("r_b", "ohm", "inner resistance of the supply, 0 = absent", start=0.1, strength=True)

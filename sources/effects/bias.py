@@ -12,8 +12,8 @@ Source: textbook.
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import in_unit, share
-from ..model import EffectModel
 from ..quantity import Quantity
 
 BIAS = Quantity("bias", "1", "constant error, 0 = absent", start=0.01, strength=True)

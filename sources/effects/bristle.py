@@ -18,9 +18,9 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.bristle import bristle
 from ..laws.signal_effect import sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 TAU_C = Quantity(

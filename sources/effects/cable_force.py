@@ -12,7 +12,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 TENSION = Quantity("tension", "N", "tension, 0 = absent", start=8.0, minimum=0.0, strength=True)

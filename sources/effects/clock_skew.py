@@ -16,8 +16,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.history import NEVER, History
-from ..model import EffectModel
 from ..quantity import Quantity
 
 SAMPLES = 64

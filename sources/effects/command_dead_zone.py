@@ -12,8 +12,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import in_unit
-from ..model import EffectModel
 from ..quantity import Quantity
 
 WIDTH = Quantity(

@@ -11,7 +11,7 @@ Robotics and Automation 12(3), 1996.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 CUBIC = Quantity(

@@ -10,7 +10,7 @@ Source: Bolton, Instrumentation and Control Systems, 2021, ch. 2 (gain error).
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 GAIN = Quantity("g", "1", "relative error of the scale, 0 = absent", start=0.02, strength=True)

@@ -10,7 +10,7 @@ Source: Bolton, Instrumentation and Control Systems, 2021, ch. 2 (zero error).
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 OFFSET = Quantity("i_off", "A", "offset of the sensor, 0 = absent", start=0.2, strength=True)

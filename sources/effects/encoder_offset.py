@@ -10,8 +10,8 @@ Source: textbook.
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import share
-from ..model import EffectModel
 from ..quantity import Quantity
 
 OFFSET = Quantity(

@@ -15,8 +15,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.planar_frame import rotated
-from ..model import EffectModel
 from ..quantity import Quantity
 
 ANGLE = Quantity(

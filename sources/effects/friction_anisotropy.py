@@ -15,7 +15,7 @@ Vehicles, ch. 6 (separate longitudinal and lateral coefficients).
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 EXCESS = Quantity(

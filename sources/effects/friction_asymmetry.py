@@ -10,7 +10,7 @@ Source: relative difference, textbook.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 DIFFERENCE = Quantity(

@@ -10,8 +10,8 @@ Source: Hooke's law.
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
-from ..model import EffectModel
 from ..quantity import Quantity
 
 STIFFNESS = Quantity(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 REDUCTION = Quantity(

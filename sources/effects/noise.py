@@ -15,10 +15,10 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.history import NEVER
 from ..laws.noise import RANDOM, Random, seed_quantity
 from ..laws.signal_effect import in_unit, sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 SIGMA = Quantity(

@@ -12,8 +12,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import in_unit
-from ..model import EffectModel
 from ..quantity import Quantity
 
 STEP = Quantity("step", "1", "resolution, 0 = absent", start=0.01, minimum=0.0, strength=True)

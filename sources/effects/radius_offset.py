@@ -12,7 +12,7 @@ Source: Borenstein, Feng, IEEE Trans. Robotics and Automation 12(6), 1996 (unequ
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 OFFSET = Quantity(

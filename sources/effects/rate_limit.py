@@ -16,9 +16,9 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.history import NEVER
 from ..laws.signal_effect import in_unit, per_unit, sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 SLOWNESS = Quantity(

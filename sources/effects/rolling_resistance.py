@@ -11,8 +11,8 @@ Source: Johnson, Contact Mechanics, 1985, ch. 9 (hysteresis of the tread).
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.contact import rolling_resistance
-from ..model import EffectModel
 from ..quantity import Quantity
 
 COEFFICIENT = Quantity(

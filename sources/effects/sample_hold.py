@@ -12,9 +12,9 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.history import NEVER
 from ..laws.signal_effect import in_unit, sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 T_S = Quantity(

@@ -14,8 +14,8 @@ load and temperature effects in robot joints, IROS 2010, reduced to one state.
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 COLD = Quantity(

@@ -13,7 +13,7 @@ Source: Pacejka, Tire and Vehicle Dynamics, 2012, ch. 1.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 ANGLE = Quantity(

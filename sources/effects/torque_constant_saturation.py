@@ -12,7 +12,7 @@ Source: Hanselman, Brushless Permanent Magnet Motor Design, 2006, ch. 4.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 LOSS = Quantity(

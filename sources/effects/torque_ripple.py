@@ -14,8 +14,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
-from ..model import EffectModel
 from ..quantity import Quantity
 
 RIPPLE = Quantity(

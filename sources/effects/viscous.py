@@ -10,7 +10,7 @@ Source: Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2.
 from __future__ import annotations
 
 from ..effect import Effect
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 DAMPING = Quantity(

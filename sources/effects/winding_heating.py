@@ -15,8 +15,8 @@ Source: thermal model of first order, Leonhard, Control of Electrical Drives, 20
 from __future__ import annotations
 
 from ..effect import Effect
+from ..effect_model import EffectModel
 from ..laws.signal_effect import sized
-from ..model import EffectModel
 from ..quantity import Quantity
 
 R_TH = Quantity(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..model import SX, EffectModel
+from ..effect_model import EffectModel
+from ..model import SX
 from ..quantity import Quantity
 from .signal_effect import sized
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from ..model import EffectModel, Model
+from ..effect_model import EffectModel
+from ..model import Model
 from ..quantity import Quantity
 
 SX = Any

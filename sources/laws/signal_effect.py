@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..model import EffectModel
+from ..effect_model import EffectModel
 from ..quantity import Quantity
 from ..units import parse
 

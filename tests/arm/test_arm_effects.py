@@ -11,8 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sources.effect import Effect
+from sources.effect_model import EffectModel
 from sources.function import Oracle
-from sources.model import Attachment, EffectModel, Model
+from sources.model import Attachment, Model
 from sources.quantity import Quantity
 from sources.variant import build_model, device_values, fidelity
 from tests.arm.chains import Reference, named, vector

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cosim.bench import WIRES, bench
 
 from cosim.errors import (
     AlgebraicLoopError,
@@ -21,6 +20,7 @@ from cosim.errors import (
 from cosim.master import Master
 from cosim.signals import Constant, Function, Table
 from cosim.system import System
+from tests.cosim.bench import WIRES, bench
 from tests.fmus import Slave, fmu
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tests.cosim.bench import bench
 
 from cosim.comparison import Reference, compare
 from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError, ValueRangeError
@@ -16,6 +15,7 @@ from cosim.files import atomic
 from cosim.master import Master
 from cosim.measurement import read_data_set, read_log
 from cosim.recording import Recording, read_recording
+from tests.cosim.bench import bench
 
 
 @pytest.fixture

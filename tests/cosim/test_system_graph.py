@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 
 import pytest
-from tests.cosim.bench import bench
 
 from cosim.errors import (
     ConnectError,
@@ -21,6 +20,7 @@ from cosim.graph import components, loops
 from cosim.provider import FolderProvider
 from cosim.system import System
 from cosim.system_file import read_system
+from tests.cosim.bench import bench
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
 

@@ -1,0 +1,109 @@
+"""What a model consists of: variables, sample clocks, balances, and the effects asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from .effect import Effect, Law
+from .quantity import Quantity
+from .units import parse
+
+SX = Any
+Role = Literal["input", "state", "parameter", "discrete", "output"]
+
+
+class ModelError(ValueError):
+    """A description that cannot become a model; the text names the culprit and the way out."""
+
+
+@dataclass
+class Variable:
+    """One scalar variable of a variant.
+
+    Attributes:
+        name: full name, `prefix.name[index]`.
+        quantity: its declaration.
+        role: input, state, parameter, discrete (held between samples) or output.
+        start: start value.
+        symbol: the CasADi symbol (outputs: the defining expression).
+        of_effect: name of the strength of the effect that declared it, "" for the fidelity's own.
+    """
+
+    name: str
+    quantity: Quantity
+    role: Role
+    start: float
+    symbol: SX
+    of_effect: str = ""
+
+
+@dataclass
+class Clock:
+    """A sample clock: ticks at `k * period`, k = 0, 1, ...; the updates act simultaneously.
+
+    Clocks due at the same instant act in the order in which they were declared, later ones seeing
+    what earlier ones wrote.
+    """
+
+    name: str
+    period: SX
+    updates: dict[str, SX] = field(default_factory=dict)
+
+
+@dataclass
+class Balance:
+    """The sum of an equation that effects may add to.
+
+    Attributes:
+        group: name shared with the like balances of parts that share parameters
+            (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
+        effort: what the attached effects add (scalar or vector SX; 0 without effects).
+        mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
+            rotational inertia about the reference point (3x3) [kg.m2]; only of kind `body`.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    signals: dict[str, SX]
+    effort: SX
+    group: str = ""
+    mass: SX = 0.0
+    first_moment: SX = None
+    inertia: SX = None
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """An effect that a variant asks for: `name` or `name@balance`."""
+
+    effect: Effect
+    law: Law
+    balance: str = ""
+
+    @property
+    def spelling(self) -> str:
+        """As in a variant's name."""
+        return f"{self.effect.name}@{self.balance}" if self.balance else self.effect.name
+
+
+def misfit(effect: Effect, balance: Balance) -> str:
+    """Why an effect cannot act on a balance, "" if it can."""
+    if balance.kind not in effect.kinds:
+        return (
+            f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
+            f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
+        )
+    if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
+        return (
+            f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
+            f"is in {balance.unit or '1'}"
+        )
+    lacking = [need for need in effect.needs if need not in balance.signals]
+    if lacking:
+        return (
+            f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
+            f"{balance.name!r} does not offer"
+        )
+    return ""
