@@ -387,6 +387,20 @@ class System:
 
     # -- printing --------------------------------------------------------------------------------
 
+    # -- pictures --------------------------------------------------------------------------------
+
+    def svg(self) -> str:
+        """The system as a drawing (SVG)."""
+        from .draw import svg
+
+        return svg(self)
+
+    def to_svg(self, path: Path | str) -> Path:
+        """Write the drawing to a file."""
+        from .draw import to_svg
+
+        return to_svg(self, path)
+
     def __str__(self) -> str:
         lines = [f"System {self.name!r}" + (f": {self.text}" if self.text else "")]
         lines.append("instances")
