@@ -20,6 +20,7 @@ import casadi as ca
 from .component import Component, Solver
 from .effect import KINDS, Effect
 from .model import Balance, Model, Variable, misfit
+from .packaging.catalog import names
 from .quantity import Quantity
 from .variant import build_model, components, device_values, devices, effects, fidelities
 
@@ -308,11 +309,44 @@ def _signals(kind: Any) -> str:
     return "; ".join(items)
 
 
+def catalogue_page() -> str:
+    """What `cosim fmus build` builds, by component."""
+    listed: dict[str, list[str]] = {}
+    for name in names():
+        listed.setdefault(name.partition("/")[0].partition(".")[0], []).append(name)
+    rows = [
+        (
+            f"[{component}](../docs/components/{component}.md)",
+            ", ".join(
+                f"`{n.partition('/')[2]}`" for n in variants if "+" not in n and "." not in n
+            ),
+            ", ".join(f"`{n}`" for n in variants if "." in n.partition("/")[0]),
+            ", ".join(f"`+{n.partition('+')[2]}`" for n in variants if "+" in n),
+        )
+        for component, variants in listed.items()
+    ]
+    return "\n".join(
+        [
+            "# FMUs",
+            "",
+            "This folder receives the built FMUs: `fmi2/` and `fmi3/` (native, co-simulation and",
+            "model exchange), `python/` (pythonfmu twins). `cosim fmus build --platform all` builds",
+            f"the catalogue below, {len(names())} variants; any other combination builds by its name.",
+            "Written by `python -m sources.tables`.",
+            "",
+            _table(
+                ("component", "fidelities", "for other devices", "effects, one at a time"), rows
+            ),
+        ]
+    )
+
+
 def pages() -> dict[str, str]:
     """All pages by their path below `docs/`."""
     found = {f"components/{name}.md": component_page(name) for name in components()}
     found["components/index.md"] = index_page()
     found["effects.md"] = effects_page()
+    found["../fmus/README.md"] = catalogue_page()
     return found
 
 

@@ -1,0 +1,23 @@
+"""Build hook of the wheel: put sources, scenarios and FMUs below `cosim_library`.
+
+An editable installation takes them from the checkout.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+
+class LibraryHook(BuildHookInterface):  # type: ignore[misc]
+    """Adds the library to a standard wheel."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Called by hatchling before it collects files."""
+        if version == "editable":
+            return
+        root = Path(self.root)
+        for folder in ("sources", "scenarios", "fmus"):
+            build_data["force_include"][str(root / folder)] = f"cosim_library/{folder}"
