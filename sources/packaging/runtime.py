@@ -164,6 +164,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.period = [0.0] * NC
         self.tick = [0.0] * NC
         self.next = [0.0] * NC
+        self.stop = _math.inf
         self.h = 0.0
         self.initialized = False
         self.stale = True
@@ -171,8 +172,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     # -- FMI ----------------------------------------------------------------------------------
 
     def setup_experiment(self, start_time: float, stop_time: Any, tolerance: Any) -> None:
-        """Take the start time."""
+        """Take the start and stop time."""
         self.v[0] = start_time
+        self.stop = _math.inf if stop_time is None else stop_time
 
     def exit_initialization_mode(self) -> None:
         """Start the sample clocks."""
@@ -240,6 +242,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             "period": list(self.period),
             "tick": list(self.tick),
             "next": list(self.next),
+            "stop": self.stop,
             "h": self.h,
             "initialized": self.initialized,
         }
@@ -247,7 +250,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self.v, self.period = list(state["v"]), list(state["period"])
         self.tick, self.next = list(state["tick"]), list(state["next"])
-        self.h, self.initialized = state["h"], state["initialized"]
+        self.stop, self.h = state["stop"], state["h"]
+        self.initialized = state["initialized"]
         self.stale = True
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -257,8 +261,17 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             raise ValueError(
                 f"{MODEL}: doStep starts at {current_time:.9g} s but the FMU is at {v[0]:.9g} s"
             )
-        v[0] = current_time
         end = current_time + step_size
+        if not current_time < end < _math.inf:
+            raise ValueError(
+                f"{MODEL}: communication step {step_size:g} s at time {current_time:.9g} s"
+            )
+        if end > self.stop + 1e-9 * (1 + abs(self.stop)):
+            raise ValueError(
+                f"{MODEL}: doStep from {current_time:.9g} s to {end:.9g} s goes past "
+                f"the stop time {self.stop:.9g} s"
+            )
+        v[0] = current_time
         while True:
             self._run_ticks()
             following = self._next_tick(end)

@@ -130,3 +130,38 @@ def test_periods_of_clocks_are_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
         "command_link/held: the period of clock 'command' depends on T; "
         "it may depend on fixed parameters only"
     )
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS)
+def test_steps_past_the_stop_time_are_refused(kind: str, fmi: int) -> None:
+    """As the standards ask; 1e-9 s more is rounding."""
+    with Slave(fmu("inertia/disc", kind, fmi), initialize=False) as slave:
+        if fmi == 2:
+            slave.fmu.setupExperiment(startTime=0.5, stopTime=1.0)
+            slave.fmu.enterInitializationMode()
+        else:
+            slave.fmu.enterInitializationMode(startTime=0.5, stopTime=1.0)
+        slave.fmu.exitInitializationMode()
+        slave.step(0.5, 0.4)
+        slave.step(0.9, 0.1 + 1e-12)
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(1.0, 0.1)
+        if fmi == 2:
+            assert "doStep from 1 s to 1.1 s goes past the stop time 1 s" in slave.messages[-1]
+
+
+def test_a_failed_step_leaves_the_time_where_it_was() -> None:
+    values = {"solver.method": 1, "solver.step": 1e-3, "d": 1e6, "w_b": 1.0}
+    with Slave(fmu("gearbox/elastic"), values) as slave:
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.0, 1.0)
+        assert slave.fmu.getRealStatus(2) == 0.0  # fmi2LastSuccessfulTime
+
+
+def test_directional_derivatives_that_are_not_finite_are_refused() -> None:
+    with Slave(fmu("gearbox/ratio"), {"ratio": 1e3, "tau_a": 1e3}) as slave:
+        references = [slave.vr["tau_b"]], [slave.vr["tau_a"]]
+        assert np.isfinite(slave.fmu.getDirectionalDerivative(*references, [1.0])[0])
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.fmu.getDirectionalDerivative(*references, [1e308])
+        assert "directional derivative of tau_b is not finite (inf)" in slave.messages[-1]

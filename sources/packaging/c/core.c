@@ -32,6 +32,7 @@ typedef struct {
   double period[NC + 1]; /* of each sample clock; depends on fixed parameters only */
   double tick[NC + 1];   /* index of the next tick of each clock */
   double next[NC + 1];   /* its time */
+  double stop;           /* where the importer says that the simulation ends */
   double h;              /* last accepted step of an error-controlled solver, 0: none yet */
   int32_t mode;
   int32_t stale;         /* outputs and derivatives must be evaluated again */
@@ -103,6 +104,7 @@ static int check_finite(Instance *c, int from, int count) {
 static void set_start(Instance *c) {
   memset(&c->m, 0, sizeof c->m);
   memcpy(c->m.v, START, sizeof c->m.v);
+  c->m.stop = INFINITY;
   c->m.mode = INSTANTIATED;
   c->m.stale = 1;
 }
@@ -345,10 +347,11 @@ static int adaptive(Instance *c, double t1) {
 }
 #endif
 
+/* Bring the states from the present time to t1; the time stays if that fails. */
 static int integrate(Instance *c, double t1) {
   double *v = c->m.v;
-#if NX
   const double t0 = v[0];
+#if NX
   if (v[METHOD] == RK4 || v[METHOD] == RODAS3) {
     const double count = ceil((t1 - t0) / v[STEP] * (1 - 1e-9));
     if (!(count < 1e9))
@@ -368,7 +371,9 @@ static int integrate(Instance *c, double t1) {
 #endif
   v[0] = t1;
   c->m.stale = 1;
-  return check_finite(c, IX, NX);
+  const int status = check_finite(c, IX, NX);
+  if (status != OK) v[0] = t0;
+  return status;
 }
 
 static int do_step(Instance *c, double t, double h) {
@@ -377,11 +382,15 @@ static int do_step(Instance *c, double t, double h) {
     return report(c, ERROR, "%s: doStep at %.9g s, but the FMU %s", MODEL, t,
                   c->m.mode < EVENT ? "is not initialized" : c->m.mode == FAILED ? "has failed before"
                   : c->m.mode == TERMINATED ? "is terminated" : "is not in step mode");
-  if (!(h > 0) || !isfinite(h)) return report(c, ERROR, "%s: communication step %g s at time %.9g s", MODEL, h, t);
+  const double t1 = t + h;
+  if (!(t1 > t) || !isfinite(t1))
+    return report(c, ERROR, "%s: communication step %g s at time %.9g s", MODEL, h, t);
   if (!(fabs(t - v[0]) <= 1e-9 * (1 + fabs(t))))
     return report(c, ERROR, "%s: doStep starts at %.9g s but the FMU is at %.9g s", MODEL, t, v[0]);
+  if (t1 > c->m.stop + 1e-9 * (1 + fabs(c->m.stop)))
+    return report(c, ERROR, "%s: doStep from %.9g s to %.9g s goes past the stop time %.9g s", MODEL, t, t1,
+                  c->m.stop);
   v[0] = t;
-  const double t1 = t + h;
   double next;
   do {
     run_ticks(c);
@@ -429,6 +438,9 @@ static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const 
     if (k >= IXD && k < IU) result[i] = dxdot[k - IXD];
     else if (k >= IY && k < IP) result[i] = dy[k - IY];
     else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, k);
+    if (!isfinite(result[i]))
+      return report(c, ERROR, "%s: directional derivative of %s is not finite (%g) at time %.9g s", MODEL, NAMES[k],
+                    result[i], v[0]);
   }
   return OK;
 }

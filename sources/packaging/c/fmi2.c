@@ -47,10 +47,12 @@ EXPORT fmi2Status fmi2SetupExperiment(Instance *c, fmi2Boolean tolerance_defined
                                       fmi2Boolean stop_defined, double stop) {
   (void)tolerance_defined;
   (void)tolerance;
-  (void)stop_defined;
-  (void)stop;
+  if (c->m.mode != INSTANTIATED) return report(c, ERROR, "%s: the FMU is already initialized", MODEL);
   if (!isfinite(start)) return report(c, ERROR, "%s: start time %g is not finite", MODEL, start);
+  if (stop_defined && !(stop >= start))
+    return report(c, ERROR, "%s: the stop time %g s lies before the start time %g s", MODEL, stop, start);
   c->m.v[0] = start;
+  c->m.stop = stop_defined ? stop : INFINITY;
   c->m.stale = 1;
   return OK;
 }
