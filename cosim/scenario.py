@@ -162,7 +162,7 @@ def read_scenario(path: Path | str, name: str = "") -> ScenarioFile:
         runs.update({run: {"": row} for run, row in table_runs(path, table["table"]).items()})
     for run, changes in table.get("runs", {}).items():
         _only(path, changes, KEYS - {"runs", "table"}, f"run {run}")
-        runs[run] = changes
+        runs[run] = {**runs.get(run, {}), **changes}
     return ScenarioFile(name or path.parent.name, path, table, runs or {"": {}})
 
 
