@@ -24,18 +24,21 @@ class Route:
     Attributes:
         end: node where it ends, a connector of an FMU or of the root system.
         unit: of the value at its start, None if nothing on the way has one.
+        order: of its last connection in the file.
     """
 
     end: Node
     factor: float
     offset: float
     unit: Unit | None
+    order: int = 0
 
 
 @dataclass(frozen=True)
 class _Edge:
     node: Node
     link: Link | None
+    order: int = 0
 
 
 def shown(path: Path) -> str:
@@ -58,6 +61,7 @@ class Net:
         self.systems: dict[Path, Element] = {}
         self._edges: dict[Node, list[_Edge]] = {}
         self._units: dict[Node, Unit | None] = {}
+        self._count = 0
         self._add(structure.system, (), ())
 
     # -- building ----------------------------------------------------------------------------------
@@ -89,9 +93,10 @@ class Net:
                     f"{self.file.shown}: connection {_name(link)} in {shown(path)} joins "
                     f"{len(starts)} and {len(ends)} elements"
                 )
+            self._count += 1
             for start, end in zip(starts, ends, strict=True):
-                self._edges.setdefault(start, []).append(_Edge(end, link))
-                self._edges.setdefault(end, []).append(_Edge(start, link))
+                self._edges.setdefault(start, []).append(_Edge(end, link, self._count))
+                self._edges.setdefault(end, []).append(_Edge(start, link, self._count))
 
     def _add_dictionary(
         self, reference: Element, place: Path, scopes: tuple[tuple[Path, Element], ...]
@@ -209,7 +214,7 @@ class Net:
                 if leaf is None:
                     queue.append((edge.node, *way, origin))
                     if not edge.node[0]:
-                        found.append(Route(edge.node, way[0], way[1], origin))
+                        found.append(Route(edge.node, way[0], way[1], origin, edge.order))
                 elif leaf.causality in ("output", "local", "calculatedParameter"):
                     if own is not None:
                         raise ConnectError(
@@ -221,7 +226,7 @@ class Net:
                     what = f"{shown(edge.node[0])}.{edge.node[1]}"
                     way = self._step(way[0], way[1], way[2], leaf.unit, what)
                     origin = origin if origin is not None else leaf.unit
-                    found.append(Route(edge.node, way[0], way[1], origin))
+                    found.append(Route(edge.node, way[0], way[1], origin, edge.order))
         return found
 
     def _along(

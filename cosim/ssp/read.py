@@ -11,14 +11,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..archive import Fmu
-from ..signals import Signal, Table
+from ..signals import Signal
 from ..system import System
 from ..system_file import SystemFile, Wire
 from . import flatten
 from .document import File, Structure, open_package, read_structure
 from .flatten import Net, shown
 from .values import Value, read_binding
+
+Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -144,6 +149,7 @@ class _Flat:
     def wires(self) -> tuple[list[Wire], dict[str, Terminal]]:
         """Connections between FMUs, in the order of the file, and outputs of the root system."""
         found: dict[tuple[str, str], list[tuple[int, int, float, float]]] = {}
+        order: dict[tuple[str, str], int] = {}
         outputs: dict[str, Terminal] = {}
         for start in self.net.outputs():
             source = f"{self.names[start[0]]}.{start[1]}"
@@ -154,8 +160,10 @@ class _Flat:
                 else:
                     target = f"{self.names[route.end[0]]}.{route.end[1]}"
                     found.setdefault((source, target), []).append((start[2], route.end[2], *change))
+                    order.setdefault((source, target), route.order)
             self.sizes[source] = self.net.variable(start[0], start[1]).size
-        return [self.wire(*ends, ways) for ends, ways in found.items()], outputs
+        sequence = sorted(found, key=order.__getitem__)
+        return [self.wire(*ends, found[ends]) for ends in sequence], outputs
 
     def wire(self, source: str, target: str, ways: list[tuple[int, int, float, float]]) -> Wire:
         """One wire for a scalar, or for an array that is joined as a whole."""
@@ -277,7 +285,7 @@ class _Flat:
             step = self.number(ours, "step") or step
             algorithm = ours.get("algorithm")
             if source := ours.get("inputs"):
-                signals = _signals(self.file.beside(source, "the default experiment"))
+                signals = _signals(self.file.beside(source, "the default experiment"), step or 0.0)
         start, stop = self.number(element, "startTime"), self.number(element, "stopTime")
         return Experiment(start, stop, step, algorithm), signals
 
@@ -311,7 +319,23 @@ def _items(fmu: Fmu, name: str) -> dict[str, int]:
     return {}
 
 
-def _signals(file: File) -> dict[str, Signal]:
+@dataclass(frozen=True)
+class _Steps:
+    """Values that hold from one time to the next; times closer than `clock` are the same."""
+
+    times: Vector
+    values: Vector
+    unit: str
+    text: str
+    clock: float
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times."""
+        index = np.searchsorted(self.times, times + self.clock, side="right") - 1
+        return self.values[np.maximum(index, 0)]
+
+
+def _signals(file: File, step: float) -> dict[str, Signal]:
     """Columns of a CSV file with a head such as `time [s],motor.w_ref [rad/s]`."""
     with file.path.open(encoding="utf-8", newline="") as handle:
         rows = list(csv.reader(handle))
@@ -323,7 +347,11 @@ def _signals(file: File) -> dict[str, Signal]:
     found: dict[str, Signal] = {}
     for head, column in zip(heads[1:], columns[1:], strict=True):
         name, _, unit = head.partition(" ")
-        found[name] = Table(
-            columns[0], column, unit=unit.strip("[]"), text=f"{file.name}:{name}", extend=True
+        found[name] = _Steps(
+            np.array(columns[0]),
+            np.array(column),
+            unit.strip("[]"),
+            f"{file.name}:{name}",
+            1e-3 * step,
         )
     return found

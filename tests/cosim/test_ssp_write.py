@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lxml import etree
 
-from cosim import Constant, Master, System, Table, ssp
+from cosim import Constant, Function, Master, System, Table, ssp
 from cosim.errors import GraphError, InputError, ScenarioError, UnitError
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
@@ -165,6 +166,37 @@ def test_inputs_over_time_come_back(tmp_path: Path) -> None:
     assert np.array_equal(*runs)
     # a tool that does not know the table holds the first value
     assert ssp.read(path).members["motor"].parameters["w_ref"] == 10.0
+
+
+def test_steps_of_inputs_come_at_their_time(tmp_path: Path) -> None:
+    """However long a value holds, and with another step than that of the table."""
+
+    def level(times: np.ndarray) -> np.ndarray:
+        return 1.0 + (times > 0.7 - 1e-9) + (times > 5.0 - 1e-9)  # 7 * 0.1 is not 0.7
+
+    path = ssp.write(
+        bench(), tmp_path / "bench.ssp", inputs={"motor.w_ref": Function(level)},
+        experiment=ssp.Experiment(0.0, 10.0, STEP),
+    )  # fmt: skip
+    again = ssp.read_scenario(path).inputs["motor.w_ref"]
+    for step in (STEP, 0.7 * STEP, 0.1):
+        times = step * np.arange(round(10.0 / step))
+        assert np.array_equal(again.at(times), level(times))
+
+
+def test_a_scenario_with_logged_inputs(tmp_path: Path) -> None:
+    from cosim import scenario
+    from cosim.runner import run_scenario
+
+    file, _ = scenario.find("motor_bench")
+    original = replace(file.scenario("ST1"), duration=0.6, record=None, references={}, checks=())
+    path = ssp.export(original, tmp_path / "bench.ssp", Versioned(2))
+    again = ssp.read_scenario(path)
+    runs = [run_scenario(item, Versioned(2)).recording for item in (original, again)]
+    every = round(original.period / original.step)
+    for name in runs[0].names:
+        assert np.array_equal(runs[0][name], runs[1][name][::every]), name
+    assert np.ptp(runs[0]["load.w"]) > 0.1
 
 
 def test_constant_inputs_are_start_values(tmp_path: Path) -> None:
