@@ -24,6 +24,7 @@ from rich.table import Table
 
 from . import algorithms, library, scenario
 from .archive import cache_folder, open_fmu
+from .cli_diagnose import diagnose_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from .provider import FolderProvider, Provider
 from .runner import Result, run
@@ -39,6 +40,7 @@ fmus_app = typer.Typer(
     help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
 )
 app.add_typer(fmus_app, name="fmus")
+app.command("diagnose")(diagnose_command)
 
 
 class Kind(StrEnum):
@@ -104,6 +106,11 @@ class Builder:
         with _bad_names():
             return Path(self._build(variant, out=self.out))
 
+    def candidates(self, variant: str) -> list[tuple[str, str, str]]:
+        """(effect, balance, one line) for every effect that could be added to a variant."""
+        with _bad_names():
+            return list(_sources("packaging.catalog").candidates(variant))
+
 
 class Installed:
     """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
@@ -120,6 +127,10 @@ class Installed:
                 return Builder().path(variant)
             except VariantError as error:
                 raise error from missing
+
+    def candidates(self, variant: str) -> list[tuple[str, str, str]]:
+        """(effect, balance, one line) for every effect that could be added to a variant."""
+        return Builder().candidates(variant)
 
 
 def default_provider() -> Provider:

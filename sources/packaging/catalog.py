@@ -45,6 +45,29 @@ def names() -> tuple[str, ...]:
     return tuple(found)
 
 
+def candidates(name: str) -> list[tuple[str, str, str]]:
+    """(effect, balance, its sentence) for every effect that could be added to a variant.
+
+    Balances that share parameters are named by their group and, where it has several members, one
+    by one. Random effects (with a seed) are left out: their values say nothing about a log.
+    """
+    parsed = parse_name(name)
+    model = build_model(parsed)
+    present = {effect + (f"@{at}" if at else "") for effect, at in parsed.effects}
+    groups: dict[str, list[str]] = {}
+    for balance in model.balances.values():
+        groups.setdefault(balance.group or balance.name, []).append(balance.name)
+    found = []
+    for group, members in groups.items():
+        places = [group, *members] if len(members) > 1 else [group]
+        for effect, module in effects().items():
+            if f"{effect}@{group}" in present or hasattr(module, "seed_quantity"):
+                continue
+            if not misfit(module.EFFECT, model.balances[members[0]]):
+                found += [(effect, place, module.EFFECT.text) for place in places]
+    return found
+
+
 def describe(name: str) -> dict[str, Any]:
     """What a variant offers, in the form of `cosim fmus list --json`."""
     parsed = parse_name(name)

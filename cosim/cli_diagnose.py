@@ -1,0 +1,72 @@
+"""`cosim diagnose`: from measured data to the name of the missing physics."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from .calibrate.mapping import read_problem
+from .diagnose import Diagnosis, diagnose
+from .report import write_page
+
+
+def diagnose_command(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    system: Annotated[
+        str | None, typer.Option(help="Another system than that of the mapping.")
+    ] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON value to stdout.")
+    ] = False,
+) -> None:
+    """Find what a model lacks: calibrate, test, attribute, add the effect, judge on unused runs.
+
+    Example: `cosim diagnose data/MB-12 --out out/MB-12`
+    """
+    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    folder = out or Path("out") / problem.name
+    folder.mkdir(parents=True, exist_ok=True)
+    result = diagnose(problem, folder, lambda text: typer.echo(text, err=True))
+    page, table = folder / "report.html", folder / "diagnosis.json"
+    write_page(result, page)
+    result.files += [page, table]
+    content = result.to_dict()
+    table.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(json.dumps(content, indent=2))
+    else:
+        _print(result)
+
+
+def _print(result: Diagnosis) -> None:
+    console = Console()
+    console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
+    for effect in result.effects():
+        values = ", ".join(
+            f"{name} = {v['value']:.4g} [{v['ci95'][0]:.4g}, {v['ci95'][1]:.4g}] {v['unit']}"
+            for name, v in effect["parameters"].items()
+        )
+        console.print(f"  {effect['effect']} at {effect['component']}.{effect['port']}: {values}")
+    table = Table()
+    for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
+                 "after valid."):  # fmt: skip
+        table.add_column(head, no_wrap=True)
+    for name, row in result.to_dict()["channels"].items():
+        cells = [row["before"]["identification"], row["before"]["validation"],
+                 row["after"]["identification"], row["after"]["validation"]]  # fmt: skip
+        table.add_row(
+            name, row["unit"], f"{row['noise_rms']:.4g}",
+            *("-" if value is None else f"{value:.4g}" for value in cells),
+        )  # fmt: skip
+    console.print(table)
+    console.print(f"in {result.files[-1].parent}", soft_wrap=True)

@@ -1,0 +1,73 @@
+"""What could be missing: every effect of the catalogue that fits a balance of the system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from ..calibrate.problem import Parameter, Problem
+from ..variants import component
+
+
+@runtime_checkable
+class Catalogue(Protocol):
+    """A provider that knows which effects fit a variant."""
+
+    def candidates(self, variant: str) -> Sequence[tuple[str, str, str]]:
+        """(effect, balance, one line about it) for all that could be added to the variant."""
+        ...
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place of the system.
+
+    Attributes:
+        instance: of the system.
+        component: of the instance.
+        effect, port: of the catalogue.
+        text: one line about the effect.
+    """
+
+    instance: str
+    component: str
+    effect: str
+    port: str
+    text: str = ""
+
+    @property
+    def label(self) -> str:
+        """As shown and reported."""
+        return f"{self.effect} at {self.instance}.{self.port}"
+
+    @property
+    def change(self) -> dict[str, str]:
+        """As of `cosim run --set`."""
+        return {self.instance: f"+{self.effect}@{self.port}"}
+
+    def added_to(self, problem: Problem) -> Problem:
+        """The problem on the system with this effect, which is absent at the nominal values."""
+        return problem.with_effects(self.change)
+
+
+def candidates(problem: Problem) -> list[Candidate]:
+    """All candidates for a system; none if its provider has no catalogue."""
+    provider = problem.provider
+    if not isinstance(provider, Catalogue):
+        return []
+    found = []
+    for instance, variant in problem.instances.items():
+        kind = component(variant)
+        if not kind:
+            continue  # a file: nothing can be added to it
+        for effect, port, text in provider.candidates(variant):
+            found.append(Candidate(instance, kind, effect, port, text))
+    return found
+
+
+def new_parameters(before: Problem, after: Problem) -> tuple[list[Parameter], list[Parameter]]:
+    """Strengths, and the other parameters, that an effect has brought."""
+    known = set(before.names)
+    added = [p for p in after.parameters if p.name not in known]
+    return [p for p in added if p.strength], [p for p in added if not p.strength]

@@ -1,0 +1,324 @@
+"""The whole chain on one data set, and its result."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.problem import Problem
+from ..errors import CosimError
+from ..provider import locate
+from ..variants import apply
+from .experiment import propose
+from .linear import Layout
+from .power import power
+from .search import ROUNDS, Fitted, Round, Search, step_error
+from .structure import Structure, structures
+
+Vector = NDArray[np.float64]
+PURPOSES = ("identification", "validation")
+
+
+@dataclass
+class Diagnosis:
+    """Verdict and evidence.
+
+    Attributes:
+        problem: the declared system with the data as measured.
+        verdict: effect_found, nothing_missing, confounded, unexplained or bad_data.
+        reason: one or two sentences.
+        search: all rounds.
+        before, after: calibrated models without and with the effects.
+        rivals: sets of effects that explain the data equally well.
+        places: other places where the same effect would do the same, by label.
+        residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
+        structure: (`before`/`after`, purpose) -> tests.
+        power: see `power.power`.
+        experiment: proposed to separate rivals.
+        files: written ones.
+    """
+
+    problem: Problem
+    verdict: str
+    reason: str
+    search: Search | None = None
+    before: Fitted | None = None
+    after: Fitted | None = None
+    rivals: list[Fitted] = field(default_factory=list)
+    places: dict[str, list[str]] = field(default_factory=dict)
+    residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
+    structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
+    power: dict[str, dict[str, Any]] = field(default_factory=dict)
+    experiment: dict[str, Any] | None = None
+    files: list[Path] = field(default_factory=list)
+    wall: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+
+    def rms(self, which: str, purpose: str) -> dict[str, float | None]:
+        """Channel -> RMS residual in its unit over the runs of a purpose."""
+        rows = [
+            self.residuals[which, run.name]
+            for run in self.problem.runs
+            if run.purpose == purpose and (which, run.name) in self.residuals
+        ]
+        if not rows:
+            return {c.name: None for c in self.problem.channels}
+        stacked = np.concatenate(rows)
+        found: dict[str, float | None] = {}
+        for column, channel in enumerate(self.problem.channels):
+            values = stacked[:, column]
+            values = values[np.isfinite(values)]
+            found[channel.name] = (
+                float(np.sqrt(np.mean(values**2))) * channel.sigma if values.size else None
+            )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """As of `cosim diagnose --json`."""
+        table: dict[str, Any] = {
+            "dataset": self.problem.name,
+            "system": self.problem.file.path.stem,
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "warnings": self.warnings,
+            "effects": self.effects(),
+            "alternatives": [
+                {"effects": [c.label for c in f.effects], "score": self._score(f)}
+                for f in self.rivals
+            ],
+            "power": self.power,
+            "proposed_experiment": self.experiment,
+            "channels": {},
+            "parameters": self.parameters(),
+            "structure": {
+                f"{which} {purpose}": [s.to_dict() for s in tests]
+                for (which, purpose), tests in self.structure.items()
+            },
+            "evaluations": self.search.evaluations if self.search else 0,
+            "wall_s": self.wall,
+            "files": [str(path) for path in self.files],
+        }
+        for channel in self.problem.channels:
+            table["channels"][channel.name] = {
+                "unit": channel.unit,
+                "noise_rms": channel.sigma,
+                **{
+                    which: {p: self.rms(which, p)[channel.name] for p in PURPOSES}
+                    for which in ("before", "after")
+                },
+            }
+        return table
+
+    def _score(self, fitted: Fitted) -> float:
+        assert self.search is not None and self.after is not None
+        return self.search.total(self.after, fitted)
+
+    def parameters(self) -> dict[str, Any]:
+        """Calibrated parameters before and after."""
+        table: dict[str, Any] = {}
+        for which, fitted in (("before", self.before), ("after", self.after)):
+            if fitted is None:
+                continue
+            estimate = fitted.estimate
+            for i, p in enumerate(estimate.problem.parameters):
+                if p.role == "nuisance":
+                    continue
+                table.setdefault(p.name, {"unit": p.unit})[which] = {
+                    "value": float(estimate.theta[i]),
+                    "ci95": [float(estimate.low[i]), float(estimate.high[i])],
+                    "identifiable": bool(estimate.identifiable[i]),
+                }
+        return table
+
+    def effects(self) -> list[dict[str, Any]]:
+        """The effects that were found."""
+        if self.after is None or self.search is None or self.before is None:
+            return []
+        found = []
+        estimate = self.after.estimate
+        for number, item in enumerate(self.after.effects):
+            prefix = f"{item.instance}.{item.port}.{item.effect}."
+            values = {
+                p.name.removeprefix(prefix): {
+                    "value": float(estimate.theta[i]),
+                    "ci95": [float(estimate.low[i]), float(estimate.high[i])],
+                    "unit": p.unit,
+                }
+                for i, p in enumerate(estimate.problem.parameters)
+                if p.name.startswith(prefix)
+            }
+            stage = self.search.rounds[number] if number < len(self.search.rounds) else None
+            winner = stage.winner if stage else None
+            found.append(
+                {
+                    "effect": item.effect,
+                    "component": item.instance,
+                    "port": item.port,
+                    "text": item.text,
+                    "parameters": values,
+                    "p_value": winner.p_value if winner else None,
+                    "explained": self._explained(stage),
+                    "gain_nats": self.search.gain(stage.base, winner) if stage and winner else None,
+                    "validation_gain_nats": winner.gate.gain if winner and winner.gate else None,
+                    "other_places": self.places.get(item.label, []),
+                }
+            )
+        return found
+
+    def _explained(self, stage: Round | None) -> float | None:
+        """Share of the excess over the noise that the effect takes away."""
+        if stage is None or stage.winner is None:
+            return None
+        before = stage.base.estimate
+        excess = 2.0 * before.cost - before.count
+        taken = 2.0 * (before.cost - stage.winner.estimate.cost)
+        return float(np.clip(taken / excess, 0.0, 1.0)) if excess > 0.0 else None
+
+
+def diagnose(
+    problem: Problem, out: Path | None = None, say: Callable[[str], None] = lambda text: None
+) -> Diagnosis:
+    """Close the loop on one data set.
+
+    Args:
+        problem: the declared system and its data.
+        out: folder for the FMUs with the effects.
+        say: told what is done.
+
+    Raises:
+        CosimError: the declared system cannot be simulated.
+    """
+    begun = time.perf_counter()
+    search = Search(problem, say)
+    base = search.calibrated()
+    result = Diagnosis(problem, "", "", search, base)
+    current, winners = base, []
+    for number in range(ROUNDS):
+        say(f"round {number + 1}: {len(search.known)} candidates")
+        stage = search.round(current)
+        if number == 0:
+            result.power = power(stage)
+        if stage.winner is None:
+            break
+        say(f"added: {stage.winner.effects[-1].label}")
+        winners.append(stage)
+        current = stage.winner
+        if not any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
+            break
+    result.after = current
+    _judge(result, winners)
+    if out is not None and current.effects:
+        result.files += _leave_fmus(result, out)
+    result.wall = time.perf_counter() - begun
+    return result
+
+
+def _tests(search: Search, fitted: Fitted, purpose: str) -> list[Structure]:
+    if purpose == PURPOSES[0]:
+        return structures(search.fit_data - fitted.fit, search.fitting)
+    return structures(search.check_data - fitted.check, search.checking)
+
+
+def _judge(result: Diagnosis, winners: list[Round]) -> None:
+    search, before, after = result.search, result.before, result.after
+    assert search is not None and before is not None and after is not None
+    for which, fitted in (("before", before), ("after", after)):
+        if which == "after" and after is before:
+            result.residuals |= {
+                ("after", name): v for (kind, name), v in list(result.residuals.items())
+            }
+        else:
+            _residuals(result, which, fitted)
+        for purpose in PURPOSES:
+            runs = [r for r in result.problem.runs if r.purpose == purpose]
+            if runs:
+                layout = Layout(result.problem, runs)
+                vector = layout.vector([result.residuals[which, r.name] for r in runs])
+                result.structure[which, purpose] = structures(vector, layout)
+    left = {
+        s.channel
+        for purpose in PURPOSES
+        for s in result.structure.get(("after", purpose), [])
+        if s.structured
+    }
+    remark = (
+        f" In {', '.join(sorted(left))} the residual still holds more than noise." if left else ""
+    )
+    if winners:
+        different: list[Fitted] = []
+        for stage in winners:
+            assert stage.winner is not None
+            added = stage.winner.effects[-1]
+            for rival in stage.rivals:
+                other = rival.effects[-1]
+                if other.effect == added.effect:
+                    result.places.setdefault(added.label, []).append(
+                        f"{other.instance}.{other.port}"
+                    )
+                else:
+                    different.append(rival)
+            if stage.winner.signature is not None:
+                for label in stage.winner.signature.same:
+                    result.places.setdefault(added.label, []).append(label)
+        result.rivals = different
+        names = " and ".join(c.label for c in after.effects)
+        if different:
+            result.verdict = "confounded"
+            others = ", ".join(f.effects[-1].label for f in different)
+            result.experiment = propose(winners[-1].winner or after, different[0])
+            result.reason = f"{names} explains the data, but so does {others}." + remark
+        else:
+            result.verdict = "effect_found"
+            result.reason = (
+                f"{names}: the gain holds on runs that were not used for fitting, and no other "
+                f"effect of the catalogue does as well." + remark
+            )
+    elif left:
+        result.verdict = "unexplained"
+        result.reason = (
+            f"The residual of {', '.join(sorted(left))} holds more than noise, and no effect of "
+            "the catalogue explains it on unused runs."
+        )
+    else:
+        result.verdict = "nothing_missing"
+        result.reason = (
+            "The calibrated system reaches the noise, and no effect of the catalogue improves it "
+            "on unused runs."
+        )
+
+
+def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
+    """Residuals against the data as measured, the step's error removed at these parameters."""
+    problem = fitted.problem.with_data({run.name: run.data for run in result.problem.runs})
+    theta = fitted.estimate.theta
+    errors = step_error(problem, theta)
+    for name, residual in problem.residuals(theta, None):
+        result.residuals[which, name] = residual - errors[name] / problem.sigma
+    problem.close()
+
+
+def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:
+    """Copy the FMUs that carry the effects into the output folder."""
+    assert result.after is not None
+    instances = result.problem.instances
+    for item in result.after.effects:
+        instances = apply(instances, item.change, result.problem.provider)
+    files = []
+    for name in dict.fromkeys(item.instance for item in result.after.effects):
+        try:
+            source = locate(instances[name], result.problem.provider)
+        except CosimError as error:
+            result.warnings.append(str(error))
+            continue
+        (out / "fmus").mkdir(parents=True, exist_ok=True)
+        target = out / "fmus" / source.name
+        shutil.copyfile(source, target)
+        files.append(target)
+    return files

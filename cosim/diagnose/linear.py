@@ -1,0 +1,177 @@
+"""Residuals and signatures of all runs as vectors, and the tests on them.
+
+A signature is what an effect adds to the model values over sigma. Everything is made orthogonal to
+what calibration can absorb, so a score only counts what declared parameters cannot explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ..calibrate.fit import BLOCK
+from ..calibrate.problem import Problem, Run, Sensitivity
+
+Vector = NDArray[np.float64]
+ABSORBED = 1e-3
+"""A signature of which less than this share is left has no direction of its own: differences over
+rounded simulations carry relative errors of that order."""
+
+
+class Layout:
+    """Where each sample of each run lies in one long vector.
+
+    Args:
+        problem: whose channels.
+        runs: in order.
+        block: length of the blocks over which residuals may be correlated [s].
+    """
+
+    def __init__(self, problem: Problem, runs: Sequence[Run], block: float = BLOCK) -> None:
+        self.problem, self.runs = problem, tuple(runs)
+        self.names = [run.name for run in runs]
+        self.good = [np.isfinite(run.data).ravel() for run in runs]
+        self.channels = len(problem.channels)
+        blocks, first = [], 0
+        for run, good in zip(runs, self.good, strict=True):
+            index = ((run.times - run.times[0]) / block).astype(np.intp) + first
+            blocks.append(np.repeat(index, self.channels)[good])
+            first = int(index[-1]) + 1
+        self.block = np.concatenate(blocks)
+        self.blocks = first
+        self.channel = np.concatenate(
+            [np.tile(np.arange(self.channels), run.times.size)[g]
+             for run, g in zip(runs, self.good, strict=True)]
+        )  # fmt: skip
+        self.run = np.concatenate([np.full(int(g.sum()), i) for i, g in enumerate(self.good)])
+        self.size = int(self.block.size)
+
+    def vector(self, rows: Sequence[Vector]) -> Vector:
+        """One vector of (samples, channels) arrays, one per run."""
+        return np.concatenate([r.ravel()[g] for r, g in zip(rows, self.good, strict=True)])
+
+    def matrix(self, sensitivities: Sequence[Sensitivity], scale: Vector) -> Vector:
+        """Columns of derivatives in units of `scale`; columns of other runs are 0."""
+        matrix = np.zeros((self.size, scale.size))
+        place = 0
+        for item, good in zip(sensitivities, self.good, strict=True):
+            count = int(good.sum())
+            values = item.values.reshape(-1, item.columns.size)[good]
+            matrix[place : place + count, item.columns] = (
+                np.nan_to_num(values) * scale[item.columns]
+            )
+            place += count
+        return matrix
+
+    def sums(self, values: Vector) -> Vector:
+        """Sum over each block."""
+        return np.asarray(np.bincount(self.block, values, self.blocks), dtype=np.float64)
+
+    def by_run(self, vector: Vector) -> list[Vector]:
+        """Back to (samples, channels) arrays, NaN in gaps."""
+        rows, place = [], 0
+        for run, good in zip(self.runs, self.good, strict=True):
+            full = np.full(good.size, np.nan)
+            count = int(good.sum())
+            full[good] = vector[place : place + count]
+            rows.append(full.reshape(run.times.size, -1))
+            place += count
+        return rows
+
+
+class Absorber:
+    """Projection onto what the parameters of a model can do.
+
+    Attributes:
+        basis: orthonormal columns.
+        normal: J^T J in scaled parameters, priors included.
+    """
+
+    def __init__(self, jacobian: Vector, problem: Problem) -> None:
+        rows = [
+            np.eye(len(problem.parameters))[i] * problem.scale[i] / p.prior
+            for i, p in enumerate(problem.parameters)
+            if p.prior
+        ]
+        self.extra = np.array(rows).reshape(-1, jacobian.shape[1])
+        self.jacobian = jacobian
+        self.normal = jacobian.T @ jacobian + self.extra.T @ self.extra
+        values, vectors = np.linalg.eigh(self.normal)
+        # a direction along which the whole span changes less than the noise absorbs nothing
+        keep = values > 1.0
+        self.inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+
+    def change(self, vector: Vector) -> Vector:
+        """Scaled parameter change that explains a vector best."""
+        return np.asarray(self.inverse @ (self.jacobian.T @ vector))
+
+    def rest(self, vector: Vector) -> Vector:
+        """What is left of a vector."""
+        return np.asarray(vector - self.jacobian @ self.change(vector))
+
+
+@dataclass(frozen=True)
+class Score:
+    """How well one direction explains a vector of residuals.
+
+    Attributes:
+        amplitude: best factor.
+        gain: log likelihood gained [nats], white noise of known size.
+        z: robust test statistic: residuals may be correlated within blocks.
+        p_value: two-sided.
+        size: norm of the direction: its signal to noise ratio at amplitude 1.
+        spread: standard deviation of the amplitude over that of white residuals.
+    """
+
+    amplitude: float
+    gain: float
+    z: float
+    p_value: float
+    size: float
+    spread: float
+
+
+def score(direction: Vector, residual: Vector, layout: Layout, freedom: int) -> Score:
+    """Test a direction, both vectors orthogonal to what calibration absorbs.
+
+    The variance is that of the block sums of what is left with the direction in the model, never
+    below that of white residuals: few blocks may seem to agree by chance.
+
+    Args:
+        direction, residual: see above.
+        layout: gives the blocks.
+        freedom: parameters already fitted.
+    """
+    square = float(direction @ direction)
+    if square <= 0.0:
+        return Score(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    amplitude = float(direction @ residual) / square
+    rest = residual - amplitude * direction
+    sums = layout.sums(direction * rest)
+    active = max(int(np.count_nonzero(layout.sums(direction**2) > 1e-6 * square)), 2)
+    degrees = max(layout.blocks - freedom, 1)
+    robust = float(sums @ sums) * layout.blocks / degrees
+    spread = float(np.sqrt(max(robust / square, 1.0)))
+    z = amplitude * np.sqrt(square) / spread
+    p_value = float(2.0 * student.sf(abs(z), max(min(degrees, active * 4), 1)))
+    return Score(amplitude, 0.5 * amplitude**2 * square, z, p_value, float(np.sqrt(square)), spread)
+
+
+def holm(p_values: Sequence[float]) -> Vector:
+    """P values corrected for the number of tests (family-wise, any dependence)."""
+    values = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(values)
+    scaled = values[order] * (values.size - np.arange(values.size))
+    corrected = np.empty_like(values)
+    corrected[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
+    return corrected
+
+
+def cosine(a: Vector, b: Vector) -> float:
+    """Of the angle between two vectors, 0 if one is nil."""
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0

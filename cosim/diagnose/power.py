@@ -1,0 +1,40 @@
+"""What the data would have shown: the smallest strength of each effect that cannot be missed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from scipy.stats import norm
+
+from .search import LEVEL, Round
+
+POWER = 0.9
+"""Probability with which an effect of the given strength is found."""
+
+
+def power(current: Round) -> dict[str, dict[str, Any]]:
+    """Label -> smallest detectable strength, or why the effect cannot be seen."""
+    tests = max(len(current.signatures), 1)
+    needed = float(norm.isf(LEVEL / tests / 2) + norm.isf(1 - POWER))
+    table: dict[str, dict[str, Any]] = {}
+    for item in current.signatures:
+        p = item.strength
+        entry: dict[str, Any] = {"unit": p.unit, "parameter": p.name, "absorbed": item.absorbed}
+        if item.unseen:
+            entry["smallest_detectable"] = None
+            entry["reason"] = (
+                "the runs do not excite it"
+                if item.score.size == 0.0
+                else "calibration of the declared parameters absorbs it"
+            )
+        else:
+            # the norm of what calibration leaves grows with the strength around the secant's value
+            size = item.score.size / max(item.score.spread, 1.0)
+            smallest = abs(item.value) * needed / size if size > 0 else math.inf
+            entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None
+            if abs(math.log10(max(smallest / abs(item.value), 1e-12))) > 1.5:
+                entry["extrapolated_from"] = abs(item.value)
+        entry["same_as"] = list(item.same)
+        table[item.candidate.label] = entry
+    return table

@@ -1,0 +1,328 @@
+"""Rounds of attribution: score all candidates, refit the best, judge them on unused runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.fit import Estimate, fit
+from ..calibrate.problem import Parameter, Problem
+from ..errors import CosimError
+from .candidates import Candidate, candidates, new_parameters
+from .linear import Absorber, Layout, Score, holm, score
+from .secant import Bench, Signature, merge, model_values
+
+Vector = NDArray[np.float64]
+LEVEL = 0.01
+"""Family-wise probability of naming an effect on data that lack none."""
+GATE = math.log(1.0 / LEVEL)
+"""Log likelihood that unused data must gain [nats]. The likelihood ratio of two fixed models has
+mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
+GATE_Z = 2.0
+"""Standard deviations by which it must differ from 0, residuals correlated within blocks."""
+RIVAL_Z = 2.0
+"""Below this many standard deviations two explanations count as equal."""
+REFITS = 5
+ROUNDS = 3
+CHECK = "validation"
+Say = Callable[[str], None]
+
+
+@dataclass
+class Fitted:
+    """A model fitted to the identification runs.
+
+    Attributes:
+        effects: what was added to the declared system.
+        estimate: parameters.
+        fit, check: model values over sigma in identification and validation runs.
+        signature: score of the effect that was added last.
+        gate: gain on unused runs against the model of the round before.
+        p_value: of the score test, corrected for the number of candidates.
+    """
+
+    effects: tuple[Candidate, ...]
+    estimate: Estimate
+    fit: Vector
+    check: Vector
+    signature: Signature | None = None
+    gate: Gate | None = None
+    p_value: float = 1.0
+
+    @property
+    def problem(self) -> Problem:
+        """What was fitted."""
+        return self.estimate.problem
+
+    @property
+    def free(self) -> int:
+        """Number of parameters that were fitted."""
+        return int(self.estimate.theta.size)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Two models on the same runs.
+
+    Attributes:
+        gain: log likelihood of the second less that of the first [nats].
+        z: in robust standard deviations.
+    """
+
+    gain: float
+    z: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the second is better."""
+        return self.gain > GATE and self.z > GATE_Z
+
+
+def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
+    """Compare two sets of model values against data (all over sigma).
+
+    z tests whether the data move from the first towards the second: both are fixed beforehand.
+    """
+    direction, residual = second - first, data - first
+    rest = data - second
+    gain = 0.5 * float(residual @ residual - rest @ rest)
+    square = float(direction @ direction)
+    if square <= 0.0:
+        return Gate(0.0, 0.0)
+    # middle of the two: positive where the second is nearer
+    middle = residual - 0.5 * direction
+    amplitude = float(direction @ middle)
+    sums = layout.sums(direction * (residual - direction * float(direction @ residual) / square))
+    return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
+
+
+@dataclass
+class Round:
+    """One round.
+
+    Attributes:
+        base: model that the round began with.
+        signatures: scored candidates, best first.
+        corrected: p value by label, corrected for their number.
+        fitted: refitted candidates, best first.
+        winner: accepted one.
+        rivals: fitted ones that the data cannot tell from it.
+    """
+
+    base: Fitted
+    signatures: list[Signature]
+    corrected: dict[str, float]
+    fitted: list[Fitted] = field(default_factory=list)
+    winner: Fitted | None = None
+    rivals: list[Fitted] = field(default_factory=list)
+
+
+def step_error(problem: Problem, theta: Vector) -> dict[str, Vector]:
+    """How far the exchange at communication points is from a continuous one, by run.
+
+    The exchange is of first order in the step: twice the change that halving it makes
+    (Richardson). In the units of the channels.
+    """
+    half = problem._with(step=problem.step / 2.0)
+    try:
+        coarse, fine = problem.residuals(theta, None), half.residuals(theta, None)
+    finally:
+        half.close()
+    return {
+        name: 2.0 * (first - second) * problem.sigma
+        for (name, first), (_, second) in zip(coarse, fine, strict=True)
+    }
+
+
+def corrected(problem: Problem, theta: Vector) -> Problem:
+    """The problem with what the communication step adds to the model taken from the data instead.
+
+    It varies little with the parameters, so thousands of cheap simulations can be compared with
+    the data as if they were exact (deferred correction).
+    """
+    errors = step_error(problem, theta)
+    return problem.with_data({run.name: run.data - errors[run.name] for run in problem.runs})
+
+
+class Search:
+    """Attribution on one problem.
+
+    Args:
+        problem: declared system.
+        say: told what is done.
+        only: candidates to consider, all of the catalogue if not given.
+    """
+
+    def __init__(
+        self, problem: Problem, say: Say = lambda text: None, only: list[Candidate] | None = None
+    ) -> None:
+        self.say = say
+        self.declared = self.raw = problem
+        self.known = candidates(problem) if only is None else only
+        self.evaluations = 0
+        self.rounds: list[Round] = []
+        self._take(problem)
+
+    def _take(self, problem: Problem) -> None:
+        self.declared = problem
+        self.fitting = Layout(problem, problem.chosen("identification"))
+        checks = problem.chosen(CHECK) or problem.chosen("identification")
+        self.checking = Layout(problem, checks)
+        self.fit_data = self._data(self.fitting)
+        self.check_data = self._data(self.checking)
+
+    def _data(self, layout: Layout) -> Vector:
+        return layout.vector([run.data / self.declared.sigma for run in layout.runs])
+
+    def calibrated(self) -> Fitted:
+        """Fit the declared system, errors of the communication step removed from then on."""
+        first = fit(self.raw, None, limit=6, robust=True, polish=False)
+        self.evaluations += first.evaluations
+        self.say(
+            f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
+        )
+        self._take(corrected(self.raw, first.theta))
+        estimate = fit(self.declared, first.theta, limit=6, robust=False, polish=True)
+        return self.judged(estimate)
+
+    def fitted(self, problem: Problem, theta: Vector | None, *, near: bool) -> Fitted:
+        """Fit a model, from a point close by or from far away."""
+        estimate = fit(problem, theta, limit=6 if near else 10, robust=not near, polish=not near)
+        return self.judged(estimate)
+
+    def judged(self, estimate: Estimate) -> Fitted:
+        """A fit with its model values."""
+        problem = estimate.problem
+        self.evaluations += estimate.evaluations
+        return Fitted(
+            (),
+            estimate,
+            model_values(problem, estimate.theta, self.fitting),
+            model_values(problem, estimate.theta, self.checking),
+        )
+
+    # -- one round ---------------------------------------------------------------------------------
+
+    def absorber(self, fitted: Fitted) -> Absorber:
+        """Of a fitted model."""
+        jacobian = self.fitting.matrix(fitted.estimate.jacobian, fitted.problem.scale)
+        return Absorber(jacobian, fitted.problem)
+
+    def scored(self, base: Fitted) -> Round:
+        """Score all candidates against a model's residual."""
+        bench = Bench(
+            base.problem, base.estimate.theta, self.fitting, base.fit,
+            self.fit_data - base.fit, self.absorber(base),
+        )  # fmt: skip
+        present = {item.label for item in base.effects}
+        signatures = []
+        for item in self.known:
+            if item.label not in present:
+                found = bench.signature(item)
+                if found is not None:
+                    signatures.append(found)
+        self.evaluations += bench.evaluations
+        signatures = merge(signatures)
+        corrected = holm([s.score.p_value for s in signatures])
+        named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
+        signatures.sort(key=lambda s: -s.score.gain)
+        return Round(base, signatures, named)
+
+    def promising(self, current: Round) -> list[Signature]:
+        """Candidates worth a refit: significant, the best gains first."""
+        good = [
+            s
+            for s in current.signatures
+            if not s.unseen and current.corrected[s.candidate.label] < LEVEL and s.score.gain > GATE
+        ]
+        return good[:REFITS]
+
+    def refit(self, base: Fitted, item: Signature, *, secondary: bool = False) -> Fitted | None:
+        """Fit declared parameters and the effect's strength (or all its parameters) together."""
+        problem = item.problem
+        _, others = new_parameters(base.problem, problem)
+        value = item.value * (item.score.amplitude or 1.0)
+        value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
+        span = abs(value) or item.strength.span
+        moved = [replace(p, span=span) if p.name == item.strength.name else p
+                 for p in problem.parameters]  # fmt: skip
+        problem = problem.with_parameters(moved)
+        if not secondary and others:
+            problem = problem.hold({p.name: p.nominal for p in others})
+        absorber = self.absorber(base)
+        residual = self.fit_data - base.fit - item.score.amplitude * item.change
+        shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
+        starts = []
+        for factor in (1.0, 0.0):
+            theta = problem.nominal
+            count = base.estimate.theta.size
+            theta[:count] = base.estimate.theta + factor * shift
+            theta[problem.index(item.strength.name)] = value
+            starts.append(np.clip(theta, problem.lower, problem.upper))
+        try:
+            costs = [self._cost(problem, theta) for theta in starts]
+            result = self.fitted(problem, starts[int(np.argmin(costs))], near=True)
+        except CosimError as error:
+            self.say(f"{item.candidate.label} could not be refitted: {error}")
+            return None
+        result.effects = (*base.effects, item.candidate)
+        result.signature = item
+        return result
+
+    def _cost(self, problem: Problem, theta: Vector) -> float:
+        values = model_values(problem, theta, self.fitting)
+        return float(np.sum((self.fit_data - values) ** 2))
+
+    def round(self, base: Fitted) -> Round:
+        """Score, refit the best, choose."""
+        current = self.scored(base)
+        for item in self.promising(current):
+            fitted = self.refit(base, item)
+            if fitted is None:
+                continue
+            fitted.p_value = current.corrected[item.candidate.label]
+            fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
+            current.fitted.append(fitted)
+            self.say(
+                f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
+                f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
+            )
+        current.fitted.sort(key=lambda f: -self.total(base, f))
+        for fitted in current.fitted:
+            if fitted.gate is not None and fitted.gate.passed:
+                current.winner = fitted
+                break
+        if current.winner is not None:
+            current.rivals = [
+                f for f in current.fitted if f is not current.winner and f.gate is not None
+                and f.gate.passed and not self.apart(f, current.winner)
+            ]  # fmt: skip
+        self.rounds.append(current)
+        return current
+
+    def gain(self, base: Fitted, other: Fitted) -> float:
+        """Log likelihood gained on the identification runs, less one per additional parameter."""
+        return base.estimate.cost - other.estimate.cost - (other.free - base.free)
+
+    def total(self, base: Fitted, other: Fitted) -> float:
+        """Log likelihood gained on all runs."""
+        return self.gain(base, other) + (other.gate.gain if other.gate is not None else 0.0)
+
+    def apart(self, first: Fitted, second: Fitted) -> bool:
+        """Whether the runs tell two models apart."""
+        checked = compare(self.check_data, first.check, second.check, self.checking)
+        fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
+        return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
+
+    def test(self, first: Fitted, second: Fitted) -> Score:
+        """Score of the step between two models on unused runs."""
+        return score(second.check - first.check, self.check_data - first.check, self.checking, 0)
+
+
+def strengths(parameters: tuple[Parameter, ...]) -> list[Parameter]:
+    """Strengths of effects among parameters."""
+    return [p for p in parameters if p.strength]

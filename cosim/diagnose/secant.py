@@ -1,0 +1,181 @@
+"""Signatures of effects by secants: full simulations with the effect at a sensible strength.
+
+Derivatives at strength 0 do not see effects with a threshold (a limit that does not bind), so a
+strength is tried, what the residual asks for is estimated, and the simulation is repeated there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.problem import Parameter, Problem
+from ..errors import CosimError
+from .candidates import Candidate, new_parameters
+from .linear import ABSORBED, Absorber, Layout, Score, score
+
+Vector = NDArray[np.float64]
+VISIBLE = 1.0
+"""Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
+WORTH = 10.0
+"""Gain [nats] below which a third trial is not worth its simulations: after correction for the
+number of candidates it would not be significant."""
+GREATEST = 1e3
+"""Factor by which one trial may exceed the one before."""
+
+
+@dataclass
+class Signature:
+    """What a candidate does to the model values.
+
+    Attributes:
+        candidate: which.
+        problem: with the effect added.
+        strength: its strength parameter.
+        value: strength at which the secant was taken.
+        change: model values over sigma with the effect less those without (float32).
+        rest: what of it calibration cannot absorb.
+        score: of `rest` against the residual.
+        absorbed: share of the signature's energy that calibration absorbs.
+        same: labels of candidates with the same signature.
+    """
+
+    candidate: Candidate
+    problem: Problem
+    strength: Parameter
+    value: float
+    change: NDArray[np.float32]
+    rest: NDArray[np.float32]
+    score: Score
+    absorbed: float
+    same: tuple[str, ...] = ()
+
+    @property
+    def unseen(self) -> bool:
+        """Whether calibration absorbs it, or the runs do not show it at all."""
+        return self.absorbed > 1.0 - ABSORBED or self.score.size == 0.0
+
+
+class Bench:
+    """Simulates candidates around one calibrated point.
+
+    Args:
+        problem: without the candidates.
+        theta: calibrated values.
+        layout: of the identification runs.
+        model: model values over sigma at theta.
+        residual: of theta.
+        absorber: of the calibration.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        theta: Vector,
+        layout: Layout,
+        model: Vector,
+        residual: Vector,
+        absorber: Absorber,
+    ) -> None:
+        self.problem, self.theta, self.layout = problem, theta, layout
+        self.model, self.absorber = model, absorber
+        self.residual = absorber.rest(residual)
+        self.evaluations = 0
+
+    def at(self, problem: Problem, strength: Parameter, value: float) -> Vector:
+        """Model values over sigma with one effect at a strength."""
+        theta = problem.nominal
+        theta[: self.theta.size] = self.theta
+        theta[problem.index(strength.name)] = value
+        self.evaluations += len(self.layout.runs)
+        return model_values(problem, theta, self.layout)
+
+    def signature(self, candidate: Candidate) -> Signature | None:
+        """Signature at the strength that the residual asks for; None if it cannot be simulated."""
+        try:
+            problem = candidate.added_to(self.problem)
+            problem.system()
+        except CosimError:
+            return None
+        strengths, _ = new_parameters(self.problem, problem)
+        if len(strengths) != 1:
+            return None
+        strength = strengths[0]
+        best: Signature | None = None
+        value = strength.span
+        tried: list[float] = []
+        previous = 0.0
+        for _ in range(4):
+            value = float(np.clip(value, strength.minimum, strength.maximum))
+            if value == 0.0 or any(abs(value / old - 1.0) < 0.3 for old in tried):
+                break
+            tried.append(value)
+            try:
+                change = self.at(problem, strength, value) - self.model
+            except CosimError:
+                value *= 0.1  # too strong for the system to run
+                continue
+            found = self._measure(candidate, problem, strength, value, change)
+            if best is None or found.score.gain > best.score.gain:
+                best = found
+            if len(tried) > 1 and found.score.gain < max(1.2 * previous, WORTH):
+                break
+            previous = found.score.gain
+            if found.unseen and (found.score.size > VISIBLE or not np.any(change)):
+                break
+            factor = found.score.amplitude
+            if factor < 0.0 and strength.minimum >= 0.0:
+                # the strength cannot be negative: see whether a small one wants to be positive
+                factor = 0.1
+            size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
+            value *= float(np.sign(factor) or 1.0) * min(size, GREATEST)
+        problem.close()
+        return best
+
+    def _measure(
+        self,
+        candidate: Candidate,
+        problem: Problem,
+        strength: Parameter,
+        value: float,
+        change: Vector,
+    ) -> Signature:
+        rest = self.absorber.rest(change)
+        total = float(change @ change)
+        absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
+        result = score(rest, self.residual, self.layout, self.theta.size)
+        if result.amplitude < 0.0 and strength.minimum >= 0.0:
+            result = replace(result, amplitude=0.0, gain=0.0, z=0.0, p_value=1.0)
+        return Signature(
+            candidate, problem, strength, value, change.astype(np.float32),
+            rest.astype(np.float32), result, absorbed,
+        )  # fmt: skip
+
+
+def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:
+    """Model values over sigma at all measured samples."""
+    runs = [run.name for run in layout.runs]
+    residuals = problem.residuals(theta, runs)
+    rows = [
+        run.data / problem.sigma - r for run, (_, r) in zip(layout.runs, residuals, strict=True)
+    ]
+    return layout.vector(rows)
+
+
+def merge(signatures: list[Signature]) -> list[Signature]:
+    """Leave one of those whose signatures are the same up to a factor, the first one."""
+    kept: list[Signature] = []
+    for item in signatures:
+        size = float(np.linalg.norm(item.change))
+        for other in kept:
+            product = float(item.change @ other.change)
+            norm = size * float(np.linalg.norm(other.change))
+            # 1e-4: sine of the angle between float32 signatures of the same simulation
+            if norm > 0.0 and abs(product) / norm > 1.0 - 1e-6:
+                other.same = (*other.same, item.candidate.label)
+                break
+        else:
+            kept.append(item)
+    return kept

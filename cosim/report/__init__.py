@@ -1,0 +1,5 @@
+"""Reports of diagnoses as web pages that need nothing else."""
+
+from .page import write_page
+
+__all__ = ["write_page"]
