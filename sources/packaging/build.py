@@ -152,14 +152,19 @@ def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
 
 
 def _libraries(source: str, identifier: str, fmi: int, platforms: list[str]) -> dict[str, bytes]:
-    def compiled(platform: str) -> tuple[str, bytes]:
+    with ThreadPoolExecutor(len(platforms)) as pool:
+        compiled = pool.map(lambda p: native.compile_library(source, identifier, p), platforms)
+        made = dict(zip(platforms, compiled, strict=True))
+    files = {}
+    for platform, library in made.items():
         target = native.PLATFORMS[platform]
         folder = target.fmi2 if fmi == 2 else target.fmi3
-        library = native.compile_library(source, identifier, platform)
-        return f"binaries/{folder}/{identifier}{target.suffix}", library
-
-    with ThreadPoolExecutor(len(platforms)) as pool:
-        return dict(pool.map(compiled, platforms))
+        files[f"binaries/{folder}/{identifier}{target.suffix}"] = library
+    mac = [library for platform, library in made.items() if platform.endswith("darwin")]
+    if fmi == 2 and mac:
+        # importers of FMI 2, FMPy among them, look there on every Mac
+        files[f"binaries/darwin64/{identifier}.dylib"] = native.universal(mac)
+    return files
 
 
 def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:

@@ -6,10 +6,12 @@ import hashlib
 import importlib.metadata
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -150,6 +152,21 @@ def with_token(source: str, token: str) -> str:
 def compiler_version() -> str:
     """Name and version of the compiler, part of every cache key."""
     return f"ziglang {importlib.metadata.version('ziglang')}"
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """One macOS library that holds those of several processors, a "fat" Mach-O file."""
+    if len(libraries) == 1:
+        return libraries[0]
+    page = 1 << 14
+    header = struct.pack(">II", 0xCAFEBABE, len(libraries))
+    body = b""
+    for library in libraries:
+        _, processor, variant = struct.unpack_from("<III", library)
+        body += b"\0" * (-len(body) % page)
+        header += struct.pack(">5I", processor, variant, page + len(body), len(library), 14)
+        body += library
+    return header.ljust(page, b"\0") + body
 
 
 def compile_library(source: str, identifier: str, platform: str) -> bytes:
