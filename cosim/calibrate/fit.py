@@ -26,6 +26,8 @@ STEPS = (2e-2, 5e-3, 1e-2)
 """Steps of differences over the span, from the first iterations to the last."""
 REUSED = 0.02
 """A Jacobian is used again after a step that lowered the cost by this fraction."""
+UNEVEN = 10.0
+"""Runs are fitted one half after the other if their mean errors differ by more than this factor."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 KNOWN = 0.25
@@ -366,7 +368,7 @@ def fit(
     """
     begun = problem.evaluations
     run = _Fit(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
-    if robust:
+    if robust and _uneven(run):
         run = _Fit(problem, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
         typical = float(np.median(np.abs(sizes))) if sizes.size else 1.0
@@ -382,6 +384,12 @@ def fit(
     if polish:
         run.polish()
     return _estimate(run)
+
+
+def _uneven(run: _Fit) -> bool:
+    """Whether some runs are much farther off than others."""
+    sizes = [float(np.nanmean(np.minimum(np.abs(r), 1e6))) for _, r in run.residuals]
+    return max(sizes) > UNEVEN * max(min(sizes), 1.0)
 
 
 def _calmest(run: _Fit) -> list[str]:

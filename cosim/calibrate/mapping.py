@@ -1,8 +1,9 @@
 """Reads a data set and the mapping of its rig to a system: the parts of a calibration problem.
 
-`dataset.toml` (docs/datasets.md has the schema) says which system describes the rig, which variables
-the sheet's parameters set, which columns drive inputs, and what each measured column is in the model.
-It is looked for in the data set's folder, above it, and among the scenarios by its `rig`.
+`dataset.toml` (docs/datasets.md has the schema) says which system describes the rig, which
+variables the sheet's parameters set, which columns drive inputs, and what each measured column is
+in the model. It is looked for in the data set's folder, above it, and among the scenarios by its
+`rig`.
 """
 
 from __future__ import annotations
@@ -28,11 +29,12 @@ from .problem import Channel, Parameter, Problem, Run, check_parameters
 Vector = NDArray[np.float64]
 KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
-    "inputs", "starts", "channels", "parameter", "nuisance",
+    "inputs", "starts", "channels", "parameter", "nuisance", "lead",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
-            "window", "unit", "subtract"}  # fmt: skip
-_RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
+            "window", "unit", "shift"}  # fmt: skip
+_INPUT = {"column", "columns", "gain", "unit", "interpolation"}
+_RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 _ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
 
 
@@ -74,11 +76,12 @@ def find_system(path: Path, name: str) -> SystemFile:
 
 
 def expand(name: str) -> list[str]:
-    """Column names behind a sheet's `q_1..6` (other names stand for themselves)."""
-    match = _RANGE.fullmatch(name.replace(" ", ""))
+    """Column names behind a sheet's `q_1..6` or `m1..5_x` (others stand for themselves)."""
+    match = _RANGE.fullmatch(name)
     if match is None:
         return [name]
-    return [f"{match['stem']}{i}" for i in range(int(match["first"]), int(match["last"]) + 1)]
+    numbers = range(int(match["first"]), int(match["last"]) + 1)
+    return [f"{match['stem']}{i}{match['tail']}" for i in numbers]
 
 
 def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
@@ -157,7 +160,12 @@ class _Mapping:
             value = _lookup(fixed, key, f"{self.path}: [fixed]")
             constants.update({name: factor * value for name, factor in
                               _targets(entry, f"{self.path}: {key}")})  # fmt: skip
-        channels = [self.channel(name, entry) for name, entry in table["channels"].items()]
+        self.columns: dict[str, str] = {}
+        channels = [
+            self.channel(one, {**entry, "signal": entry.get("signal", "").replace("{}", str(i))})
+            for name, entry in table["channels"].items()
+            for i, one in enumerate(expand(name), 1)
+        ]
         present = [c for c in channels if any(self._column(c) in log.columns
                                               for log in self.logs.values())]  # fmt: skip
         parameters = [*self.declared(), *self.others()]
@@ -177,15 +185,16 @@ class _Mapping:
         )
 
     def _column(self, channel: Channel) -> str:
-        return str(self.table["channels"][channel.name].get("column", channel.name))
+        return self.columns[channel.name]
 
     def channel(self, name: str, entry: Mapping[str, Any]) -> Channel:
         """One measured column."""
         where = f"{self.path}: channel {name}"
         unknown = set(entry) - _CHANNEL
-        if unknown or "signal" not in entry:
+        if unknown or not entry["signal"]:
             raise ScenarioError(f"{where}: wrong keys {sorted(unknown)}, or no signal")
         column = str(entry.get("column", name))
+        self.columns[name] = column
         sigma = float(entry.get("sigma", self.noise.get(column, 0.0)))
         rounding = float(entry.get("quantum", 0.0)) ** 2 / 12.0 * int(entry.get("roundings", 1))
         sigma = math.sqrt(sigma**2 + rounding)
@@ -200,6 +209,7 @@ class _Mapping:
             float(entry.get("offset", 0.0)),
             str(entry.get("transform", "sample")),
             float(entry.get("window", 0.0)),
+            float(entry.get("shift", 0.0)),
         )
 
     def declared(self) -> list[Parameter]:
@@ -261,17 +271,20 @@ class _Mapping:
             where = f"{self.path}: [starts] {key}"
             value = self.value(key, name, where)
             starts.update({n: factor * value for n, factor in _targets(entry, where)})
+        lead = float(self.table.get("lead", 0.0))
         return Run(
             name,
             self.data.runs[name].purpose,
-            log.time,
+            log.time + lead,
             np.column_stack([self._measured(log, c) for c in channels]),
             {
-                target: self._input(log, target, entry)
+                one: signal
                 for target, entry in self.table.get("inputs", {}).items()
+                for one, signal in self._inputs(log, target, entry, lead).items()
             },
             starts,
             log.values,
+            lead,
         )
 
     def _measured(self, log: Log, channel: Channel) -> Vector:
@@ -280,14 +293,38 @@ class _Mapping:
             return np.full(log.time.shape, np.nan)
         return log[column]
 
-    def _input(self, log: Log, target: str, entry: Any) -> Table:
+    def _inputs(self, log: Log, target: str, entry: Any, lead: float) -> dict[str, Table]:
+        """The signals of an input, or of all elements of a vector input."""
         if isinstance(entry, str):
             entry = {"column": entry}
-        column = str(entry["column"])
+        where = f"{self.path}: input {target}"
+        unknown = set(entry) - _INPUT
+        if unknown or not {"column", "columns"} & set(entry):
+            raise ScenarioError(f"{where}: wrong keys {sorted(unknown)}, or no column")
+        if "column" in entry:
+            return {target: self._input(log, str(entry["column"]), entry, lead)}
+        columns = entry["columns"]
+        names = expand(columns) if isinstance(columns, str) else list(columns)
+        return {f"{target}[{i}]": self._input(log, column, entry, lead)
+                for i, column in enumerate(names, 1)}  # fmt: skip
+
+    def _input(self, log: Log, column: str, entry: Mapping[str, Any], lead: float) -> Table:
+        values = log[column] * float(entry.get("gain", 1.0))
+        times, how = log.time + lead, str(entry.get("interpolation", "hold"))
+        if how == "slope":  # of the interval that begins
+            values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
+            before = 0.0
+        elif how == "window":  # mean over the interval that ends
+            values, how = np.append(values[1:], values[-1]), "hold"
+            before = float(values[0])
+        else:
+            before = float(values[0])
+        if lead > 0.0:
+            times, values = np.append(0.0, times), np.append(before, values)
         return Table(
-            log.time,
-            log[column] * float(entry.get("gain", 1.0)),
+            times,
+            values,
             unit=str(entry.get("unit", "")),
-            interpolation=entry.get("interpolation", "hold"),
+            interpolation=how,  # type: ignore[arg-type]
             text=f"{log.name}:{column}",
         )

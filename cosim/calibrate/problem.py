@@ -87,6 +87,8 @@ class Channel:
         gain, offset: column = gain * signal + offset.
         transform: `sample`; `mean` or `difference` over the `window` before the sample.
         window: [s].
+        shift: the column's value at t is the signal's at t + shift [s], where the exchange delays
+            the signal.
     """
 
     name: str
@@ -97,9 +99,11 @@ class Channel:
     offset: float = 0.0
     transform: str = "sample"
     window: float = 0.0
+    shift: float = 0.0
 
     def of(self, times: Vector, recorded: Vector, values: Vector) -> Vector:
         """What the channel would read at `times`."""
+        times = times + self.shift
         if self.transform == "sample":
             result = _at(times, recorded, values)
         elif self.transform == "difference":
@@ -120,6 +124,12 @@ def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
         interval = recorded[1] - recorded[0] if recorded.size > 1 else 1.0
         if np.max(np.abs(times - recorded)) <= COINCIDENT * interval:
             return values
+    if recorded.size > 1:
+        interval = recorded[1] - recorded[0]
+        index = np.clip(np.rint((times - recorded[0]) / interval).astype(np.intp), 0, None)
+        index = np.minimum(index, recorded.size - 1)
+        if np.max(np.abs(times - recorded[index])) <= COINCIDENT * interval:
+            return values[index]
     return np.interp(times, recorded, values)
 
 
@@ -135,6 +145,7 @@ class Run:
         inputs: what drives the system's open inputs.
         starts: full variable name -> start value that is known for this run.
         values: entries of the run in its description.
+        lead: the simulation begins this much before the first sample [s].
     """
 
     name: str
@@ -144,6 +155,7 @@ class Run:
     inputs: Mapping[str, Signal]
     starts: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
+    lead: float = 0.0
 
 
 class Sensitivity(NamedTuple):
@@ -304,8 +316,9 @@ class Problem:
         interval = self.period or float(np.median(np.diff(run.times)))
         every = max(round(interval / self.step), 1)
         size = every * self.step
-        first = float(run.times[0])
-        count = math.ceil((float(run.times[-1]) - first) / size - COINCIDENT)
+        first = float(run.times[0]) - run.lead
+        last = float(run.times[-1]) + max(channel.shift for channel in self.channels)
+        count = math.ceil((last - first) / size - COINCIDENT)
         return Session(
             master,
             count * size,
