@@ -127,7 +127,14 @@ def whole_or_part(index: int, parts: int, part: int) -> tuple[int, ...]:
     return (Op.STEP, index) if parts == 1 else (Op.SUBSTEP, index, parts * PARTS + part)
 
 
-def refuse_without_states(system: System, algorithm: str) -> None:
+def positive(name: str, value: float) -> float:
+    """The value of an option that must be a positive number."""
+    if not isinstance(value, (int, float)) or not 0.0 < value < float("inf"):
+        raise ValueRangeError(f"option {name} = {value!r} must be a positive number")
+    return float(value)
+
+
+def refuse_without_states(system: System, algorithm: str, variable: bool = False) -> None:
     """Algorithms that repeat steps need FMUs that can return to a saved state.
 
     Raises:
@@ -143,4 +150,14 @@ def refuse_without_states(system: System, algorithm: str) -> None:
             f"algorithm {algorithm!r} repeats steps, but these FMUs declare that they cannot "
             f"return to a saved state: {', '.join(unable)}; take jacobi or gauss_seidel, with "
             "extrapolation = 1 for second order"
+        )
+    fixed = [
+        f"{member.name} ({member.reference})"
+        for member in system.members.values()
+        if not member.description.can("canHandleVariableCommunicationStepSize")
+    ]
+    if variable and fixed:
+        raise InputError(
+            f"algorithm {algorithm!r} changes the step, but these FMUs declare that they cannot "
+            f"follow: {', '.join(fixed)}; take iterated, jacobi or gauss_seidel"
         )

@@ -158,8 +158,8 @@ class Newton:
         valid: one number, whether `inverse` is good for anything.
     """
 
-    def __init__(self, n: int) -> None:
-        self.n = n
+    def __init__(self, n: int, tolerance: float = SETTLED) -> None:
+        self.n, self.tolerance = n, tolerance
         self.inverse = np.zeros((n, n))
         self.valid = np.zeros(1, dtype=np.int64)
 
@@ -187,7 +187,7 @@ class Newton:
                     return False
                 renewed = True
             size, change = self.newton_step(rest, z)
-            if size <= SETTLED and not renewed:
+            if size <= self.tolerance and not renewed:
                 return True
             if not renewed and last > 0.0 and not size <= CONTRACTION * last:
                 if not self.difference(function, z, value):

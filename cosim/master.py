@@ -30,10 +30,12 @@ from .errors import (
     listing,
 )
 from .instance import Instance
+from .iteration import Iterated
 from .loops import Newton
 from .plan import PARTS, Loop, Mean, Op, Plan
 from .recording import Recording
 from .signals import Signal, as_signal
+from .step_control import StepControl
 from .system import System
 from .units import conversion, parse
 
@@ -262,6 +264,8 @@ class _Run:
         self.bound: kernel.Kernel | None = None
         self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
         self.history = np.zeros((len(plan.means), 3))
+        self.iterated: Iterated | None = None
+        self.control: StepControl | None = None
         self.started = False
 
     # -- phases ----------------------------------------------------------------------------------
@@ -270,7 +274,7 @@ class _Run:
         self.initialize()
         shown = max(count // 100, 1)
         try:
-            advance = self.compiled() or self.interpreted()
+            advance = self.executor()
             while self.index < count:
                 advance(min(self.index + shown, count))
                 if progress is not None:
@@ -297,6 +301,10 @@ class _Run:
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
         self.started = False
+        if self.iterated is not None:
+            self.iterated.restart()
+        if self.control is not None:
+            self.control.restart()
         for newton in self.newtons:
             newton.valid[0] = 0
         for instance, member in zip(
@@ -306,6 +314,22 @@ class _Run:
             instance.set(member.parameters)
         if self.bound is not None:
             self.bound.restart()
+
+    def executor(self) -> Callable[[int], None]:
+        """What makes communication steps up to an index."""
+        settings = self.plan.iteration
+        if settings is None:
+            return self.compiled() or self.interpreted()
+        if self.master.executor == "c":
+            raise ValueRangeError(
+                f"executor 'c': algorithm {self.plan.algorithm!r} repeats steps, which the one "
+                "in Python does; take executor auto"
+            )
+        if settings.adaptive:
+            self.control = StepControl(self, settings)
+            return self.control.advance
+        self.iterated = Iterated(self, settings)
+        return self.interpreted()
 
     def interpreted(self) -> Callable[[int], None]:
         """The executor in Python: communication steps up to an index."""
@@ -511,6 +535,9 @@ class _Run:
                 self.account()
             case Op.SOLVE:
                 self.solve(a)
+            case Op.ITERATE:
+                if self.iterated is not None:
+                    self.iterated.step()
             case Op.NOTE:
                 self.history[:, 1:] = self.history[:, :-1].copy()
                 self.history[:, 0] = [values[mean.source] for mean in self.plan.means]
@@ -542,7 +569,10 @@ class _Run:
         self.previous = values[layout.bond_output].tolist()
         if self.index % self.every:
             return
-        row = values[layout.record_source] * layout.record_gain + layout.record_offset
+        self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+
+    def keep(self, row: Vector) -> None:
+        """Add a row to the recording."""
         if not np.isfinite(row).all():
             name = self.observed[int(np.flatnonzero(~np.isfinite(row))[0])]
             value = row[self.observed.index(name)]
@@ -560,6 +590,12 @@ class _Run:
             mean = self.previous[term] + outputs[term]
             self.bond_energy[bond] += layout.bond_sign[term] * inputs[term] * mean * half
 
+    def steps(self) -> int:
+        """Steps of the whole system that were made, repeated ones too."""
+        if self.control is not None:
+            return 3 * (self.control.taken + self.control.rejected)
+        return self.iterated.repetitions if self.iterated is not None else self.index
+
     def recording(self, error: str) -> Recording:
         return Recording(
             time=self.times[:: self.every][: self.row].copy(),
@@ -569,7 +605,8 @@ class _Run:
             provenance={
                 **self.master.provenance(),
                 "inputs": {name: signal.text for name, signal in self.signals.items()},
-                "fmu_steps": self.index * len(self.instances),
+                "fmu_steps": self.steps() * len(self.instances),
+                **({"step_control": self.control.report()} if self.control else {}),
             },
             bond_energy={
                 bond.name: float(energy)

@@ -121,15 +121,17 @@ class Iteration:
     Attributes:
         tolerance: relative change of exchanged values at which they count as settled; of step
             control, the error of one step.
-        sweep: operations that make outputs consistent with inputs at one instant.
         smooth: per copy, whether its values are continuous in time.
         energy: step control: energy that the coupling may invent, relative to what it passes on.
+        longest: step control: longest step [s].
+        adaptive: whether steps are controlled.
     """
 
     tolerance: float
-    sweep: Integers
     smooth: NDArray[np.bool_]
     energy: float = np.inf
+    longest: float | None = None
+    adaptive: bool = False
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ class Session:
         self._stack = ExitStack()
         try:
             self._run = _Run(master, plan, observed, external, times, every, signals, self._stack)
-            self._advance = self._run.compiled() or self._run.interpreted()
+            self._advance = self._run.executor()
             self._blocks = {name: self._block(name) for name in self.targets}
         except BaseException:
             self._stack.close()
