@@ -330,8 +330,9 @@ def catalogue_page() -> str:
             "# FMUs",
             "",
             "This folder receives the built FMUs: `fmi2/` and `fmi3/` (native, co-simulation and",
-            "model exchange), `python/` (pythonfmu twins). `cosim fmus build --platform all` builds",
-            f"the catalogue below, {len(names())} variants; any other combination builds by its name.",
+            "model exchange), `python/` (pythonfmu twins). `cosim fmus build --platform all`",
+            f"builds the catalogue below, {len(names())} variants; any other combination builds",
+            "by its name.",
             "Written by `python -m sources.tables`.",
             "",
             _table(
