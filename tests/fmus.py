@@ -71,7 +71,11 @@ class Slave:
             self.fmu.instantiate(callbacks=self._callbacks, loggingOn=chatty)
         else:
             self.fmu = FMU3Slave(**arguments)
-            self.fmu.instantiate()
+            self.fmu.instantiate(
+                logMessage=lambda _env, _status, _category, text: self.messages.append(
+                    text.decode()
+                )
+            )
         if initialize:
             self.initialize(values)
 
