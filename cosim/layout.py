@@ -23,8 +23,8 @@ GAP, PASS = 26.0, 9.0
 TRACK, MARGIN = 11.0, 24.0
 """Distance of vertical tracks, and of the outer ones to the columns."""
 SWEEPS = 24
-NUDGE = 14.0
-"""How far an item is moved to make a wire straight."""
+NUDGE, APART = 14.0, 4.5
+"""How far an item is moved at the end, and how near lines of two nets may lie."""
 
 
 @dataclass
@@ -312,36 +312,53 @@ class Layout:
                     item.y = y
             if sweep < SWEEPS:
                 self._sort_ports()
-        self._straighten()
+        self._adjust()
         top = min((item.y for item in self.items.values()), default=0.0)
         for item in self.items.values():
             item.y = round(item.y - top, 1)
 
-    def _straighten(self) -> None:
-        """Shift items a little where that makes wires straight."""
+    def _adjust(self) -> None:
+        """Shift items a little: wires straight, and those of other nets not beside each other."""
         for column in [*self.columns, *reversed(self.columns)]:
             for index, item in enumerate(column):
                 low, high = item.y - NUDGE, item.y + NUDGE
                 if index:
                     above = column[index - 1]
-                    low = max(
-                        low, above.y + above.height + above.foot + 0.75 * _distance(above, item)
-                    )
+                    gap = 0.75 * _distance(above, item)
+                    low = max(low, above.y + above.height + above.foot + gap)
                 if index + 1 < len(column):
                     below = column[index + 1]
                     high = min(
                         high, below.y - item.height - item.foot - 0.75 * _distance(item, below)
                     )
-                gain: dict[float, float] = {}
+                tries = {item.y, *(item.y + shift for shift in range(-int(NUDGE), int(NUDGE) + 1))}
                 for port in item.ports.values():
-                    for other, weight in self._neighbours.get(
-                        (item.name, port.side, port.name), ()
-                    ):
-                        y = round(self._at(other) - port.offset, 3)
-                        if low <= y <= high:
-                            gain[y] = gain.get(y, 0.0) + weight
-                if gain:
-                    item.y = max(sorted(gain), key=lambda y: gain[y])
+                    for other, _ in self._partners(port):
+                        tries.add(self._at(other) - port.offset)
+                inside = sorted(y for y in tries if low <= y <= high)
+                if inside:
+                    home = item.y
+                    item.y = min(inside, key=lambda y, i=item, h=home: self._cost(i, y, h))
+
+    def _partners(self, port: Port) -> list[tuple[Port, float]]:
+        return self._neighbours.get((port.box, port.side, port.name), [])
+
+    def _cost(self, item: Item, y: float, home: float) -> float:
+        """What is bad about a height: lines of other nets beside those of its own."""
+        cost = 0.05 * abs(y - home)
+        for port in item.ports.values():
+            partners = {id(other): weight for other, weight in self._partners(port)}
+            across = item.layer + port.side
+            for other in self.columns[across] if 0 <= across < len(self.columns) else ():
+                for facing in other.ports.values():
+                    if facing.side != -port.side:
+                        continue
+                    distance = abs(y + port.offset - self._at(facing))
+                    if id(facing) in partners:
+                        cost -= 2.0 * partners[id(facing)] * (distance <= 0.5)
+                    elif distance < APART:
+                        cost += 3.0
+        return cost
 
     # -- ways --------------------------------------------------------------------------------------
 
