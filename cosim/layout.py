@@ -336,16 +336,15 @@ class Layout:
                     for other, _ in self._partners(port):
                         tries.add(self._at(other) - port.offset)
                 inside = sorted(y for y in tries if low <= y <= high)
-                if inside:
-                    home = item.y
-                    item.y = min(inside, key=lambda y, i=item, h=home: self._cost(i, y, h))
+                costs = {y: self._cost(item, y) for y in inside}
+                item.y = min(inside, key=costs.__getitem__, default=item.y)
 
     def _partners(self, port: Port) -> list[tuple[Port, float]]:
         return self._neighbours.get((port.box, port.side, port.name), [])
 
-    def _cost(self, item: Item, y: float, home: float) -> float:
+    def _cost(self, item: Item, y: float) -> float:
         """What is bad about a height: lines of other nets beside those of its own."""
-        cost = 0.05 * abs(y - home)
+        cost = 0.05 * abs(y - item.y)
         for port in item.ports.values():
             partners = {id(other): weight for other, weight in self._partners(port)}
             across = item.layer + port.side
