@@ -22,7 +22,7 @@ from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
-from . import algorithms, library, scenario
+from . import algorithms, kernel, library, scenario
 from .archive import cache_folder, open_fmu
 from .cli_diagnose import diagnose_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
@@ -100,6 +100,12 @@ class Builder:
     def __init__(self, out: Path | None = None) -> None:
         self.out = out or cache_folder() / "fmus"
         self._build = _sources("packaging.build").build
+        if kernel.find() is None:  # a checkout's first run: compile the executor as an FMU
+            _sources("packaging.kernel").build_kernel(
+                kernel.SOURCE,
+                kernel.cache_folder() / kernel.library_name(),
+                _sources("packaging.build").host_platform(),
+            )
 
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU, built if it is not there."""
