@@ -24,6 +24,7 @@ from rich.table import Table
 
 from . import algorithms, kernel, library, scenario
 from .archive import cache_folder, open_fmu
+from .cli_calibrate import calibrate_command
 from .cli_diagnose import diagnose_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from .provider import FolderProvider, Provider
@@ -40,6 +41,7 @@ fmus_app = typer.Typer(
     help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
 )
 app.add_typer(fmus_app, name="fmus")
+app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 
 

@@ -321,30 +321,26 @@ class _Fit:
         weight = self.weight if math.isfinite(self.cap) else None
         return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
-    def polish(self, rounds: int = 1, worth: float = 0.5) -> None:
+    def polish(self) -> None:
         """Search along the main directions of the normal matrix, without derivatives."""
         p = self.problem
-        for _ in range(rounds):
-            normal = self.normal(STEPS[-1], central=True)
-            before = self.cost
-            self.attempt(self.step(normal, 1e-9))
-            if not normal.rough:
-                return
-            values, vectors = np.linalg.eigh(normal.matrix)
-            for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
-                if value < 1.0 / KNOWN**2:
-                    continue
-                size = 1.0 / math.sqrt(value)
-                for sign in (1.0, -1.0):
-                    length = size
-                    while self.attempt(
-                        np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
-                    ):
-                        length *= 2.0
-                    if length > size:
-                        break
-            if before - self.cost < worth:
-                return
+        normal = self.normal(STEPS[-1], central=True)
+        self.attempt(self.step(normal, 1e-9))
+        if not normal.rough:
+            return
+        values, vectors = np.linalg.eigh(normal.matrix)
+        for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
+            if value < 1.0 / KNOWN**2:
+                continue
+            size = 1.0 / math.sqrt(value)
+            for sign in (1.0, -1.0):
+                length = size
+                while self.attempt(
+                    np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
+                ):
+                    length *= 2.0
+                if length > size:
+                    break
 
 
 def fit(
@@ -383,6 +379,8 @@ def fit(
     run.descend(STEPS[1], limit, 1e-4)
     if polish:
         run.polish()
+    else:
+        run.normal(STEPS[-1], central=True)
     return _estimate(run)
 
 
@@ -400,7 +398,8 @@ def _calmest(run: _Fit) -> list[str]:
 
 def _estimate(run: _Fit) -> Estimate:
     problem = run.problem
-    normal = run.normal(STEPS[-1], central=True)
+    # the last Jacobian, whose point is less than the steps of its differences away
+    normal = Normal(problem, run.theta, run.jacobian, run.residuals)
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
