@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 MEASURED = {"color": "black", "linewidth": 2.2, "alpha": 0.55}
 """How references are drawn: below the model's thin coloured lines."""
+PATH_HEIGHT = 4.2
+"""Height of the axes of paths [inch]."""
 SPREAD = 100.0
 """Ratio of largest to smallest value of an overview from which its scale is logarithmic."""
 _KEYS = {
@@ -125,13 +128,13 @@ def plot_run(
     paths = [item for item in axes if item.paths]
     courses = [item for item in axes if not item.paths]
     width = 5.0 * bool(paths) + 8.0 * bool(courses)
-    height = max(2.2 * len(courses), 4.2 * len(paths)) + 0.6
+    height = max(2.2 * len(courses), PATH_HEIGHT * len(paths)) + 0.6
     figure = Figure(figsize=(width, height), layout="constrained")
     columns: Any = (figure, figure)
     if paths and courses:
         columns = figure.subfigures(1, 2, width_ratios=(5.0, 8.0))
     if paths:
-        for axis, item in zip(_column(columns[0], len(paths), False), paths, strict=True):
+        for axis, item in zip(_path_column(columns[0], len(paths), height), paths, strict=True):
             _draw_paths(axis, item, recording, tuple(references.values()))
     if courses:
         found = _column(columns[1], len(courses), len({(i.after, i.before) for i in courses}) == 1)
@@ -148,6 +151,18 @@ def plot_run(
 
 def _column(place: Any, count: int, shared: bool) -> list[MatplotlibAxes]:
     return list(place.subplots(count, 1, sharex=shared, squeeze=False)[:, 0])
+
+
+def _path_column(place: Any, count: int, height: float) -> list[MatplotlibAxes]:
+    """Axes below each other, none much higher than wide; room that is left [inch] stays empty."""
+    rest = height - PATH_HEIGHT * count
+    if rest < 1.0:
+        return _column(place, count, False)
+    ratios = [PATH_HEIGHT] * count + [rest]
+    axes: list[MatplotlibAxes]
+    *axes, empty = place.subplots(count + 1, 1, height_ratios=ratios)
+    empty.remove()
+    return axes
 
 
 def _write(figure: Figure, path: Path | str | None) -> None:
@@ -318,6 +333,6 @@ def plot_overview(
         axis.tick_params(labelbottom=item is quantities[-1])
         axis.grid(True, axis="y", alpha=0.3)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
-    figure.suptitle(title)
+    figure.suptitle(textwrap.fill(title, int(9.0 * figure.get_figwidth())))
     _write(figure, path)
     return figure
