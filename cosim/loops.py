@@ -147,6 +147,15 @@ def consistent(
     return rows
 
 
+def reached(system: System, layout: Layout) -> bool:
+    """Whether external inputs are passed on to fetched outputs at the same instant."""
+    influences = _influences(system, layout)
+    fetched = {layout.names[slot] for slot in range(int(layout.inputs[0, 0]))}
+    return any(
+        fetched & set(influences.get(layout.names[slot], ())) for slot in layout.external.tolist()
+    )
+
+
 # -- numbers ---------------------------------------------------------------------------------------
 
 

@@ -264,6 +264,7 @@ class _Run:
         self.bound: kernel.Kernel | None = None
         self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
         self.history = np.zeros((len(plan.means), 3))
+        self.held = np.zeros(len(self.layout.bond_input))
         self.iterated: Iterated | None = None
         self.control: StepControl | None = None
         self.started = False
@@ -532,7 +533,9 @@ class _Run:
             case Op.RECORD:
                 self.record()
             case Op.ENERGY:
-                self.account()
+                self.account(self.held if a == 1 else values[layout.bond_input])
+            case Op.HOLD:
+                self.held = values[layout.bond_input]
             case Op.SOLVE:
                 self.solve(a)
             case Op.ITERATE:
@@ -580,11 +583,11 @@ class _Run:
         self.rows[self.row] = row
         self.row += 1
 
-    def account(self) -> None:
+    def account(self, held: Vector) -> None:
         """Trapezoid of output times held input, in a fixed order of summation."""
         layout = self.layout
         outputs = self.values[layout.bond_output].tolist()
-        inputs = self.values[layout.bond_input].tolist()
+        inputs = held.tolist()
         half = 0.5 * self.master.step
         for term, bond in enumerate(layout.bond_index.tolist()):
             mean = self.previous[term] + outputs[term]

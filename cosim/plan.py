@@ -30,12 +30,13 @@ class Op(IntEnum):
     SET = 3  # give inputs to instance a
     STEP = 4  # instance a goes one communication step
     GET = 5  # fetch outputs of instance a
-    ENERGY = 6  # add the energy that went over each bond in this step
+    ENERGY = 6  # add the energy that went over each bond in this step; a = 1: with inputs of HOLD
     SOLVE = 7  # solve algebraic loop a
     NOTE = 8  # remember the outputs that are extrapolated
     EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step * gain + offset
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
-    ITERATE = 11  # all instances step, again and again, until inputs fit outputs (Python only)
+    HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
+    ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
 
 
 PARTS = 1 << 16

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..coupling import means
-from ..loops import consistent, find_loops
+from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 from ..system import System
 
@@ -34,7 +34,9 @@ def compile_plan(
     extrapolated, spans = means(system, layout, extrapolation, system.order())
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
-    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *fresh, (Op.RECORD,)]
+    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too
+    again = extrapolation == 0 or reached(system, layout)
+    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
     if extrapolated:
         step.append((Op.NOTE,))
     for name in system.order():
@@ -44,7 +46,7 @@ def compile_plan(
         if spans[index][0] < spans[index][1]:
             step.append((Op.EXTRAPOLATE, *spans[index]))
         step += [set_, (Op.STEP, index), (Op.GET, index)]
-    step.append((Op.ENERGY,))
+    step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "gauss_seidel",
         layout,

@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..coupling import factors, means, side_by_side
-from ..loops import consistent, find_loops
+from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..system import System
 
@@ -41,7 +41,9 @@ def compile_plan(
     extrapolated, spans = means(system, layout, extrapolation)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
-    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *fresh, (Op.RECORD,)]
+    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too
+    again = extrapolation == 0 or reached(system, layout)
+    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
     if extrapolated:
         step.append((Op.NOTE,))
     if max(parts.values()) > 1:
@@ -51,7 +53,7 @@ def compile_plan(
         if extrapolated:
             step.append((Op.EXTRAPOLATE, 0, len(extrapolated)))
         step += [(op, index) for op in (Op.SET, Op.STEP, Op.GET) for index in everyone]
-    step.append((Op.ENERGY,))
+    step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "jacobi",
         layout,

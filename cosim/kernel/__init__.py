@@ -56,7 +56,8 @@ class _Copy(ct.Structure):
 
 class _Term(ct.Structure):
     _fields_ = (
-        ("sign", _D), ("previous", _D), ("output", _I64), ("input", _I64), ("bond", _I64),
+        ("sign", _D), ("previous", _D), ("held", _D), ("output", _I64),
+        ("input", _I64), ("bond", _I64),
     )  # fmt: skip
 
 
@@ -104,6 +105,7 @@ class _Code(IntEnum):
     NOTE = 12
     EXTRAPOLATE = 13
     SUBSTEP = 14
+    HOLD = 15
 
 
 UNFIT = 7
@@ -235,7 +237,7 @@ class Kernel:
             terms=self._structures(
                 _Term,
                 zip(
-                    layout.bond_sign.tolist(), [0.0] * len(layout.bond_sign),
+                    layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
                     layout.bond_output.tolist(), layout.bond_input.tolist(),
                     layout.bond_index.tolist(), strict=True,
                 ),

@@ -17,7 +17,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD };
 enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8 }; /* beyond the statuses of FMI */
 enum { PARTS = 1 << 16, ITERATIONS = 60 }; /* as in cosim/plan.py and cosim/loops.py */
 #define SETTLED 1e-10
@@ -51,7 +51,7 @@ typedef struct {
 
 /* Power through one variable of a bond: sign * output of one end * input of the same end. */
 typedef struct {
-  double sign, previous; /* previous: the output at the beginning of the step */
+  double sign, previous, held; /* previous: the output at the beginning of the step */
   int64_t output, input;
   int64_t bond; /* terms of a bond follow each other */
 } Term;
@@ -216,7 +216,7 @@ static void copy_scaled(const Copy *c, const Copy *end, double *values) {
   for (; c < end; c++) values[c->target] = values[c->source] * c->gain + c->offset;
 }
 
-static void add_energy(Run *run) {
+static void add_energy(Run *run, int held) {
   const double *const values = run->values;
   const double half = 0.5 * run->step;
   Term *const end = run->terms + run->n_terms;
@@ -225,7 +225,7 @@ static void add_energy(Run *run) {
     double energy = run->bond_energy[bond];
     do {
       const double output = values[t->output], mean = t->previous + output;
-      energy += t->sign * values[t->input] * mean * half;
+      energy += t->sign * (held ? t->held : values[t->input]) * mean * half;
       t->previous = output;
       t++;
     } while (t < end && t->bond == bond);
@@ -395,7 +395,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
       member = step3(members + in->first, members + in->last, run->times[run->index], run->step, &status);
       break;
     case ENERGY:
-      add_energy(run);
+      add_energy(run, in->first == 1);
       break;
     case SOLVE:
       status = solve(run, run->loops + in->first);
@@ -408,6 +408,9 @@ static int execute(Run *run, int64_t first, int64_t last) {
         h[1] = h[0];
         h[0] = run->values[run->means[i].source];
       }
+      break;
+    case HOLD:
+      for (int64_t i = 0; i < run->n_terms; i++) run->terms[i].held = run->values[run->terms[i].input];
       break;
     case EXTRAPOLATE:
       extrapolate(run, in->first, in->last);
