@@ -420,6 +420,8 @@ def _estimate(run: _Fit) -> Estimate:
     sandwich = inverse @ middle @ inverse
     spread = max(2.0 * run.cost / max(count - int(np.sum(~poor)), 1), 1.0)
     plain = inverse * spread
+    # variance that comes from the bounds alone
+    open_ = np.sum(vectors**2 * np.where(poor, spread / (values + prior), 0.0), axis=1)
     # a few blocks can seem to agree by chance: never below what white residuals give
     factor = np.sqrt(
         np.maximum(np.diag(plain), np.diag(sandwich)) / np.maximum(np.diag(sandwich), 1e-300)
@@ -438,7 +440,8 @@ def _estimate(run: _Fit) -> Estimate:
         covariance=covariance,
         low=np.maximum(run.theta - half, problem.lower),
         high=np.minimum(run.theta + half, problem.upper),
-        identifiable=np.sqrt(np.diag(covariance)) < KNOWN * scale,
+        identifiable=(np.sqrt(np.diag(covariance)) < KNOWN * scale)
+        & (open_ < 0.5 * np.diag(plain)),
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=run.cost,

@@ -30,6 +30,7 @@ Vector = NDArray[np.float64]
 KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
+    "only",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
@@ -147,7 +148,12 @@ class _Mapping:
             column: sigma for name, sigma in data.noise.items() for column in expand(name)
         }
         self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
-        self.logs = {name: data.log(name) for name in data.runs}
+        wanted = self.table.get("only", {})
+        self.logs = {
+            name: data.log(name)
+            for name, run in data.runs.items()
+            if all(run.values.get(key, value) == value for key, value in wanted.items())
+        }
 
     def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
         """The problem."""
@@ -176,7 +182,7 @@ class _Mapping:
             provider,
             parameters,
             present,
-            [self.run(name, present) for name in self.data.runs],
+            [self.run(name, present) for name in self.logs],
             constants=constants,
             step=float(table["step"]),
             algorithm=str(table.get("algorithm", "jacobi")),
@@ -238,7 +244,7 @@ class _Mapping:
             for entry in self.table.get(key, []):
                 where = f"{self.path}: {key} {entry.get('name')}"
                 targets = _targets(entry["targets"], where)
-                runs = list(self.data.runs) if entry.get("per_run") else [""]
+                runs = list(self.logs) if entry.get("per_run") else [""]
                 for run in runs:
                     nominal = self.value(entry["nominal"], run, where)
                     span = float(entry.get("span", 0.0))

@@ -139,7 +139,11 @@ def _check_columns(problem: Problem, run: Run) -> Iterator[Finding]:
 
 
 def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
-    """Problems that show against the model (at nominal values if `theta` is not given)."""
+    """Problems that show against the model (at nominal values if `theta` is not given).
+
+    Wrong parameters look like a shifted clock, too, so at nominal values that must be more evident.
+    """
+    evident = 100.0 if theta is None else 4.0
     theta = problem.nominal if theta is None else theta
     found: list[Finding] = []
     try:
@@ -157,7 +161,7 @@ def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
         found += _check_scale(problem, models, index)
     named = {f.column for f in found}
     found += _check_swaps(problem, models, named)
-    found += _check_clocks(problem, models)
+    found += _check_clocks(problem, models, evident)
     found += _check_inputs(problem, models, theta)
     return found
 
@@ -240,7 +244,7 @@ def _misfit(problem: Problem, models: dict[str, Vector], data: int, model: int) 
     return total
 
 
-def _check_clocks(problem: Problem, models: dict[str, Vector]) -> Iterator[Finding]:
+def _check_clocks(problem: Problem, models: dict[str, Vector], evident: float) -> Iterator[Finding]:
     """A run, or one column in all runs, that fits much better when it is shifted in time."""
     lags: dict[tuple[str, int], tuple[int, float]] = {}
     for run in problem.runs:
@@ -252,7 +256,7 @@ def _check_clocks(problem: Problem, models: dict[str, Vector]) -> Iterator[Findi
             )  # fmt: skip
     for run in problem.runs:
         own = [lags[run.name, i] for i in range(len(problem.channels))]
-        sure = [lag for lag, gain in own if gain > 4.0]
+        sure = [lag for lag, gain in own if gain > evident]
         interval = float(np.median(np.diff(run.times)))
         if (
             len(sure) > len(own) / 2
@@ -263,9 +267,11 @@ def _check_clocks(problem: Problem, models: dict[str, Vector]) -> Iterator[Findi
             text = f"all columns fit better shifted: they are late by {late:.4g} s (clock offset)"
             yield Finding("warning", "clock", run.name, "time", text)
     for index, channel in enumerate(problem.channels):
-        sure = [lags[run.name, index][0] for run in problem.runs if lags[run.name, index][1] > 4.0]
+        sure = [
+            lags[run.name, index][0] for run in problem.runs if lags[run.name, index][1] > evident
+        ]
         others = [lags[run.name, i][0] for run in problem.runs for i in range(len(problem.channels))
-                  if i != index and lags[run.name, i][1] > 4.0]  # fmt: skip
+                  if i != index and lags[run.name, i][1] > evident]  # fmt: skip
         apart = not others or abs(np.median(others) - np.median(sure or [0])) >= 2
         if len(sure) > len(problem.runs) / 2 and abs(np.median(sure)) >= 2 and apart:
             interval = float(np.median(np.diff(problem.runs[0].times)))

@@ -1,0 +1,71 @@
+"""A repeated run is a new run, bit for bit, and leaves no memory behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cosim.cli import default_provider
+from cosim.errors import UnknownNameError, ValueRangeError
+from cosim.master import Master
+from cosim.scenario import find
+from cosim.session import Session
+
+RECORD = ["encoder.w_meas", "motor.i_measured", "load.w"]
+DURATION = 0.3
+
+
+@pytest.fixture(scope="module")
+def parts():
+    scenario = find("motor_bench")[0].scenario("ST1")
+    system = scenario.system.build(default_provider())
+    return Master(system, "gauss_seidel", 1e-4), scenario.inputs
+
+
+@pytest.mark.parametrize("executor", ["c", "python"])
+def test_repetition_is_a_new_run(parts, executor) -> None:
+    master, inputs = parts
+    master = Master(master.system, master.algorithm, master.step, executor=executor)
+    fresh = master.run(DURATION, inputs=inputs, record=RECORD, every=10)
+    with Session(master, DURATION, inputs=inputs, record=RECORD, every=10) as session:
+        times, rows = session.run()
+        _, other = session.run({"load.J": 0.07, "load.speed": 0.5})
+        _, again = session.run()
+    assert np.array_equal(times, fresh.time)
+    assert np.array_equal(rows, fresh.values)
+    assert np.array_equal(again, fresh.values)
+    assert not np.array_equal(other, fresh.values)
+
+
+def test_values_by_array_and_by_name(parts) -> None:
+    master, inputs = parts
+    targets = ["load.J", "motor.R_a"]
+    with Session(master, DURATION, inputs=inputs, record=RECORD, targets=targets) as session:
+        _, named = session.run({"load.J": 0.09, "motor.R_a": 0.36})
+        _, listed = session.run(np.array([0.09, 0.36]))
+        assert np.array_equal(named, listed)
+        with pytest.raises(ValueRangeError):
+            session.run(np.array([0.09]))
+        with pytest.raises(UnknownNameError):
+            session.run({"load.nothing": 1.0})
+        with pytest.raises(ValueRangeError):
+            session.run({"load.J": -1.0})
+        assert np.array_equal(session.run({"load.J": 0.09, "motor.R_a": 0.36})[1], named)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's statm")
+def test_thousand_runs_leave_no_memory(parts) -> None:
+    master, inputs = parts
+
+    def pages() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1])
+
+    with Session(master, 0.02, inputs=inputs, record=RECORD) as session:
+        for _ in range(50):
+            session.run({"load.J": 0.08})
+        before = pages()
+        for _ in range(1000):
+            session.run({"load.J": 0.08})
+        # one page per ten runs would be 100; the interpreter's own pools may move by a few
+        assert pages() - before < 50
