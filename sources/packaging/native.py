@@ -196,6 +196,7 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
         *("-target", target.target, "-std=c99", "-O2", "-shared", "-fPIC", "-s", "-g0"),
         # no fused multiply-add: every platform and the Python twin round alike
         *("-fvisibility=hidden", "-ffp-contract=off", "-w"),
+        "-fno-slp-vectorize",  # a quarter less compiling, the same speed
     ]
     if "macos" in target.target:
         flags.append(f"-Wl,-install_name,@rpath/{identifier}.dylib")
