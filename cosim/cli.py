@@ -26,6 +26,7 @@ from . import algorithms, kernel, library, scenario
 from .archive import cache_folder, open_fmu
 from .cli_calibrate import calibrate_command
 from .cli_diagnose import diagnose_command
+from .cli_linearize import linearize_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from .provider import FolderProvider, Provider
 from .runner import Result, run
@@ -43,6 +44,7 @@ fmus_app = typer.Typer(
 app.add_typer(fmus_app, name="fmus")
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
+app.command("linearize")(linearize_command)
 
 
 class Kind(StrEnum):

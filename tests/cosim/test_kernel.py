@@ -20,8 +20,6 @@ from tests.fmus import fmu
 ALGORITHMS = ("jacobi", "gauss_seidel")
 """Those that run compiled; algorithms that repeat steps run in Python."""
 STEP = 1e-4
-COMPILED = [name for name in algorithms.names() if name not in ("adaptive", "iterated")]
-"""Algorithms that the compiled executor runs; the others repeat steps."""
 SINE = Function(lambda t: 20.0 * np.sin(30.0 * t))
 
 

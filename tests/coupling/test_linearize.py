@@ -1,0 +1,151 @@
+"""Linear systems from FMUs, margins of loops, tuning of controllers."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cosim.cli import app
+from cosim.errors import InputError, UnknownNameError
+from cosim.linearize import (
+    RASTER,
+    linearize,
+    loop_margins,
+    margins,
+    operating_point,
+    require_control,
+    tune_pi,
+    tune_pid,
+)
+from cosim.master import Master
+from cosim.system import System
+
+S = control.tf("s")
+
+
+def test_a_damped_load_has_its_pole(provider) -> None:
+    system = System(provider=provider)
+    system.add("load", "inertia/disc", {"J": 2.0, "b": 0.0})
+    system.add("brake", "gearbox/ratio", {"ratio": 1.0, "b": 3.0, "J_a": 0.5, "eta": 1.0})
+    for source, target in [("brake.tau_b", "load.tau"), ("load.w", "brake.w_b"),
+                           ("brake.J_b", "load.J_added")]:  # fmt: skip
+        system.connect(source, target)
+    found = linearize(Master(system, step=0.1), 0.2, {"brake.tau_a": 0.0})
+    assert found.time == pytest.approx(0.2)
+    # (J + J_a) w' = tau_a - b w, exact derivatives
+    np.testing.assert_allclose(np.sort(found.poles.real), [-3.0 / 2.5, 0.0], atol=1e-12)
+    there = found.response(np.array([0.7]), "brake.tau_a", "load.w")
+    assert there[0] == pytest.approx(1.0 / (2.5 * 2j * np.pi * 0.7 + 3.0), rel=1e-12)
+    model = found.to_control(["brake.tau_a"], ["load.w"])
+    assert complex(model(2j * np.pi * 0.7)) == pytest.approx(there[0], rel=1e-12)
+    with pytest.raises(UnknownNameError, match=r"load\.w"):
+        found.response(np.array([1.0]), "brake.tau_a", "load.v")
+
+
+def test_loops_of_direct_feedthrough_are_closed_and_foreign_fmus_count_as_static(affine) -> None:
+    system = System("ring")
+    system.add("a", str(affine), {"a": 0.5, "b": 1.0})
+    system.add("b", str(affine), {"a": -0.8})
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u", offset=1.0)
+    parts, notes = operating_point(Master(system, step=0.1), 0.0, {})
+    assert any("counts as static" in note for note in notes)
+    (loop,) = [m for m in loop_margins(Master(system, step=0.1), parts, ["b.u"])]
+    # differences of an affine law, exact up to rounding over the increment
+    np.testing.assert_allclose(loop.response, 0.4, atol=1e-8)
+
+
+def test_margins_of_a_known_loop() -> None:
+    # L = 2 / (s (s + 1)^2): |L| = 1 at w = 1 with phase -180 degrees: no margin left
+    s = 2j * np.pi * RASTER
+    edge = margins("edge", RASTER, 2.0 / (s * (s + 1.0) ** 2))
+    assert 2.0 * np.pi * edge.crossover == pytest.approx(1.0, rel=1e-4)  # raster of 0.23 %
+    assert edge.phase == pytest.approx(0.0, abs=0.05)
+    half = margins("half", RASTER, 1.0 / (s * (s + 1.0) ** 2))
+    assert half.gain == pytest.approx(2.0, rel=0.01)  # nearest point of the raster
+    gm, pm, *_ = control.margin(1 / (S * (S + 1) ** 2))
+    assert half.phase == pytest.approx(pm, abs=0.05) and gm == pytest.approx(2.0, rel=1e-6)
+
+
+R, L, KT, J = 0.10, 0.2e-3, 0.13, 0.00601  # motor of the MiR250 and inertia of a translation
+DELAY = 150e-6
+
+
+def test_nested_loops_of_the_drive_have_the_margins_of_their_design() -> None:
+    winding = 1 / (L * S + R)
+    inner = 0.19 + 94 / S
+    s = 2j * np.pi * RASTER
+    current = margins("i", RASTER, (inner * winding)(s) * np.exp(-s * DELAY))
+    # design figure; it is proportional to Kp, which is printed as 0.19 (+- 2.6 %)
+    assert current.crossover == pytest.approx(152, rel=0.026)
+    _, phase, _, crossover = control.margin(inner * winding)  # without the delay
+    assert 2 * np.pi * current.crossover == pytest.approx(crossover, rel=1e-5)
+    behind = np.degrees(crossover * DELAY)
+    assert current.phase == pytest.approx(phase - behind, abs=1e-3)  # interpolated on the raster
+    assert current.phase == pytest.approx(82, abs=1.0)  # printed to 1 degree
+    assert current.gain == pytest.approx(11, abs=0.5)  # printed to 1
+    # the tuner gives back the gains of the design from its crossover and margin
+    kp, ki = tune_pi(winding, current.crossover, current.phase, DELAY)
+    assert kp == pytest.approx(0.19, rel=1e-3) and ki == pytest.approx(94, rel=0.02)
+
+    closed = control.feedback(inner * winding, 1)
+    plant = closed * KT / (J * S)
+    speed = margins("w", RASTER, ((1.6 + 8.4 / S) * plant)(s) * np.exp(-s * DELAY))
+    assert speed.crossover == pytest.approx(4.9, abs=0.75)  # theirs has friction and back-EMF
+    kp, ki = tune_pi(plant, speed.crossover, speed.phase, DELAY)
+    assert kp == pytest.approx(1.6, rel=1e-3) and ki == pytest.approx(8.4, rel=0.02)
+
+
+@pytest.mark.parametrize(("load", "crossover", "margin"), [(0.5, 6.3, 83), (4.5, 5.3, 58)])
+def test_position_loop_of_a_joint(load: float, crossover: float, margin: float) -> None:
+    n, kt, eta, resistance, inductance, friction = 101, 0.12, 0.80, 0.5, 0.6e-3, 8.0
+    inertia = load + n**2 * 1e-4
+    torque = n * eta * kt / ((inductance * S + resistance) * (inertia * S + friction))
+    plant = control.feedback(torque, kt * n) / S
+    filter_time = 1 / (2 * np.pi * 400)
+    law = 500 + 400 / S + 2 * S / (1 + filter_time * S)
+    s = 2j * np.pi * RASTER
+    found = margins("q", RASTER, (law * plant)(s) * np.exp(-s * 1e-3))
+    # design figures of a plant whose friction and gains are printed to one digit
+    assert found.crossover == pytest.approx(crossover, rel=0.02)
+    assert found.phase == pytest.approx(margin, abs=2.0)
+    _, phase, _, there = control.margin(law * plant)  # without the delay
+    assert 2 * np.pi * found.crossover == pytest.approx(there, rel=1e-5)
+    # interpolated on the raster
+    assert found.phase == pytest.approx(phase - np.degrees(there * 1e-3), abs=1e-3)
+    gains = tune_pid(plant, found.crossover, found.phase, 500 / 400, filter_time, 1e-3)
+    np.testing.assert_allclose(gains, [500, 400, 2], rtol=0.02)  # raster of the margins
+
+
+def test_impossible_wishes_of_the_tuner_are_refused() -> None:
+    with pytest.raises(InputError, match="lower the crossover"):
+        tune_pi(1 / (S * (S + 1) ** 2), 3.0, 60.0)
+    with pytest.raises(InputError, match="take a PI controller"):
+        tune_pid(1 / (0.2e-3 * S + 0.1), 150.0, 60.0, 1.0)
+
+
+def test_without_python_control_the_extra_is_named(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(InputError, match=r"pip install 'cosim\[control\]'"):
+        require_control()
+
+
+def test_the_command_prints_poles_and_loops(provider, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("cosim.cli.default_provider", lambda: provider)
+    arguments = ["linearize", "mir250", "--at", "0.1", "--cut", "motor_left.w", "--json",
+                 "--out", str(tmp_path)]  # fmt: skip
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    content = json.loads(result.output)
+    heave = min(content["poles"], key=lambda pole: abs(pole["frequency_Hz"] - 11.3))
+    # six contact springs of 1e5 N/m and dampers of 1500 N s/m under 118.6 kg: 11.3 Hz, 0.53
+    assert heave["frequency_Hz"] == pytest.approx(11.3, abs=0.05)
+    assert heave["damping"] == pytest.approx(0.53, abs=0.01)
+    assert content["loops"][0]["phase_margin_deg"] > 45.0  # a loop that is stable with room
+    assert (tmp_path / "bode.png").stat().st_size > 10_000 and (tmp_path / "linear.json").is_file()
