@@ -454,7 +454,7 @@ def _estimate(run: _Fit) -> Estimate:
 
 
 def _signed(vector: Vector) -> Vector:
-    return vector * np.sign(vector[np.argmax(np.abs(vector))])
+    return np.asarray(vector * np.sign(vector[np.argmax(np.abs(vector))]), dtype=np.float64)
 
 
 def channel_rms(problem: Problem, residuals: Iterable[tuple[str, Vector]]) -> dict[str, float]:

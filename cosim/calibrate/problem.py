@@ -116,7 +116,7 @@ class Channel:
             width = np.maximum(times - first, 1e-12)
             mean = np.interp(times, recorded, integral) - np.interp(first, recorded, integral)
             result = np.where(times > first, mean / width, values[0])
-        return self.gain * result + self.offset
+        return np.asarray(self.gain * result + self.offset, dtype=np.float64)
 
 
 def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:

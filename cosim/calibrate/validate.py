@@ -176,47 +176,43 @@ def _centred(problem: Problem, models: dict[str, Vector], data: int, model: int,
     return measured - measured.mean(), simulated - simulated.mean()
 
 
-def _joined(
-    problem: Problem, models: dict[str, Vector], data: int, model: int
-) -> tuple[float, float]:
-    """Slope and correlation of a column against a channel of the model, runs centred."""
-    parts = [_centred(problem, models, data, model, run) for run in problem.runs]
-    measured = np.concatenate([a for a, _ in parts])
-    simulated = np.concatenate([b for _, b in parts])
-    power, noise = float(simulated @ simulated), float(measured @ measured)
-    moves = simulated.size and np.std(simulated) > 3.0 * problem.channels[model].sigma
-    if not moves or noise == 0.0:
-        return 1.0, 0.0
-    cross = float(measured @ simulated)
-    return cross / power, cross / np.sqrt(power * noise)
+def _follow(
+    problem: Problem, models: dict[str, Vector], index: int
+) -> dict[str, tuple[float, float]]:
+    """Slope and correlation of a column against its signal, for the runs in which it follows."""
+    sigma, found = problem.channels[index].sigma, {}
+    for run in problem.runs:
+        measured, simulated = _centred(problem, models, index, index, run)
+        power, noise = float(simulated @ simulated), float(measured @ measured)
+        if not measured.size or noise == 0.0 or np.std(simulated) < 5.0 * sigma:
+            continue
+        cross = float(measured @ simulated)
+        correlation = cross / float(np.sqrt(power * noise))
+        if abs(correlation) > FOLLOWS:
+            found[run.name] = (cross / power, correlation)
+    return found
 
 
 def _check_scale(problem: Problem, models: dict[str, Vector], index: int) -> Iterator[Finding]:
     channel = problem.channels[index]
-    slope, correlation = _joined(problem, models, index, index)
-    if abs(correlation) < FOLLOWS:
+    follow = _follow(problem, models, index)
+    if not follow:
         return
-    if slope < 0.0:
-        text = f"follows {channel.signal} with the sign turned round (factor {slope:.3g})"
+    turned = [name for name, (slope, _) in follow.items() if slope < 0.0]
+    if len(turned) > len(follow) / 2:
+        text = f"follows {channel.signal} with the sign turned round"
         yield Finding("error", "sign", "", channel.name, text)
-    size = abs(slope)
+    else:
+        for name in turned:
+            text = f"follows {channel.signal} with the sign turned round in this run alone"
+            yield Finding("error", "sign", name, channel.name, text)
+    size = float(np.median([abs(slope) for slope, _ in follow.values()]))
     if not 0.5 < size < 2.0:
         near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
-        if abs(np.log(size / FACTORS[near])) < 0.2:
-            reason = f"the unit looks wrong: {near}"
-        else:
-            reason = "unit or scale look wrong"
+        known = abs(np.log(size / FACTORS[near])) < 0.2
+        reason = f"the unit looks wrong: {near}" if known else "unit or scale look wrong"
         text = f"is {size:.4g} times what the model has [{channel.unit}]; {reason}"
         yield Finding("error", "unit", "", channel.name, text)
-        return
-    for run in problem.runs:
-        measured, simulated = _centred(problem, models, index, index, run)
-        if measured.size and np.std(simulated) > 10.0 * channel.sigma:
-            size = float(measured @ measured) * float(simulated @ simulated)
-            own = float(measured @ simulated) / max(float(np.sqrt(size)), 1e-300)
-            if own < -FOLLOWS < 0.0 < slope:
-                text = f"follows {channel.signal} with the sign turned round in this run alone"
-                yield Finding("error", "sign", run.name, channel.name, text)
 
 
 def _check_swaps(problem: Problem, models: dict[str, Vector], named: set[str]) -> Iterator[Finding]:
