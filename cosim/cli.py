@@ -26,6 +26,7 @@ from . import algorithms, kernel, library, scenario
 from .archive import cache_folder, open_fmu
 from .cli_calibrate import calibrate_command
 from .cli_diagnose import diagnose_command
+from .cli_export import draw_command, export_command
 from .cli_linearize import linearize_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from .provider import FolderProvider, Provider
@@ -45,6 +46,8 @@ app.add_typer(fmus_app, name="fmus")
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)
+app.command("export")(export_command)
+app.command("draw")(draw_command)
 
 
 class Kind(StrEnum):
@@ -330,7 +333,9 @@ def list_scenarios(as_json: AsJson = False) -> None:
 
 @app.command("run")
 def run_command(
-    name: Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, folder or .toml file.")],
+    name: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="Name, folder, .toml or .ssp file.")
+    ],
     variants: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="INSTANCE=VARIANT", help="E.g. gearbox=elastic+backlash."),
@@ -375,7 +380,7 @@ def run_command(
             step=step,
             duration=duration,
             provider=provider,
-            out=out or Path("out") / name.removesuffix(".toml").strip("./"),
+            out=out or Path("out") / _folder_name(name),
             progress=told,
         )
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
@@ -388,6 +393,12 @@ def run_command(
     if failed:
         shown = "; ".join(failed[:5]) + ("; ..." if len(failed) > 5 else "")
         raise CheckError(f"{len(failed)} of {len(result.checks)} checks failed: {shown}")
+
+
+def _folder_name(name: str) -> str:
+    for suffix in (".toml", ".ssp", ".ssd"):
+        name = name.removesuffix(suffix)
+    return name.strip("./")
 
 
 def _pair(text: str, option: str, form: str) -> tuple[str, str]:

@@ -23,6 +23,7 @@ from .plots import plot_overview, plot_run
 from .provider import Provider
 from .recording import Recording
 from .scenario import Scenario
+from .ssp import read_scenario
 from .system import System
 from .variants import apply
 
@@ -215,6 +216,7 @@ def run_scenario(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[[float], None] | None = None,
     base: Path | None = None,
+    isolate: float | None = None,
 ) -> RunResult:
     """Run one scenario.
 
@@ -226,6 +228,7 @@ def run_scenario(
         parameters: values on top of the scenario's.
         progress: told now and then which fraction is done.
         base: folder against which .fmu paths among the variants are taken.
+        isolate: as of `Master`.
 
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
@@ -235,7 +238,10 @@ def run_scenario(
     changed = {name for name in instances if instances[name] != usual[name]}
     system, notes = _system(scenario, provider, instances, changed, parameters or {})
     record, others = _recorded(scenario, system, changed)
-    master = Master(system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name)
+    master = Master(
+        system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
+        isolate=isolate,
+    )  # fmt: skip
     started = time.perf_counter()
     recording = master.run(
         scenario.duration,
@@ -261,6 +267,18 @@ def run_scenario(
     )
 
 
+def _find(
+    name: str, folder: Path | None, duration: float | None, step: float | None
+) -> tuple[str, str, str, dict[str, Scenario]]:
+    """Name and description of the whole, the run that was asked for ("" for all), the runs."""
+    if name.endswith((".ssp", ".ssd")):
+        item = read_scenario(name, duration=duration, step=step)
+        return Path(name).stem, "", "", {"": item}
+    file, wanted = scenarios.find(name, folder)
+    chosen = [wanted] if wanted else list(file.runs)
+    return file.name, file.text, wanted, {run: file.scenario(run) for run in chosen}
+
+
 def run(
     name: str,
     *,
@@ -273,11 +291,13 @@ def run(
     out: Path | str | None = None,
     folder: Path | None = None,
     progress: Callable[[str, float], None] | None = None,
+    isolate: float | None = None,
 ) -> Result:
     """Run a scenario, all its runs or the one that the name ends with.
 
     Args:
-        name: `motor_bench`, `crawler_paper/SET1_1`, a folder or a scenario.toml.
+        name: `motor_bench`, `crawler_paper/SET1_1`, a folder or a scenario.toml; an .ssp archive
+            or .ssd file.
         variants: instance (or component, or slot) -> variant, fidelity, or `+effect`.
         parameters: `instance.name` -> value.
         algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
@@ -287,6 +307,7 @@ def run(
         out: folder for recording, plot and result; nothing is written without it.
         folder: where scenarios are looked for; the library's by default.
         progress: told run and fraction now and then.
+        isolate: as of `Master`.
 
     Raises:
         CosimError: see `errors`.
@@ -295,12 +316,11 @@ def run(
         from .cli import default_provider  # the only place that knows the sources
 
         provider = default_provider()
-    file, wanted = scenarios.find(name, folder)
-    chosen = [wanted] if wanted else list(file.runs)
+    whole, text, wanted, items = _find(name, folder, duration, step)
+    chosen = list(items)
     results: dict[str, RunResult] = {}
     files: list[Path] = []
-    for run_name in chosen:
-        item = file.scenario(run_name)
+    for run_name, item in items.items():
         if duration is not None and duration < item.duration:
             item = _shortened(item, duration)
         item = replace(
@@ -314,7 +334,7 @@ def run(
         try:
             result = run_scenario(
                 item, provider, variants=variants, parameters=parameters, progress=told,
-                base=Path.cwd(),
+                base=Path.cwd(), isolate=isolate,
             )  # fmt: skip
         except StepError as error:
             if place is not None and error.recording is not None:
@@ -331,12 +351,12 @@ def run(
             files.append(place / "plot.png")
     single = wanted or (chosen[0] if len(chosen) == 1 else "")
     runs = {"": next(iter(results.values()))} if len(chosen) == 1 else results
-    final = Result(file.name + (f"/{single}" if single else ""), runs, tuple(files))
+    final = Result(whole + (f"/{single}" if single else ""), runs, tuple(files))
     if out is not None:
         quantities = final.overview
         if quantities and len(runs) > 1:
             path = Path(out) / "overview.png"
-            plot_overview(quantities, file.text or file.name, path)
+            plot_overview(quantities, text or whole, path)
             files.append(path)
         path = Path(out) / "result.json"
         final = replace(final, files=(*files, path))

@@ -239,3 +239,18 @@ def test_messages_of_the_progress_bar_stay_off_stdout(command: Command) -> None:
         assert "modelDescription.xml" in archive.namelist()
     done = command("run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.1", "--json")
     json.loads(done.out)  # one JSON value and nothing else
+
+
+def test_an_exported_scenario_runs_from_its_archive(command: Command, tmp_path: Path) -> None:
+    archive, drawing = tmp_path / "bench.ssp", tmp_path / "bench.svg"
+    assert command("export", "motor_bench/ST1", "--ssp", archive).code == 0
+    assert command("draw", "motor_bench/ST1", "--out", drawing).code == 0
+    assert "<svg" in drawing.read_text(encoding="utf-8")
+    results = [
+        json.loads(command("run", name, "--duration", "0.7", "--json").out)
+        for name in (archive, "motor_bench/ST1")
+    ]
+    # the same FMUs, inputs and steps: the same energy to the last digit
+    assert results[0]["energy_residual_J"] == results[1]["energy_residual_J"] != 0.0
+    refused = command("export", "motor_bench", "--ssp", archive)
+    assert refused.code == 2 and "name one" in refused.err
