@@ -48,6 +48,7 @@ class Slave:
         self.description, folder = _unpacked(path)
         self.version = 3 if self.description.fmiVersion.startswith("3") else 2
         self.messages: list[str] = []
+        self.alive = True  # after fmi2Fatal, pythonfmu's answer to all errors, no call may follow
         arguments = {
             "guid": token or self.description.guid,
             "unzipDirectory": str(folder),
@@ -59,9 +60,10 @@ class Slave:
         if self.version == 2:
 
             def log(
-                _environment: Any, _name: Any, _status: Any, _category: Any, text: bytes
+                _environment: Any, _name: Any, status: int, _category: Any, text: bytes
             ) -> None:
                 self.messages.append(text.decode())
+                self.alive = self.alive and status != 4
 
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
@@ -130,4 +132,5 @@ class Slave:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.fmu.freeInstance()
+        if self.alive:
+            self.fmu.freeInstance()
