@@ -30,6 +30,7 @@ from .errors import (
     listing,
 )
 from .instance import Instance
+from .isolation import run_isolated
 from .iteration import Iterated
 from .loops import Newton
 from .plan import PARTS, Loop, Mean, Op, Plan
@@ -66,6 +67,8 @@ class Master:
             has the library).
         scenario: name that recordings carry.
         options: of the algorithm.
+        isolate: run in a process of its own, where a call to an FMU may take this long [s]: what
+            crashes or hangs there ends the run with an error and the recording up to then.
     """
 
     system: System
@@ -75,6 +78,7 @@ class Master:
     scenario: str = ""
     executor: str = "auto"
     options: Mapping[str, Any] = field(default_factory=dict)
+    isolate: float | None = None
 
     def run(
         self,
@@ -108,6 +112,12 @@ class Master:
         plan = self.compile(list(signals), observed)
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         external = self._external(signals, times)
+        if self.isolate is not None:
+            if not self.isolate > 0.0:
+                raise ValueRangeError(f"time limit {self.isolate} s is not positive")
+            return run_isolated(
+                self, self.isolate, signals, external, observed, times, every, progress
+            )
         with ExitStack() as stack:
             run = _Run(self, plan, observed, external, times, every, signals, stack)
             return run.execute(count, progress)
