@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
+from ..calibrate.validate import check_data, check_model
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
@@ -143,7 +144,8 @@ class Diagnosis:
             return []
         found = []
         estimate = self.after.estimate
-        for number, item in enumerate(self.after.effects):
+        stages = {r.winner.effects[-1]: r for r in self.search.rounds if r.winner is not None}
+        for item in self.after.effects:
             prefix = f"{item.instance}.{item.port}.{item.effect}."
             values = {
                 p.name.removeprefix(prefix): {
@@ -154,7 +156,7 @@ class Diagnosis:
                 for i, p in enumerate(estimate.problem.parameters)
                 if p.name.startswith(prefix)
             }
-            stage = self.search.rounds[number] if number < len(self.search.rounds) else None
+            stage = stages.get(item)
             winner = stage.winner if stage else None
             found.append(
                 {
@@ -196,9 +198,19 @@ def diagnose(
         CosimError: the declared system cannot be simulated.
     """
     begun = time.perf_counter()
+    findings = check_data(problem)
+    if not any(f.severity == "error" for f in findings):
+        findings += check_model(problem)
+    errors = [str(f) for f in findings if f.severity == "error"]
+    if errors:
+        result = Diagnosis(problem, "bad_data", "; ".join(errors))
+        result.warnings = [str(f) for f in findings if f.severity != "error"]
+        result.wall = time.perf_counter() - begun
+        return result
     search = Search(problem, say)
     base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
+    result.warnings = [str(f) for f in findings]
     current, winners = base, []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
@@ -212,6 +224,9 @@ def diagnose(
         current = stage.winner
         if not any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
             break
+    if len(current.effects) > 1:
+        current = search.eliminated(current)
+        winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]
     result.after = current
     _judge(result, winners)
     if out is not None and current.effects:

@@ -17,6 +17,8 @@ from ..calibrate.fit import BLOCK
 from ..calibrate.problem import Problem, Run, Sensitivity
 
 Vector = NDArray[np.float64]
+BLOCKS = 40
+"""Blocks needed to estimate a variance from them: its own error is then a quarter."""
 ABSORBED = 1e-3
 """A signature of which less than this share is left has no direction of its own: differences over
 rounded simulations carry relative errors of that order."""
@@ -28,10 +30,13 @@ class Layout:
     Args:
         problem: whose channels.
         runs: in order.
-        block: length of the blocks over which residuals may be correlated [s].
+        block: length of the blocks over which residuals may be correlated [s]; shorter where that
+            leaves fewer than `BLOCKS`.
     """
 
     def __init__(self, problem: Problem, runs: Sequence[Run], block: float = BLOCK) -> None:
+        total = sum(float(run.times[-1] - run.times[0]) for run in runs)
+        block = min(block, total / BLOCKS)
         self.problem, self.runs = problem, tuple(runs)
         self.names = [run.name for run in runs]
         self.good = [np.isfinite(run.data).ravel() for run in runs]

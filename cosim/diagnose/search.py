@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.fit import Estimate, fit
-from ..calibrate.problem import Parameter, Problem
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, candidates, new_parameters
 from .linear import Absorber, Layout, Score, holm, score
@@ -27,6 +27,7 @@ GATE_Z = 2.0
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
 REFITS = 5
+REFINED = 3
 ROUNDS = 3
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -292,6 +293,9 @@ class Search:
                 f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
             )
         current.fitted.sort(key=lambda f: -self.total(base, f))
+        best = [self.refined(base, f) for f in current.fitted[:REFINED]]
+        current.fitted = [*best, *current.fitted[REFINED:]]
+        current.fitted.sort(key=lambda f: -self.total(base, f))
         for fitted in current.fitted:
             if fitted.gate is not None and fitted.gate.passed:
                 current.winner = fitted
@@ -303,6 +307,62 @@ class Search:
             ]  # fmt: skip
         self.rounds.append(current)
         return current
+
+    def refined(self, base: Fitted, fitted: Fitted) -> Fitted:
+        """The fit with all parameters of its last effect free, if unused runs want that."""
+        item = fitted.signature
+        if item is None:
+            return fitted
+        _, others = new_parameters(base.problem, item.problem)
+        if not others:
+            return fitted
+        spans = {p.name: p.span for p in fitted.problem.parameters}
+        problem = item.problem.with_parameters(
+            [replace(p, span=spans.get(p.name, p.span)) for p in item.problem.parameters]
+        )
+        theta = problem.nominal
+        for name, value in fitted.estimate.values.items():
+            theta[problem.index(name)] = value
+        try:
+            result = self.fitted(problem, theta, near=True)
+        except CosimError:
+            return fitted
+        result.effects, result.signature = fitted.effects, item
+        result.p_value = fitted.p_value
+        result.gate = compare(self.check_data, base.check, result.check, self.checking)
+        better = self.gain(fitted, result) > GATE
+        if (
+            not better
+            or not compare(self.check_data, fitted.check, result.check, self.checking).passed
+        ):
+            return fitted
+        self.say(f"{item.candidate.label}: its other parameters are wanted, too")
+        return result
+
+    def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
+        """A model refitted with one of its effects absent."""
+        prefix = f"{effect.instance}.{effect.port}.{effect.effect}."
+        problem = fitted.problem
+        held = {
+            p.name: 0.0 if p.strength else value
+            for p, value in zip(problem.parameters, fitted.estimate.theta.tolist(), strict=True)
+            if p.name.startswith(prefix)
+        }
+        keep = [i for i, p in enumerate(problem.parameters) if p.name not in held]
+        result = self.fitted(problem.hold(held), fitted.estimate.theta[keep], near=True)
+        result.effects = tuple(e for e in fitted.effects if e != effect)
+        result.signature = fitted.signature
+        return result
+
+    def eliminated(self, fitted: Fitted) -> Fitted:
+        """The model without effects that later ones have made superfluous."""
+        for effect in fitted.effects[:-1]:
+            less = self.without(fitted, effect)
+            gate = compare(self.check_data, less.check, fitted.check, self.checking)
+            if not gate.passed:
+                self.say(f"dropped again: {effect.label}")
+                return self.eliminated(less)
+        return fitted
 
     def gain(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on the identification runs, less one per additional parameter."""
@@ -321,8 +381,3 @@ class Search:
     def test(self, first: Fitted, second: Fitted) -> Score:
         """Score of the step between two models on unused runs."""
         return score(second.check - first.check, self.check_data - first.check, self.checking, 0)
-
-
-def strengths(parameters: tuple[Parameter, ...]) -> list[Parameter]:
-    """Strengths of effects among parameters."""
-    return [p for p in parameters if p.strength]

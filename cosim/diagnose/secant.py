@@ -22,6 +22,8 @@ VISIBLE = 1.0
 WORTH = 10.0
 """Gain [nats] below which a third trial is not worth its simulations: after correction for the
 number of candidates it would not be significant."""
+TRIALS, NEAR = 3, 0.3
+"""Trials at most; a strength this close to one that was tried is not tried again."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -106,10 +108,9 @@ class Bench:
         best: Signature | None = None
         value = strength.span
         tried: list[float] = []
-        previous = 0.0
-        for _ in range(4):
+        for _ in range(TRIALS):
             value = float(np.clip(value, strength.minimum, strength.maximum))
-            if value == 0.0 or any(abs(value / old - 1.0) < 0.3 for old in tried):
+            if value == 0.0 or any(abs(value / old - 1.0) < NEAR for old in tried):
                 break
             tried.append(value)
             try:
@@ -118,17 +119,14 @@ class Bench:
                 value *= 0.1  # too strong for the system to run
                 continue
             found = self._measure(candidate, problem, strength, value, change)
-            if best is None or found.score.gain > best.score.gain:
+            if best is None or _mismatch(found) < _mismatch(best):
                 best = found
-            if len(tried) > 1 and found.score.gain < max(1.2 * previous, WORTH):
-                break
-            previous = found.score.gain
-            if found.unseen and (found.score.size > VISIBLE or not np.any(change)):
+            small = len(tried) > 1 and found.score.gain < WORTH
+            if small or (found.unseen and (found.score.size > VISIBLE or not np.any(change))):
                 break
             factor = found.score.amplitude
-            if factor < 0.0 and strength.minimum >= 0.0:
-                # the strength cannot be negative: see whether a small one wants to be positive
-                factor = 0.1
+            if factor <= 0.0 and strength.minimum >= 0.0:
+                factor = 0.1  # it cannot be negative: see whether a small one wants to be positive
             size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
             value *= float(np.sign(factor) or 1.0) * min(size, GREATEST)
         problem.close()
@@ -152,6 +150,11 @@ class Bench:
             candidate, problem, strength, value, change.astype(np.float32),
             rest.astype(np.float32), result, absorbed,
         )  # fmt: skip
+
+
+def _mismatch(item: Signature) -> float:
+    """How far the strength of the trial is from the one that the residual asks for."""
+    return abs(float(np.log(max(item.score.amplitude, 1e-6))))
 
 
 def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:

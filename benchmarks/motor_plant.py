@@ -1,0 +1,211 @@
+"""A motor bench written from its rig sheet alone, to make data sets with undeclared effects.
+
+It shares nothing with the components that are to explain its data: one loop over the ticks of the
+current controller, many benches at once as arrays, midpoint rule between the ticks, effects written
+down here once more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+TICK, SUBSTEPS = 5e-5, 2
+RATIO, L_A, J_ROTOR, U_MAX, I_MAX, KP_I, KI_I = 10.167, 4e-4, 1.6e-4, 48.0, 30.0, 0.80, 560.0
+DECLARED = {
+    "R_a": (0.338, 0.362), "K_t": (0.0915, 0.0985), "eta": (0.78, 0.86), "b": (0.02, 0.12),
+    "J_load": (0.065, 0.1), "Kp_v": (0.32, 0.5), "Ki_v": (2.8, 5.6), "acc_max": (1200.0, 1900.0),
+}  # fmt: skip
+EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
+    "none": (0.0, ()),
+    "coulomb": (0.8, ("coulomb",)),
+    "stribeck": (0.8, ("stribeck",)),
+    "quadratic_drag": (1e-3, ("quadratic_drag",)),
+    "unbalance": (0.5, ("unbalance",)),
+    "hose_spring": (0.02, ("hose_spring",)),
+    "load_friction": (0.06, ("load_friction",)),
+    "supply_sag": (0.15, ("battery_sag",)),
+    "winding_heating": (2.0, ("winding_heating",)),
+    "saturation": (0.2, ("torque_constant_saturation",)),
+    "brush_drop": (0.5, ("brush_drop",)),
+    "current_offset": (0.25, ("bias", "current_offset")),
+    "current_gain": (0.03, ("gain", "current_gain")),
+    "command_delay": (8e-3, ("delay",)),
+}
+"""Name -> size, and the names of the catalogue that are the same law."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """One bench: its parameters, and an effect that its sheet does not declare."""
+
+    parameters: dict[str, float]
+    effect: str = "none"
+    size: float = 0.0
+
+
+def draw(random: np.random.Generator, effect: str = "none", factor: float = 1.0) -> Bench:
+    """A bench with parameters within the sheet's bounds."""
+    values = {}
+    for name, (low, high) in DECLARED.items():
+        margin = 0.15 * (high - low)
+        values[name] = float(random.uniform(low + margin, high - margin))
+    return Bench(values, effect, factor * EFFECTS[effect][0])
+
+
+def commands(random: np.random.Generator, seconds: float) -> dict[str, tuple[str, Vector]]:
+    """Set speeds of the motor shaft at 1 kHz: run -> (purpose, values)."""
+    t = np.arange(0.0, seconds, 1e-3)
+
+    def levels(values: list[float], count: int) -> Vector:
+        index = np.minimum((t / seconds * count).astype(int), count - 1)
+        return np.array([0.0, *values])[index]
+
+    def sines(amplitude: float, lowest: float) -> Vector:
+        phases = random.uniform(0.0, 2.0 * np.pi, 6)
+        rates = lowest * np.array([1.0, 1.7, 2.9, 5.3, 9.1, 13.0])
+        parts = np.sin(2 * np.pi * rates * t[:, None] + phases) / np.arange(1, 7)
+        ramp = np.minimum(t / 0.3, 1.0)
+        return np.asarray(amplitude * ramp * parts.sum(axis=1))
+
+    slow = 15.0 * np.sin(2 * np.pi * t * 2.0 / seconds)
+    return {
+        "ST": ("identification", levels([60.0, 60.0, -40.0, 150.0], 5)),
+        "MS": ("identification", sines(70.0, 0.4)),
+        "RV": ("identification", slow),
+        "LV": ("identification", levels([20.0, 90.0, 180.0, 300.0, 330.0], 6)),
+        "MX": ("validation", sines(60.0, 0.5) + levels([40.0, -30.0], 3)),
+        "LW": ("validation", levels([-30.0, -110.0, -220.0, -310.0], 5)),
+    }
+
+
+def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[str, Vector]:
+    """Speed, current, voltage and angle at 1 kHz, one column per bench, without noise."""
+
+    def of(name: str) -> Vector:
+        return np.array([b.parameters[name] for b in benches])
+
+    def size(name: str) -> Vector:
+        return np.array([b.size if b.effect == name else 0.0 for b in benches])
+
+    resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")
+    kp, ki, acc = of("Kp_v"), of("Ki_v"), of("acc_max")
+    inertia = of("J_load") + RATIO**2 * J_ROTOR
+    coulomb, stribeck, drag = size("coulomb"), size("stribeck"), size("quadratic_drag")
+    unbalance, hose, load_mu = size("unbalance"), size("hose_spring"), size("load_friction")
+    sag, heating, saturation = size("supply_sag"), size("winding_heating"), size("saturation")
+    drop, offset, gain = size("brush_drop"), size("current_offset"), size("current_gain")
+    delay = np.rint(size("command_delay") / 1e-3).astype(int)
+
+    n = len(benches)
+    i, w, heat = np.zeros(n), np.zeros(n), np.zeros(n)
+    angle = np.full(n, start_angle / RATIO)
+    speed_integral, current_integral = np.zeros(n), np.zeros(n)
+    w_set, i_set, u = np.zeros(n), np.zeros(n), np.zeros(n)
+    rows: dict[str, list[Vector]] = {k: [] for k in ("speed", "current", "voltage", "angle")}
+    last = RATIO * angle
+    h = TICK / SUBSTEPS
+
+    def rates(i: Vector, w: Vector, angle: Vector) -> tuple[Vector, Vector]:
+        constant = k_t * (1 - saturation * i**2 / (i**2 + 20.0**2))
+        hot = resistance * (1 + 0.00393 * heating * heat)
+        supply = u * (1 - sag * (u * i / 48.0) / 48.0)
+        i_rate = (supply - hot * i - constant * RATIO * w - drop * np.tanh(i / 0.2)) / L_A
+        torque = RATIO * eta * constant * i
+        sign = np.tanh(w / 2e-3)
+        friction = (
+            b * w + drag * w * np.abs(w) + (coulomb + load_mu * np.abs(torque)) * sign
+            + stribeck * np.exp(-((w / 0.5) ** 2)) * sign
+        )  # fmt: skip
+        springs = unbalance * np.sin(angle) + hose * angle
+        return i_rate, (torque - friction - springs) / inertia
+
+    for tick in range(w_ref.size * 20):
+        if tick % 20 == 0:
+            rows["speed"].append((RATIO * angle - last) / 1e-3)
+            rows["current"].append(i * (1 + gain) + offset)
+            rows["voltage"].append(u.copy())
+            rows["angle"].append(RATIO * angle)
+            last = RATIO * angle
+        if tick % 10 == 0:
+            command = w_ref[np.maximum(tick // 20 - delay, 0)]
+            w_set = w_set + np.clip(command - w_set, -acc * 5e-4, acc * 5e-4)
+            error = w_set - RATIO * w
+            wanted = kp * error + speed_integral
+            free = np.abs(wanted) < I_MAX
+            speed_integral = speed_integral + np.where(free, ki * error * 5e-4, 0.0)
+            i_set = np.clip(wanted, -I_MAX, I_MAX)
+        error = i_set - (i * (1 + gain) + offset)
+        wanted = KP_I * error + current_integral
+        free = np.abs(wanted) < U_MAX
+        current_integral = current_integral + np.where(free, KI_I * error * TICK, 0.0)
+        u = np.clip(wanted, -U_MAX, U_MAX)
+        for _ in range(SUBSTEPS):
+            i_rate, w_rate = rates(i, w, angle)
+            middle_i, middle_w = i + 0.5 * h * i_rate, w + 0.5 * h * w_rate
+            i_rate, w_rate = rates(middle_i, middle_w, angle + 0.5 * h * w)
+            angle = angle + h * middle_w
+            i, w = i + h * i_rate, w + h * w_rate
+        heat = heat + TICK * (resistance * i**2 - heat) / 60.0
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+def write_sets(
+    folder: Path,
+    benches: list[Bench],
+    sheet: Path,
+    seed: int,
+    seconds: float = 5.0,
+    names: tuple[str, ...] = (),
+) -> list[Path]:
+    """Write one data set per bench, with the sheet's noise and rounding; return their folders.
+
+    Args:
+        folder: data sets go into folders below it.
+        benches: to simulate.
+        sheet: the rig sheet.
+        seed: of commands and noise.
+        seconds: duration of the runs.
+        names: of the runs, all if empty.
+    """
+    random = np.random.default_rng(seed)
+    runs = {k: v for k, v in commands(random, seconds).items() if not names or k in names}
+    places = [folder / f"bench_{number:03d}" for number in range(len(benches))]
+    columns = '["time", "speed_set", "speed", "current", "voltage", "angle"]'
+    texts = {
+        place: f'rig = "motor_bench"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
+        f"sample_rate_hz = 1000\ncolumns = {columns}\n"
+        for place in places
+    }
+    for name, (purpose, w_ref) in runs.items():
+        start = float(random.uniform(0.0, 6.0))
+        clean = simulate(benches, w_ref, start)
+        for column, place in enumerate(places):
+            table: dict[str, Any] = {"time": np.arange(w_ref.size) * 1e-3, "speed_set": w_ref}
+            for channel, sigma, quantum in (
+                ("speed", 0.15, 0.0959), ("current", 0.05, 0.0), ("voltage", 0.05, 0.0),
+                ("angle", 0.005, 0.00153),
+            ):  # fmt: skip
+                values = clean[channel][:, column]
+                if channel == "speed":  # differences of counts
+                    counts = np.floor(clean["angle"][:, column] * 65536 / (2 * np.pi))
+                    values = np.diff(counts, prepend=counts[0]) * quantum
+                elif quantum:
+                    values = np.rint(values / quantum) * quantum
+                table[channel] = values + sigma * random.standard_normal(values.size)
+            (place / "runs").mkdir(parents=True, exist_ok=True)
+            pd.DataFrame(table).to_parquet(place / "runs" / f"{name}.parquet")
+            texts[place] += (
+                f'\n[[run]]\nname = "{name}"\nfile = "runs/{name}.parquet"\n'
+                f'purpose = "{purpose}"\nduration_s = {w_ref.size * 1e-3 - 1e-3}\n'
+                f"initial_motor_angle = {start}\ninitial_speed = 0.0\n"
+            )
+    for place, text in texts.items():
+        (place / "set.toml").write_text(text, encoding="utf-8")
+    return places

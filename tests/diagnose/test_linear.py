@@ -1,0 +1,66 @@
+"""The tests on residuals keep their level and see what is there."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.diagnose.linear import Layout, holm, score
+from cosim.diagnose.search import GATE, compare
+
+RATE, SECONDS = 100, 40
+
+
+def layout() -> Layout:
+    """One run of one channel, sampled at `RATE`."""
+    times = np.arange(RATE * SECONDS) / RATE
+    run: Any = SimpleNamespace(name="A", times=times, data=np.zeros((times.size, 1)))
+    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")])
+    return Layout(problem, [run])
+
+
+def p_values(correlated: bool, trials: int = 400) -> np.ndarray:
+    """Of scores of noise alone against a sine."""
+    random, place = np.random.default_rng(0), layout()
+    direction = np.sin(2 * np.pi * 3.0 * place.runs[0].times)
+    values = []
+    for _ in range(trials):
+        noise = random.standard_normal(place.size)
+        if correlated:  # each value drawn for ten samples: a correlation of 0.1 s
+            noise = np.repeat(noise[::10], 10)
+        values.append(score(direction, noise, place, 0).p_value)
+    return np.array(values)
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+def test_false_alarms_are_as_rare_as_promised(correlated: bool) -> None:
+    # 400 trials at 5 %: 20 expected, 36 is 3.7 standard deviations above
+    assert np.sum(p_values(correlated) < 0.05) <= 36
+
+
+def test_a_direction_that_is_there_is_found() -> None:
+    place = layout()
+    direction = np.sin(2 * np.pi * 3.0 * place.runs[0].times)
+    noise = np.random.default_rng(1).standard_normal(place.size)
+    found = score(direction, noise + 0.3 * direction, place, 0)
+    # standard deviation of the amplitude is 1/sqrt(2000) = 0.022; four of them
+    assert found.amplitude == pytest.approx(0.3, abs=0.09)
+    assert found.p_value < 1e-6
+
+
+def test_holm_corrects_for_the_number_of_tests() -> None:
+    assert holm([0.01, 0.04, 0.03]).tolist() == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_the_gate_opens_for_the_better_model_only() -> None:
+    place = layout()
+    truth = np.sin(2 * np.pi * 0.5 * place.runs[0].times)
+    data = truth + np.random.default_rng(2).standard_normal(place.size)
+    nothing = np.zeros(place.size)
+    there, back = compare(data, nothing, truth, place), compare(data, truth, nothing, place)
+    assert there.passed and there.gain > GATE
+    assert not back.passed
+    assert back.gain == pytest.approx(-there.gain)

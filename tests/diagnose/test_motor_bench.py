@@ -1,0 +1,64 @@
+"""The chain on data of an independent plant: an effect is named, its clean twin stays quiet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import Bench, draw, write_sets
+from cosim.calibrate.mapping import read_problem
+from cosim.diagnose.candidates import Candidate, candidates
+from cosim.diagnose.search import Round, Search
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+SIZE = 0.15
+CHOICE = {"battery_sag", "brush_drop", "winding_heating", "current_gain", "viscous", "unbalance"}
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
+    """A bench with a soft supply, and the same bench without."""
+    folder = tmp_path_factory.mktemp("benches")
+    plain = draw(np.random.default_rng(3))
+    benches = [plain, Bench(plain.parameters, "supply_sag", SIZE)]
+    clean, sagging = write_sets(folder, benches, SHEET, 5, 2.0, ("ST", "MS", "LW"))
+    yield {"clean": clean, "supply_sag": sagging}
+
+
+def searched(folder: Path) -> tuple[Search, Round]:
+    """One round over a part of the catalogue."""
+    problem = read_problem(folder, workers=2)
+    chosen = [c for c in candidates(problem) if c.effect in CHOICE]
+    assert len({c.effect for c in chosen}) == len(CHOICE)
+    search = Search(problem, only=chosen)
+    return search, search.round(search.calibrated())
+
+
+def test_the_undeclared_effect_is_named_with_its_size(sets: dict[str, Path]) -> None:
+    search, found = searched(sets["supply_sag"])
+    assert found.winner is not None
+    assert found.winner.effects[-1].effect == "battery_sag"
+    size = found.winner.estimate.values["motor.winding.battery_sag.r_b"]
+    # twice the 95 % interval of this short data set is about 10 %
+    assert size == pytest.approx(SIZE, rel=0.1)
+    # 1.1: what the sheets' noise figures are good for
+    rest = search.check_data - found.winner.check
+    assert np.sqrt(np.mean(rest**2)) < 1.1
+
+
+def test_the_clean_twin_stays_quiet(sets: dict[str, Path]) -> None:
+    search, found = searched(sets["clean"])
+    assert found.winner is None
+    assert np.sqrt(np.mean((search.check_data - found.base.check) ** 2)) < 1.1
+
+
+def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, Path]) -> None:
+    problem = read_problem(sets["clean"], workers=2)
+    viscous = [c for c in candidates(problem) if c.effect == "viscous" and c.instance == "load"]
+    search = Search(problem, only=viscous)
+    stage = search.scored(search.calibrated())
+    assert [s.unseen for s in stage.signatures] == [True]
+    assert isinstance(viscous[0], Candidate)
