@@ -110,11 +110,30 @@ def _npz(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
     return columns, {}
 
 
-_READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz}
+def _mat(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, squeeze_me=True)
+    except (ValueError, OSError, NotImplementedError) as error:
+        raise ScenarioError(
+            f"{path}: is not a MATLAB file of version 7 or older ({error}); save it with -v7"
+        ) from error
+    columns = {
+        name: np.asarray(value, dtype=np.float64)
+        for name, value in content.items()
+        if not name.startswith("__")
+        and getattr(value, "ndim", 0) == 1
+        and value.dtype.kind in "fiub"
+    }
+    return columns, {}
+
+
+_READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mat": _mat}
 
 
 def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log:
-    """Read a CSV, Parquet or npz file.
+    """Read a CSV, Parquet, npz or MATLAB file.
 
     Raises:
         ScenarioError: missing or unreadable.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from .. import library
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..measurement import DataSet, Log, read_data_set
+from ..measurement import Run as DataRun
 from ..provider import Provider
 from ..signals import Table
 from ..system_file import SystemFile, read_system
@@ -30,10 +32,13 @@ Vector = NDArray[np.float64]
 KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
-    "only",
+    "only", "run", "columns", "time",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
+GAP = 3.0
+"""Intervals of a clock longer than this many usual ones are gaps."""
+_COLUMN = {"source", "time", "late", "scale", "offset", "unit"}
 _INPUT = {"column", "columns", "gain", "unit", "interpolation"}
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 _ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
@@ -129,9 +134,45 @@ def read_problem(
 
         provider = default_provider()
     folder = Path(folder)
-    data = read_data_set(folder)
-    path = Path(mapping) if mapping is not None else find_mapping(folder, data.rig)
+    if (folder / "set.toml").is_file():
+        data = read_data_set(folder)
+        path = Path(mapping) if mapping is not None else find_mapping(folder, data.rig)
+    else:
+        path = Path(mapping) if mapping is not None else find_mapping(folder, "")
+        data = _plain(folder, path)
     return _Mapping(path, data).problem(provider, system, workers)
+
+
+def _plain(folder: Path, path: Path) -> DataSet:
+    """A data set of plain logs, whose runs the mapping lists."""
+    runs = read_toml(path).get("run", [])
+    if not runs:
+        raise ScenarioError(
+            f"{folder}: has no set.toml, and {path} lists no runs "
+            "([[run]] with name, file, purpose)"
+        )
+    try:
+        found = {
+            entry["name"]: DataRun(
+                entry["name"], folder / entry["file"], entry["purpose"], dict(entry)
+            )
+            for entry in runs
+        }
+    except KeyError as error:
+        raise ScenarioError(f"{path}: a run lacks {error}") from None
+    return DataSet(folder, folder.resolve().name, "", found, {}, {}, {})
+
+
+def _resampled(times: Vector, own: Vector, values: Vector) -> Vector:
+    """Values of another clock; NaN outside it and where it has gaps."""
+    good = np.isfinite(values) & np.isfinite(own)
+    own, values = own[good], values[good]
+    if own.size < 2:
+        return np.full(times.shape, np.nan)
+    result = np.interp(times, own, values, left=np.nan, right=np.nan)
+    place = np.clip(np.searchsorted(own, times), 1, own.size - 1)
+    gap = own[place] - own[place - 1] > GAP * float(np.median(np.diff(own)))
+    return np.where(gap, np.nan, result)
 
 
 class _Mapping:
@@ -150,10 +191,46 @@ class _Mapping:
         self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
         wanted = self.table.get("only", {})
         self.logs = {
-            name: data.log(name)
+            name: self.prepared(data.log(name))
             for name, run in data.runs.items()
             if all(run.values.get(key, value) == value for key, value in wanted.items())
         }
+
+    def prepared(self, log: Log) -> Log:
+        """The log on one clock, with the columns that the mapping makes."""
+        entries = self.table.get("columns", {})
+        name = str(self.table.get("time", "time"))
+        if not entries and name == "time":
+            return log
+        time = log[name]
+        columns: dict[str, Vector] = {
+            column: values for column, values in log.columns.items() if values.shape == time.shape
+        }
+        units = dict(log.units)
+        for column, entry in entries.items():
+            where = f"{self.path}: column {column}"
+            unknown = set(entry) - _COLUMN
+            if unknown:
+                raise ScenarioError(
+                    f"{where}: has no key {sorted(unknown)[0]!r}; {listing(sorted(_COLUMN))}"
+                )
+            values = log[str(entry.get("source", column))]
+            own = log[str(entry.get("time", name))] - float(entry.get("late", 0.0))
+            if own.shape != values.shape:
+                raise ScenarioError(
+                    f"{where}: {values.size} values, but its clock has {own.size} times; name its "
+                    "own clock with time"
+                )
+            if entry.get("time", name) != name or entry.get("late", 0.0):
+                values = _resampled(time, own, values)
+            columns[column] = values * float(entry.get("scale", 1.0)) + float(
+                entry.get("offset", 0.0)
+            )
+            units[column] = str(entry.get("unit", units.get(column, "")))
+        clock = columns.get("time", time)
+        columns["time"] = clock - clock[0]
+        self.units.update({column: unit for column, unit in units.items() if unit})
+        return replace(log, columns=columns, units=units)
 
     def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
         """The problem."""
