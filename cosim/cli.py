@@ -347,12 +347,22 @@ def run_command(
     algorithm: Annotated[
         str | None, typer.Option(help=f"One of {', '.join(algorithms.names())}.")
     ] = None,
+    options: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="NAME=VALUE", help="E.g. extrapolation=1."),
+    ] = None,
     step: Annotated[float | None, typer.Option(help="Communication step [s].")] = None,
     duration: Annotated[float | None, typer.Option(help="Duration [s].")] = None,
     fmus: Annotated[
         Path | None, typer.Option(help="Take variants from this folder instead of building.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/SCENARIO].")] = None,
+    isolate: Annotated[
+        bool, typer.Option("--isolate", help="Run in a process of its own: FMUs may crash or hang.")
+    ] = False,
+    time_limit: Annotated[
+        float, typer.Option(help="With --isolate: longest time of one call to an FMU [s].")
+    ] = 60.0,
     as_json: AsJson = False,
 ) -> None:
     """Run a scenario, compare it with its reference, plot it.
@@ -361,6 +371,7 @@ def run_command(
     """
     changes = dict(_pair(item, "--set", "INSTANCE=VARIANT") for item in variants or [])
     values = dict(_pair(item, "--param", "INSTANCE.NAME=VALUE") for item in parameters or [])
+    chosen = dict(_pair(item, "--option", "NAME=VALUE") for item in options or [])
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
     provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
@@ -377,11 +388,13 @@ def run_command(
             variants=changes,
             parameters={key: _number(text) for key, text in values.items()},
             algorithm=algorithm,
+            options={key: _number(text) for key, text in chosen.items()},
             step=step,
             duration=duration,
             provider=provider,
             out=out or Path("out") / _folder_name(name),
             progress=told,
+            isolate=time_limit if isolate else None,
         )
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         _say(f"note: {note}")

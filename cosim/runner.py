@@ -240,7 +240,7 @@ def run_scenario(
     record, others = _recorded(scenario, system, changed)
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
-        isolate=isolate,
+        isolate=isolate, options=scenario.options,
     )  # fmt: skip
     started = time.perf_counter()
     recording = master.run(
@@ -285,6 +285,7 @@ def run(
     variants: Mapping[str, str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     algorithm: str | None = None,
+    options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
     provider: Provider | None = None,
@@ -300,6 +301,7 @@ def run(
             or .ssd file.
         variants: instance (or component, or slot) -> variant, fidelity, or `+effect`.
         parameters: `instance.name` -> value.
+        options: of the algorithm; those of the scenario if that is its algorithm, too.
         algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
             does not reach.
         provider: where variants come from; by default they are built from the sources, or taken
@@ -326,6 +328,10 @@ def run(
         item = replace(
             item,
             algorithm=algorithm or item.algorithm,
+            options={
+                **(item.options if algorithm in (None, item.algorithm) else {}),
+                **(options or {}),
+            },
             step=step if step is not None else item.step,
             duration=duration if duration is not None else item.duration,
         )

@@ -27,8 +27,8 @@ from .table import fill, table_runs
 
 KEYS = {
     "description", "question", "expected", "source", "system", "duration", "start", "step",
-    "algorithm", "tolerance", "variants", "parameters", "inputs", "record", "compare", "checks",
-    "runs", "table", "plot", "plots",
+    "algorithm", "options", "tolerance", "variants", "parameters", "inputs", "record", "compare",
+    "checks", "runs", "table", "plot", "plots",
 }  # fmt: skip
 _SOURCE_KEYS = {"file", "data", "run", "column", "columns", "time", "unit", "constant", "times",
                 "values", "interpolation"}  # fmt: skip
@@ -46,6 +46,7 @@ class Scenario:
         system: the graph, before variants are changed.
         duration, start, step: [s].
         algorithm: name of the co-simulation algorithm.
+        options: of the algorithm.
         tolerance: handed to the FMUs, None for their own.
         variants: changes to the system's variants, in short forms.
         parameters: full name -> value.
@@ -79,6 +80,7 @@ class Scenario:
     checks: tuple[Check, ...]
     plot: tuple[str, ...] | None
     plots: tuple[Axes, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -249,6 +251,7 @@ class _Reader:
             checks=tuple(checks),
             plot=tuple(table["plot"]) if "plot" in table else None,
             plots=tuple(self.axes(entry) for entry in table.get("plots", [])),
+            options=dict(table.get("options", {})),
         )
 
     def axes(self, entry: Any) -> Axes:

@@ -79,9 +79,7 @@ def test_claims_that_are_not_true_are_told(faulty: Path) -> None:
     for algorithm in ("iterated", "adaptive"):
         with pytest.raises(StepError, match="saving the state at t = 0 s failed with status"):
             Master(pair(faulty, None), algorithm, 0.1).run(1.0)
-    with pytest.raises(
-        FmuCallError, match=r"a directional derivative.* failed with status 'error'"
-    ):
+    with pytest.raises(FmuCallError, match=r"directional derivative.* failed with"):
         linearize(Master(pair(faulty, None), step=0.1))
 
 
