@@ -83,8 +83,11 @@ def measure(driver: ctypes.CDLL, path: Path, h: float, *, rounds: int, count: in
         slave.initialize({"solver.step": h} if "solver.step" in slave.vr else {})
         raw = ctypes.CDLL(slave.fmu.dll._name)
         inputs, outputs = slave.names("input"), slave.names("output")
-        start = {v.name: float(v.start) for v in slave.description.modelVariables if v.start
-                 and v.causality == "input"}
+        start = {
+            v.name: float(v.start)
+            for v in slave.description.modelVariables
+            if v.start and v.causality == "input"
+        }
         u = (ctypes.c_uint32 * len(inputs))(*(slave.vr[name] for name in inputs))
         y = (ctypes.c_uint32 * len(outputs))(*(slave.vr[name] for name in outputs))
         values = (ctypes.c_double * len(inputs))(*(start.get(name, 0.0) for name in inputs))
@@ -92,10 +95,19 @@ def measure(driver: ctypes.CDLL, path: Path, h: float, *, rounds: int, count: in
         best = float("inf")
         for k in range(rounds):
             spent = driver.run(
-                ctypes.c_void_p(slave.fmu.component), _address(raw.fmi2DoStep), _address(raw.fmi2GetReal),
-                _address(raw.fmi2SetReal), u, ctypes.c_size_t(len(inputs)), values, y,
-                ctypes.c_size_t(len(outputs)), results, ctypes.c_double(h),
-                ctypes.c_long(k * count), ctypes.c_long(count),
+                ctypes.c_void_p(slave.fmu.component),
+                _address(raw.fmi2DoStep),
+                _address(raw.fmi2GetReal),
+                _address(raw.fmi2SetReal),
+                u,
+                ctypes.c_size_t(len(inputs)),
+                values,
+                y,
+                ctypes.c_size_t(len(outputs)),
+                results,
+                ctypes.c_double(h),
+                ctypes.c_long(k * count),
+                ctypes.c_long(count),
             )
             if spent < 0:
                 raise RuntimeError(f"{path.name}: call {int(-spent)} failed: {slave.messages}")
@@ -121,17 +133,28 @@ def main() -> None:
             microseconds = measure(driver, native, h, rounds=60, count=500)
             python = measure(driver, build(name, out=out, kind="python"), h, rounds=3, count=20)
             rows.append(
-                {"variant": name, "states": steps, "step_s": h, "native_us": microseconds,
-                 "limit_us": limit, "python_us": python}
+                {
+                    "variant": name,
+                    "states": steps,
+                    "step_s": h,
+                    "native_us": microseconds,
+                    "limit_us": limit,
+                    "python_us": python,
+                }
             )
     if options.json:
         print(json.dumps({"rows": rows}))
         return
-    table = Table("variant", "states", "step [s]", "native [µs]", "limit [µs]", "pythonfmu [µs]", "ratio")
+    titles = ("variant", "states", "step [s]", "native [µs]", "limit [µs]", "twin [µs]", "ratio")
+    table = Table(*titles)
     for row in rows:
         table.add_row(
-            row["variant"], str(row["states"]), f"{row['step_s']:g}", f"{row['native_us']:.3f}",
-            "" if row["limit_us"] is None else f"{row['limit_us']:g}", f"{row['python_us']:.0f}",
+            row["variant"],
+            str(row["states"]),
+            f"{row['step_s']:g}",
+            f"{row['native_us']:.3f}",
+            "" if row["limit_us"] is None else f"{row['limit_us']:g}",
+            f"{row['python_us']:.0f}",
             f"{row['python_us'] / row['native_us']:.0f}",
         )
     Console().print(table)
