@@ -130,8 +130,8 @@ def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
         index = np.minimum(index, recorded.size - 1)
         if np.max(np.abs(times - recorded[index])) <= COINCIDENT * interval:
             return values[index]
-    return np.interp(times, recorded, values)
     return np.asarray(np.interp(times, recorded, values), dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class Run:
