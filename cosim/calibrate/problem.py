@@ -129,7 +129,7 @@ def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
         index = np.clip(np.rint((times - recorded[0]) / interval).astype(np.intp), 0, None)
         index = np.minimum(index, recorded.size - 1)
         if np.max(np.abs(times - recorded[index])) <= COINCIDENT * interval:
-            return values[index]
+            return np.asarray(values[index], dtype=np.float64)
     return np.asarray(np.interp(times, recorded, values), dtype=np.float64)
 
 
