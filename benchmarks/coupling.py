@@ -171,11 +171,13 @@ ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 def build(name: str, case: Case) -> System:
-    """The system of a case."""
+    """The system of a case, without sampled parts that nothing depends on."""
     document = read_system(ROOT / "scenarios" / "systems" / f"{name}.toml")
     system = System(name, FolderProvider(ROOT / "fmus"))
+    drivers = {wire.source.partition(".")[0] for wire in document.connections}
     for instance, reference in document.instances.items():
-        if instance not in case.drop:
+        ends = instance not in drivers and build_model(reference).of_role("discrete")
+        if instance not in case.drop and not ends:
             system.add(instance, case.swap.get(instance, reference))
     for key, value in document.parameters.items():
         if key.partition(".")[0] in system.members:

@@ -8,13 +8,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from .errors import AlgebraicLoopError, FmuCallError, StepError
+from .execution import Execution
 from .isolation import CALLS, INDEX, INSTANCE, OPERATION, ROW, Order, Outcome, shared
-from .master import _Run
 from .plan import Op
 from .signals import Constant
 
 
-class _Told(_Run):
+class _Told(Execution):
     """A run that says what it is about to do."""
 
     def watch(self, order: Order) -> None:

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 INDEX, ROW, INSTANCE, OPERATION, CALLS = range(5)
 WHAT = {Op.SET: "taking inputs", Op.GET: "giving outputs", Op.STEP: "a step", Op.SUBSTEP: "a step"}
+STARTING = 30.0
+"""Longer than the limit, for Python to start and load the FMUs [s]."""
 LOADING = -1
 """Operation while FMUs are loaded and initialized."""
 
@@ -187,7 +189,7 @@ def _wait(
                 seen, since = calls, time.monotonic()
                 if progress is not None:
                     progress(int(state[INDEX]) / count)
-            elif time.monotonic() - since > limit:
+            elif time.monotonic() - since > limit + (0 if calls else STARTING):
                 return True
 
 

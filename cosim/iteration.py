@@ -15,7 +15,7 @@ from .loops import Newton
 from .plan import Iteration, Op
 
 if TYPE_CHECKING:
-    from .master import _Run
+    from .execution import Execution
 
 Vector = NDArray[np.float64]
 FIXED_POINT = 12
@@ -23,7 +23,7 @@ FIXED_POINT = 12
 
 
 @contextmanager
-def saved(run: _Run) -> Iterator[list[State]]:
+def saved(run: Execution) -> Iterator[list[State]]:
     """The states of all instances, released at the end."""
     states: list[State] = []
     try:
@@ -35,7 +35,7 @@ def saved(run: _Run) -> Iterator[list[State]]:
             instance.release(state)
 
 
-def restore(run: _Run, states: list[State]) -> None:
+def restore(run: Execution, states: list[State]) -> None:
     """Return all instances to their saved states."""
     for instance, state in zip(run.instances, states, strict=True):
         instance.restore(state)
@@ -48,7 +48,7 @@ class Iterated:
         repetitions: steps of the whole system that were made, for the record.
     """
 
-    def __init__(self, run: _Run, settings: Iteration) -> None:
+    def __init__(self, run: Execution, settings: Iteration) -> None:
         self.run, self.settings = run, settings
         layout = run.layout
         self.sources = np.unique(layout.copy_source[settings.smooth])

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from .block import DTYPES
 from .errors import AlgebraicLoopError, InputError, UnknownNameError, listing
+from .execution import Execution
 from .instance import Instance
-from .master import Driver, Master, _Run
+from .master import Driver, Master
 from .plan import Op
 
 Vector = NDArray[np.float64]
@@ -201,7 +202,7 @@ def operating_point(
     external = master._external(signals, times)
     parts, notes = [], []
     with ExitStack() as stack:
-        run = _Run(master, plan, [], external, times, 1, signals, stack)
+        run = Execution(master, plan, [], external, times, 1, signals, stack)
         run.initialize()
         if count:
             run.executor()(count)

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from .block import Block, check_values
 from .errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
-from .master import Driver, Master, _Run
+from .execution import Execution
+from .master import Driver, Master
 
 Vector = NDArray[np.float64]
 
@@ -60,7 +61,9 @@ class Session:
         self.targets = tuple(targets)
         self._stack = ExitStack()
         try:
-            self._run = _Run(master, plan, observed, external, times, every, signals, self._stack)
+            self._run = Execution(
+                master, plan, observed, external, times, every, signals, self._stack
+            )
             self._advance = self._run.executor()
             self._blocks = {name: self._block(name) for name in self.targets}
         except BaseException:

@@ -12,7 +12,7 @@ from .iteration import restore, saved
 from .plan import Iteration, Op
 
 if TYPE_CHECKING:
-    from .master import _Run
+    from .execution import Execution
 
 Vector = NDArray[np.float64]
 SHORTEST = 1e-6
@@ -29,7 +29,7 @@ class StepControl:
         shortest, longest: of those taken [s].
     """
 
-    def __init__(self, run: _Run, settings: Iteration) -> None:
+    def __init__(self, run: Execution, settings: Iteration) -> None:
         self.run, self.settings = run, settings
         layout = run.layout
         self.raster = run.master.step

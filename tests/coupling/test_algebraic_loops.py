@@ -68,7 +68,7 @@ def arm_and_base(provider) -> System:
 
 def test_arm_and_base_diverge_by_plain_exchange(provider, monkeypatch) -> None:
     monkeypatch.setattr("cosim.loops.ITERATIONS", 0)
-    monkeypatch.setattr("cosim.master.PATIENCE", 1000)  # ended early by runaway values
+    monkeypatch.setattr("cosim.execution.PATIENCE", 1000)  # ended early by runaway values
     with pytest.raises(AlgebraicLoopError, match="algebraic loop"):
         Master(arm_and_base(provider), step=1e-3, executor="python").run(1e-3)
 
