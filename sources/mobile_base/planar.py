@@ -24,6 +24,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..component import Solver
+from ..declarations import ModelError
 from ..laws import planar_body
 from ..laws.symmetric import solve
 from ..model import SX, Balance, Model
@@ -74,6 +75,11 @@ SHARE = Quantity(
 
 def equations(m: Model) -> None:
     """Collect the equations."""
+    if m.slots["wheel_contact"] == "spatial":
+        raise ModelError(
+            "mobile_base/planar gives each wheel its load, but wheel_contact=spatial finds it from "
+            "the wheel's height, which a planar base does not move; take stick_slip, or six_dof"
+        )
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
     mass, com = m.parameter(MASS), ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), 0)
     com += m.balance("load", "position", value=com).effort

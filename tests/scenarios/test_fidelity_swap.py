@@ -47,6 +47,10 @@ def test_fidelity(name: str, instance: str, fidelity: str) -> None:
 @pytest.mark.parametrize("slot", ["wheel_contact", "caster"])
 def test_parts_of_the_base(slot: str) -> None:
     for item in fidelities(slot):
-        if slot == "wheel_contact" and item == "spatial":
-            continue  # computes normal forces, which the planar base gives; part of six_dof
-        check("mir250/CN1", {"base": "planar", slot: item})
+        if item != "spatial":
+            check("mir250/CN1", {"base": "planar", slot: item})
+
+
+def test_a_planar_base_refuses_wheels_that_want_its_height() -> None:
+    with pytest.raises(ValueError, match="take stick_slip, or six_dof"):
+        check("mir250/CN1", {"base": "planar", "wheel_contact": "spatial"})
