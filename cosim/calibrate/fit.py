@@ -404,29 +404,34 @@ def _estimate(run: _Fit) -> Estimate:
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
     poor = values < 1.0 / KNOWN**2
-    combinations = tuple(
-        Combination(
-            dict(zip(problem.names, _signed(vectors[:, i]).tolist(), strict=True)),
-            float(1.0 / math.sqrt(max(values[i], 1e-12))),
-        )
-        for i in np.flatnonzero(poor)
-    )
+    fitted = {name for name, _ in run.residuals}
+    concerned = np.array([not p.run or p.run in fitted for p in problem.parameters])
     # along directions that the data leave open, the bounds are all that is known
     prior = 12.0
-    inverse = (vectors / (values + np.where(poor, prior, 0.0))) @ vectors.T
+    good = vectors[:, ~poor]
+    inverse = (good / values[~poor]) @ good.T
     blocks = max(int(np.any(normal.scores != 0.0, axis=1).sum()), 1)
     freedom = max(blocks - int(np.sum(~poor)), 1)
     middle = normal.scores.T @ normal.scores * blocks / freedom
     sandwich = inverse @ middle @ inverse
     spread = max(2.0 * run.cost / max(count - int(np.sum(~poor)), 1), 1.0)
-    plain = inverse * spread
-    # variance that comes from the bounds alone
-    open_ = np.sum(vectors**2 * np.where(poor, spread / (values + prior), 0.0), axis=1)
     # a few blocks can seem to agree by chance: never below what white residuals give
-    factor = np.sqrt(
-        np.maximum(np.diag(plain), np.diag(sandwich)) / np.maximum(np.diag(sandwich), 1e-300)
+    white, robust = np.diag(inverse) * spread, np.diag(sandwich)
+    factor = np.sqrt(np.maximum(white, robust) / np.maximum(robust, 1e-300))
+    known = sandwich * np.outer(factor, factor)
+    unknown = (vectors[:, poor] * (spread / (values[poor] + prior))) @ vectors[:, poor].T
+    scaled = known + unknown
+    covariance = scaled * np.outer(scale, scale)
+    variances, directions = np.linalg.eigh(scaled)
+    combinations = tuple(
+        Combination(
+            dict(zip(problem.names, _signed(directions[:, i]).tolist(), strict=True)),
+            float(math.sqrt(variances[i])),
+        )
+        for i in np.flatnonzero(variances > KNOWN**2)[::-1]
+        # nuisance values of runs that were not fitted are no finding
+        if float(np.sum(directions[concerned, i] ** 2)) > 0.5
     )
-    covariance = sandwich * np.outer(factor, factor) * np.outer(scale, scale)
     half = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(covariance))
     near = 1e-6 * scale
     at_bound = [
@@ -441,7 +446,7 @@ def _estimate(run: _Fit) -> Estimate:
         low=np.maximum(run.theta - half, problem.lower),
         high=np.minimum(run.theta + half, problem.upper),
         identifiable=(np.sqrt(np.diag(covariance)) < KNOWN * scale)
-        & (open_ < 0.5 * np.diag(plain)),
+        & (np.diag(unknown) < 0.5 * np.diag(scaled)),
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=run.cost,
