@@ -1,6 +1,6 @@
 """Error of the coupling against the same equations solved as one, and energy that it invents.
 
-    python -m benchmarks.coupling [SYSTEM ...] [--quick]
+    python -m benchmarks.coupling [SYSTEM ...] [--quick] [--steps SECONDS ...]
 
 For each system: largest error of signals over algorithms and communication steps, the order
 measured from step to step, and the energy invented relative to the energy dissipated. The
@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -246,9 +246,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("systems", nargs="*", choices=[*CASES, []])
     parser.add_argument("--quick", action="store_true", help="fewer algorithms")
+    parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
     arguments = parser.parse_args()
     for name in arguments.systems or CASES:
-        table(name, CASES[name], arguments.quick)
+        case = CASES[name]
+        if arguments.steps:
+            case = replace(case, steps=tuple(arguments.steps))
+        table(name, case, arguments.quick)
 
 
 if __name__ == "__main__":
