@@ -28,6 +28,8 @@ REUSED = 0.02
 """A Jacobian is used again after a step that lowered the cost by this fraction."""
 UNEVEN = 10.0
 """Runs are fitted one half after the other if their mean errors differ by more than this factor."""
+BOUNDS = 12.0
+"""Information of the bounds: 1 / variance of a value anywhere between them, in spans."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 KNOWN = 0.25
@@ -213,6 +215,11 @@ def cost_of(
     return total
 
 
+def _drawn(problem: Problem) -> NDArray[np.bool_]:
+    """Parameters that the sheet's bounds draw towards their nominal values."""
+    return np.array([p.role == "declared" and not p.prior for p in problem.parameters])
+
+
 class _Fit:
     def __init__(
         self,
@@ -227,12 +234,19 @@ class _Fit:
         self.cap = math.inf
         self.iterations = 0
         self.begun = problem.evaluations if begun is None else begun
+        self.drawn = _drawn(problem)
         self.residuals = problem.residuals(self.theta, self.purpose)
-        self.cost = cost_of(problem, self.theta, self.residuals)
+        self.cost = self.total(self.theta, self.residuals)
+
+    def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
+        """Cost with the bounds as a weak prior, which decides where the data are silent."""
+        p = self.problem
+        away = ((theta - p.nominal) / p.scale)[self.drawn]
+        return cost_of(p, theta, residuals, self.cap) + 0.5 * BOUNDS * float(away @ away)
 
     def set_cap(self, cap: float) -> None:
         self.cap = cap
-        self.cost = cost_of(self.problem, self.theta, self.residuals, cap)
+        self.cost = self.total(self.theta, self.residuals)
 
     def weight(self, errors: Vector) -> Vector:
         return np.minimum(1.0, self.cap / np.maximum(np.abs(errors), 1e-300))
@@ -261,7 +275,7 @@ class _Fit:
             residuals = self.problem.residuals(theta, self.purpose)
         except FmuCallError:
             return False
-        cost = cost_of(self.problem, theta, residuals, self.cap)
+        cost = self.total(theta, residuals)
         if not cost < self.cost:
             return False
         self.theta, self.residuals, self.cost = theta, residuals, cost
@@ -272,12 +286,14 @@ class _Fit:
         p = self.problem
         free = np.ones(self.theta.size, dtype=bool)
         change = np.zeros(self.theta.size)
+        whole = normal.matrix + np.diag(BOUNDS * self.drawn)
+        gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
         for _ in range(self.theta.size):
-            matrix = normal.matrix[np.ix_(free, free)]
-            ridge = damping * np.trace(normal.matrix) / self.theta.size + 1e-9
+            matrix = whole[np.ix_(free, free)]
+            ridge = damping * np.trace(matrix) / self.theta.size + 1e-9
             change[:] = 0.0
             change[free] = np.linalg.solve(
-                matrix + ridge * np.eye(matrix.shape[0]), normal.gradient[free]
+                matrix + ridge * np.eye(matrix.shape[0]), gradient[free]
             )
             wanted = self.theta + change * p.scale
             outside = free & (
@@ -407,19 +423,19 @@ def _estimate(run: _Fit) -> Estimate:
     fitted = {name for name, _ in run.residuals}
     concerned = np.array([not p.run or p.run in fitted for p in problem.parameters])
     # along directions that the data leave open, the bounds are all that is known
-    prior = 12.0
     good = vectors[:, ~poor]
     inverse = (good / values[~poor]) @ good.T
     blocks = max(int(np.any(normal.scores != 0.0, axis=1).sum()), 1)
     freedom = max(blocks - int(np.sum(~poor)), 1)
     middle = normal.scores.T @ normal.scores * blocks / freedom
     sandwich = inverse @ middle @ inverse
-    spread = max(2.0 * run.cost / max(count - int(np.sum(~poor)), 1), 1.0)
+    cost = cost_of(problem, run.theta, run.residuals)
+    spread = max(2.0 * cost / max(count - int(np.sum(~poor)), 1), 1.0)
     # a few blocks can seem to agree by chance: never below what white residuals give
     white, robust = np.diag(inverse) * spread, np.diag(sandwich)
     factor = np.sqrt(np.maximum(white, robust) / np.maximum(robust, 1e-300))
     known = sandwich * np.outer(factor, factor)
-    unknown = (vectors[:, poor] * (spread / (values[poor] + prior))) @ vectors[:, poor].T
+    unknown = (vectors[:, poor] * (spread / (values[poor] + BOUNDS))) @ vectors[:, poor].T
     scaled = known + unknown
     covariance = scaled * np.outer(scale, scale)
     variances, directions = np.linalg.eigh(scaled)
@@ -449,7 +465,7 @@ def _estimate(run: _Fit) -> Estimate:
         & (np.diag(unknown) < 0.5 * np.diag(scaled)),
         combinations=combinations,
         at_bound=tuple(at_bound),
-        cost=run.cost,
+        cost=cost,
         count=count,
         iterations=run.iterations,
         evaluations=problem.evaluations - run.begun,
