@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -125,6 +126,32 @@ def side_by_side(
 def whole_or_part(index: int, parts: int, part: int) -> tuple[int, ...]:
     """The operation by which an instance steps."""
     return (Op.STEP, index) if parts == 1 else (Op.SUBSTEP, index, parts * PARTS + part)
+
+
+def without_parts(layout: Layout, parts: Mapping[str, int]) -> Layout:
+    """The layout without power bonds of instances with sub-steps.
+
+    Their inputs change within a communication step, so what they take cannot be told from the
+    values at its ends.
+    """
+
+    def whole(index: int) -> bool:
+        bond = layout.bonds[index]
+        return all(parts[end.partition(".")[0]] == 1 for end in (bond.first, bond.second))
+
+    kept = [index for index in range(len(layout.bonds)) if whole(index)]
+    terms = np.isin(layout.bond_index, kept)
+    number = {old: new for new, old in enumerate(kept)}
+    return replace(
+        layout,
+        bonds=tuple(layout.bonds[index] for index in kept),
+        bond_index=np.array(
+            [number[index] for index in layout.bond_index[terms].tolist()], dtype=np.int64
+        ),
+        bond_output=layout.bond_output[terms],
+        bond_input=layout.bond_input[terms],
+        bond_sign=layout.bond_sign[terms],
+    )
 
 
 def positive(name: str, value: float) -> float:

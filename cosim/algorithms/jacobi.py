@@ -10,7 +10,8 @@ Options:
         through the last outputs (weights of Adams and Bashforth), and outputs with direct
         feedthrough are fetched anew at t_k; second order in the communication step.
     substeps: instance -> n, for instances that go n steps per communication step and exchange at
-        each; what comes from slower instances is held.
+        each; what comes from slower instances is held. The energy of their power bonds is not
+        accounted for.
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (parallel scheme); Busch,
 Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
@@ -20,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..coupling import factors, means, side_by_side
+from ..coupling import factors, means, side_by_side, without_parts
 from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..system import System
@@ -35,9 +36,9 @@ def compile_plan(
     substeps: Mapping[str, int] | None = None,
 ) -> Plan:
     """Compile a system."""
-    layout = lay_out(system, external, observed)
-    everyone = range(len(layout.instances))
     parts = factors(system, substeps)
+    layout = without_parts(lay_out(system, external, observed), parts)
+    everyone = range(len(layout.instances))
     extrapolated, spans = means(system, layout, extrapolation)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
