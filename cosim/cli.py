@@ -66,6 +66,8 @@ class Platform(StrEnum):
 
 SHOWN = 40
 """Comparisons and passed checks that are printed; more are in result.json only."""
+SHOWN_FOLDERS = 8
+"""Folders of results that are named one by one."""
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to stdout.")]
 
 
@@ -466,8 +468,14 @@ def _print_result(result: Result) -> None:
             bound = f"{limit:.4g}" if isinstance(limit, float) else str(limit)
             table.add_row(item["name"], f"{item['value']:.4g}", bound, outcome, item["source"])
         console.print(table)
-    for folder in list(dict.fromkeys(str(path.parent) for path in result.files))[-8:]:
+    folders = list(dict.fromkeys(str(path.parent) for path in result.files))
+    if len(folders) > SHOWN_FOLDERS:
+        console.print(f"in {len(folders) - 1} folders below {folders[-1]}", soft_wrap=True)
+    for folder in folders if len(folders) <= SHOWN_FOLDERS else ():
         console.print(f"in {folder}", soft_wrap=True)
+    pictures = [path for path in result.files if path.suffix == ".png"]
+    for path in pictures[-1:] if pictures and pictures[-1].name == "overview.png" else pictures:
+        console.print(f"picture: {path}", soft_wrap=True)
 
 
 # -- frame -----------------------------------------------------------------------------------------
