@@ -1,6 +1,6 @@
 """Does the diagnosis name undeclared effects, and stay quiet without? Data of an independent plant.
 
-    python benchmarks/selftest.py --repeats 3 --out docs/claims
+    python -m benchmarks.selftest --repeats 3 --out out/selftest
 
 Every effect of `motor_plant.EFFECTS` is put into benches with other parameters and sizes; half of
 the data sets have none. Prints the confusion matrix, false alarms and the coverage of the 95 %
