@@ -327,8 +327,8 @@ def plot_overview(
         shown = [*item.values.values(), *item.marks.values()]
         if min(shown) > 0.0 and max(shown) > SPREAD * min(shown):
             axis.set_yscale("log")
-        elif min(shown) >= 0.0:
-            axis.set_ylim(bottom=0.0)
+        elif min(shown) >= 0.0 and max(shown) > 0.0:
+            axis.set_ylim(0.0, 1.08 * max(shown))
         axis.set_xticks(range(len(runs)), runs, rotation=45, ha="right", fontsize="small")
         axis.tick_params(labelbottom=item is quantities[-1])
         axis.grid(True, axis="y", alpha=0.3)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from cosim.cli import default_provider
 from cosim.errors import UnknownNameError, ValueRangeError
 from cosim.master import Master
