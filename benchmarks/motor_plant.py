@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 TICK, SUBSTEPS = 5e-5, 2
+COUNT = 2 * np.pi / 65536  # of the encoder [rad]
 RATIO, L_A, J_ROTOR, U_MAX, I_MAX, KP_I, KI_I = 10.167, 4e-4, 1.6e-4, 48.0, 30.0, 0.80, 560.0
 DECLARED = {
     "R_a": (0.338, 0.362), "K_t": (0.0915, 0.0985), "eta": (0.78, 0.86), "b": (0.02, 0.12),
@@ -189,12 +190,12 @@ def write_sets(
         for column, place in enumerate(places):
             table: dict[str, Any] = {"time": np.arange(w_ref.size) * 1e-3, "speed_set": w_ref}
             for channel, sigma, quantum in (
-                ("speed", 0.15, 0.0959), ("current", 0.05, 0.0), ("voltage", 0.05, 0.0),
+                ("speed", 0.15, COUNT / 1e-3), ("current", 0.05, 0.0), ("voltage", 0.05, 0.0),
                 ("angle", 0.005, 0.00153),
             ):  # fmt: skip
                 values = clean[channel][:, column]
                 if channel == "speed":  # differences of counts
-                    counts = np.floor(clean["angle"][:, column] * 65536 / (2 * np.pi))
+                    counts = np.floor(clean["angle"][:, column] / COUNT)
                     values = np.diff(counts, prepend=counts[0]) * quantum
                 elif quantum:
                     values = np.rint(values / quantum) * quantum
