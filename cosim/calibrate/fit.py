@@ -292,9 +292,7 @@ class _Fit:
             matrix = whole[np.ix_(free, free)]
             ridge = damping * np.trace(matrix) / self.theta.size + 1e-9
             change[:] = 0.0
-            change[free] = np.linalg.solve(
-                matrix + ridge * np.eye(matrix.shape[0]), gradient[free]
-            )
+            change[free] = np.linalg.solve(matrix + ridge * np.eye(matrix.shape[0]), gradient[free])
             wanted = self.theta + change * p.scale
             outside = free & (
                 ((self.theta <= p.lower) & (wanted < p.lower))
