@@ -17,6 +17,7 @@ compiled code can make the same calls; `Block` holds the arrays that go with the
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes as ct
 import math
@@ -59,6 +60,10 @@ def _library(fmu: Fmu) -> Any:
                 f"{fmu.path}: its binary cannot be loaded ({error}); it may need a library that "
                 "this machine lacks"
             ) from error
+        # libraries of pythonfmu read freed memory when the process ends, unless told before
+        finalize = getattr(_libraries[path], "finalizePythonInterpreter", None)
+        if finalize is not None:
+            atexit.register(finalize)
     return _libraries[path]
 
 

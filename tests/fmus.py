@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
@@ -16,6 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 from sources.packaging.build import build
 
 OUT = Path(__file__).parent.parent / "fmus"
+_FINALIZED: set[Path] = set()
 _HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
 
 
@@ -68,6 +70,11 @@ class Slave:
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
             self.fmu = FMU2Slave(**arguments)
+            # libraries of pythonfmu read freed memory when the process ends, unless told before
+            finalize = getattr(self.fmu.dll, "finalizePythonInterpreter", None)
+            if finalize is not None and path not in _FINALIZED:
+                _FINALIZED.add(path)
+                atexit.register(finalize)
             # an interpreted FMU reports its exceptions only when it may log
             chatty = bool(self.description.coSimulation.needsExecutionTool)
             self.fmu.instantiate(callbacks=self._callbacks, loggingOn=chatty)
