@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
@@ -14,6 +15,7 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
+from sources.packaging import catalog
 from sources.packaging.build import build
 
 OUT = Path(__file__).parent.parent / "fmus"
@@ -33,6 +35,24 @@ def _unpacked(path: Path) -> tuple[Any, Path]:
     folder = Path(holder.name)
     fmpy.extract(str(path), str(folder))
     return fmpy.read_model_description(str(path), validate=False), folder
+
+
+@lru_cache(maxsize=1)
+def catalogue() -> tuple[str, ...]:
+    """The variants under test: all fidelities, and every effect once, on each component in turn.
+
+    With `COSIM_TESTS=all` every catalogued variant, which compiles for half an hour on two cores.
+    """
+    if os.environ.get("COSIM_TESTS") == "all":
+        return catalog.names()
+    chosen = [name for name in catalog.names() if "+" not in name]
+    hosts: dict[str, list[str]] = {}
+    for name in catalog.names():
+        if "+" in name:
+            hosts.setdefault(name.partition("+")[2], []).append(name)
+    for turn, (_, names) in enumerate(sorted(hosts.items())):
+        chosen.append(names[turn % len(names)])
+    return tuple(chosen)
 
 
 class Slave:

@@ -10,12 +10,11 @@ import pytest
 
 from sources.function import Oracle
 from sources.model import Role
-from sources.packaging import catalog
 from sources.packaging.check import check
 from sources.variant import build_model
-from tests.fmus import Slave, fmu
+from tests.fmus import Slave, catalogue, fmu
 
-NAMES = catalog.names()
+NAMES = catalogue()
 PLAIN = [name for name in NAMES if "+" not in name]
 WITH_EFFECT = [name for name in NAMES if "+" in name]
 H = 1e-3

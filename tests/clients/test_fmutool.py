@@ -15,8 +15,7 @@ import xmlschema
 from fmu_manipulation_toolbox import checker
 from fmu_manipulation_toolbox.operations import FMU
 
-from sources.packaging import catalog
-from tests.fmus import fmu
+from tests.fmus import catalogue, fmu
 
 SCHEMAS = Path(checker.__file__).parent / "resources" / "fmi-3.0"
 
@@ -67,7 +66,7 @@ def further_complaints(folder: Path) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("name", catalog.names())
+@pytest.mark.parametrize("name", catalogue())
 def test_nothing_is_found(name: str) -> None:
     assert complaints(fmu(name)) == []
     assert complaints(fmu(name, fmi=3)) == []

@@ -9,11 +9,12 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from sources.packaging import catalog, native
+from sources.packaging import native
 from sources.packaging.build import Variant, collect
 from sources.packaging.description import describe_fmi2, describe_fmi3, terminals
+from tests.fmus import catalogue, fmu
 
-NAMES = catalog.names()
+NAMES = catalogue()
 Exponents = dict[str, int]
 
 
@@ -186,7 +187,6 @@ def test_binaries_of_all_platforms_are_where_the_standards_say(fmi: int) -> None
 
 
 def test_archive_holds_what_the_description_names() -> None:
-    from tests.fmus import fmu
 
     for fmi in (2, 3):
         with zipfile.ZipFile(fmu("inertia/disc", fmi=fmi)) as archive:
