@@ -88,8 +88,11 @@ def build_functions(model: Model) -> Functions:
         return {name: tuple(items) for name, items in found.items()}
 
     def function(name: str, results: list[Any], extra: list[Any] | None = None) -> ca.Function:
-        # structural zeros are written too: the C code and the Python twin index densely
-        return ca.Function(name, arguments + (extra or []), [ca.densify(r) for r in results])
+        # what parts compute alike is computed once; structural zeros are written too: the C code
+        # and the Python twin index densely
+        return ca.Function(
+            name, arguments + (extra or []), ca.cse([ca.densify(r) for r in results])
+        )
 
     return Functions(
         outputs=function("f_outputs", [xdot, y]),

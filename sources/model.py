@@ -114,8 +114,11 @@ class Model:
     def parameter(self, quantity: Quantity, *, shared: str = "") -> SX:
         """Declare a parameter; its start value is the device's, else the declaration's.
 
-        With `shared`, declare one of parts to come that share it under this prefix (see `part`).
+        With `shared`, declare one of parts to come that share it under this prefix (see `part`), or
+        return it if that has been done.
         """
+        if shared and f"{self._full(shared)}.{quantity.name}" in self._root._vectors:
+            return self._root._vectors[f"{self._full(shared)}.{quantity.name}"]
         prefix, self.prefix = self.prefix, self._full(shared) if shared else self.prefix
         try:
             return self._declare(quantity, "parameter")
@@ -147,13 +150,18 @@ class Model:
         for index in range(symbol.numel()):
             self._root.input_rates[symbol[index].name()] = rate[index]
 
-    def state(self, quantity: Quantity) -> SX:
+    def state(self, quantity: Quantity, *, part: str = "") -> SX:
         """Declare a continuous state; give its `derivative`.
 
         The implicit solver eliminates states in the order of their declaration: declare what is
-        local (a wheel) before what couples everything (the body).
+        local (a wheel) before what couples everything (the body). With `part`, declare one of a
+        part to come whose inputs depend on it (see `part`).
         """
-        return self._declare(quantity, "state")
+        prefix, self.prefix = self.prefix, self._full(part) if part else self.prefix
+        try:
+            return self._declare(quantity, "state")
+        finally:
+            self.prefix = prefix
 
     def eliminate_last(self, *states: SX) -> None:
         """Move states behind all others declared so far, e.g. a body's behind its wheels'."""
@@ -410,6 +418,10 @@ class _Part(Model):
             return super().parameter(quantity, shared=shared)
         finally:
             self.prefix = prefix
+
+    def state(self, quantity: Quantity, *, part: str = "") -> SX:
+        declared = self._root._vectors.get(self._full(quantity.name))
+        return super().state(quantity, part=part) if part or declared is None else declared
 
     def output(self, quantity: Quantity, expression: SX) -> SX:
         self.results[quantity.name] = ca.SX(expression)

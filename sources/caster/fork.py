@@ -5,7 +5,7 @@ fork, total mass m and first moment c = m_w t + m_f t x_f behind the pivot, iner
 
     s_h = v.h - r w,   s_n = v.n - t W,   (f_h, f_n) by the friction law
     J_c w' = -r f_h - b_w w - c_rr N r tanh(w/w_rr) + axle
-    T = -t f_n - b_s psi' + swivel + floor
+    T = -t f_n - b_s psi' + swivel + floor + tau_f
     J W' = T + c a.n                                 (a: acceleration of the pivot)
     force on the body at the pivot: f_h h + f_n n + c (W' n - W^2 h) - m a
     moment on the body: b_s psi' - swivel
@@ -34,6 +34,7 @@ from . import (
     F_X,
     F_Y,
     F_Z,
+    FORK,
     M_F,
     M_W,
     M_Z,
@@ -42,8 +43,10 @@ from . import (
     PIVOT_Y,
     PSI,
     RELIEF,
+    TAU_F,
     V_X,
     V_Y,
+    W_F,
     W_Z,
     X_W,
     Y_W,
@@ -80,35 +83,51 @@ Friction = Callable[[SX, SX, SX, SX, SX, SX], tuple[SX, SX]]
 """(s_h, s_n, normal force, r w, x, y) -> forces along the wheel and across it."""
 
 
+class Swing:
+    """Inertia of fork and wheel about the pivot.
+
+    Attributes:
+        trail: wheel axis behind the swivel axis [m].
+        mass, moment, inertia: m, c, J of fork and wheel together [kg], [kg.m], [kg.m2].
+    """
+
+    def __init__(self, read: Callable[[Quantity], SX]) -> None:
+        fork_mass, wheel_mass, self.trail = read(M_F), read(M_W), read(TRAIL)
+        behind = read(X_F) * self.trail
+        self.mass = fork_mass + wheel_mass
+        self.moment = wheel_mass * self.trail + fork_mass * behind
+        self.inertia = read(J_T) + read(J_F) + wheel_mass * self.trail**2 + fork_mass * behind**2
+
+    def rate(self, momentum: SX, aside: SX) -> SX:
+        """Yaw rate W of the fork [rad/s] by its momentum and the pivot's velocity v.n [m/s]."""
+        return momentum / self.inertia + self.moment / self.inertia * aside
+
+
 def fork(m: Model, friction: Friction) -> None:
     """Collect the equations of a swivelling caster with the given friction."""
     v_x, v_y, w_z, load = m.input(V_X), m.input(V_Y), m.input(W_Z), m.input(F_N)
-    x_w, y_w = m.input(X_W), m.input(Y_W)
-    trail, radius, spin_inertia = m.parameter(TRAIL), m.parameter(R), m.parameter(J_C)
-    fork_mass, wheel_mass = m.parameter(M_F), m.parameter(M_W)
-    behind = m.parameter(X_F) * trail
+    x_w, y_w, lean = m.input(X_W), m.input(Y_W), m.input(TAU_F)
+    swing, radius, spin_inertia = Swing(m.parameter), m.parameter(R), m.parameter(J_C)
+    trail, mass, moment, inertia = swing.trail, swing.mass, swing.moment, swing.inertia
     swivel_damping, drag = m.parameter(B_S), m.parameter(B_W)
     c_rr, w_rr = m.parameter(C_RR), m.parameter(W_RR)
     spin, angle, momentum = m.state(SPIN), m.state(SWIVEL_ANGLE), m.state(MOMENTUM)
 
-    mass = fork_mass + wheel_mass
-    moment = wheel_mass * trail + fork_mass * behind
-    inertia = m.parameter(J_T) + m.parameter(J_F) + wheel_mass * trail**2 + fork_mass * behind**2
     ratio = moment / inertia
     h_x, h_y = ca.cos(angle), ca.sin(angle)
     ahead, aside = h_x * v_x + h_y * v_y, h_x * v_y - h_y * v_x
-    rate = momentum / inertia + ratio * aside
-    swing = rate - w_z
+    rate = swing.rate(momentum, aside)
+    turning = rate - w_z
 
     s_h, s_n = ahead - radius * spin, aside - trail * rate
     f_h, f_n = friction(s_h, s_n, load, radius * spin, x_w, y_w)
     m.loss("slip", -(f_h * s_h + f_n * s_n))
     resistance = rolling_resistance(c_rr, load, radius, spin, w_rr)
     m.loss("rolling", resistance * spin)
-    m.loss("swivel", swivel_damping * swing**2)
+    m.loss("swivel", swivel_damping * turning**2)
     m.loss("bearing", drag * spin**2)
 
-    swivel = m.balance("swivel", "rotation", velocity=swing, angle=angle, normal=load)
+    swivel = m.balance("swivel", "rotation", velocity=turning, angle=angle, normal=load)
     axle = m.balance("axle", "rotation", velocity=spin, normal=load, radius=radius)
     floor = m.balance(
         "floor",
@@ -117,10 +136,10 @@ def fork(m: Model, friction: Friction) -> None:
         rolling=ca.sqrt((radius * spin) ** 2 + SMALL),
         normal=load,
     )
-    hinge = swivel.effort - swivel_damping * swing
-    torque = hinge + floor.effort - trail * f_n
+    hinge = swivel.effort - swivel_damping * turning
+    torque = hinge + floor.effort + lean - trail * f_n
     m.derivative(spin, (axle.effort - radius * f_h - drag * spin - resistance) / spin_inertia)
-    m.derivative(angle, swing)
+    m.derivative(angle, turning)
     m.derivative(momentum, torque + moment * rate * ahead)
 
     relief = ratio * moment
@@ -132,6 +151,7 @@ def fork(m: Model, friction: Friction) -> None:
     m_z = m.output(M_Z, -hinge)
     m.output(PSI, angle)
     m.output(W, spin)
+    m.output(W_F, rate)
     m.output(MASS, mass)
     m.output(RELIEF, ca.vertcat(relief * h_y * h_y, -relief * h_x * h_y, relief * h_x * h_x))
     m.stored_energy(
@@ -141,3 +161,4 @@ def fork(m: Model, friction: Friction) -> None:
     m.port(PIVOT_X, f_x, v_x)
     m.port(PIVOT_Y, f_y, v_y)
     m.port(YAW, m_z, w_z)
+    m.port(FORK, lean, rate)

@@ -13,7 +13,8 @@ the plane; drive wheels have a preload F_0 and the stiffness k relative to a cas
     N_drive = F_0 + k (A + C y),   N_caster = A + B x + C y
     A = (P - 2 F_0)/(4 + 2 k),   B = M_y/(4 x_c^2),   C = -M_x/(4 y_c^2 + 2 k (track/2)^2)
 
-Not modelled: load transfer by acceleration, tilt, bounce (`six_dof`); a wheel whose load would be
+Not modelled: load transfer by acceleration, tilt, bounce, the trail between a caster's pivot, where
+its load acts here, and its wheel (`six_dof`); a wheel whose load would be
 negative carries none, the others do not take over.
 
 Source: digital twin paper, MiR250 model, reduced to the plane; Newton-Euler equations.

@@ -7,8 +7,10 @@ body axes (third row of R). With the mount at mu from O and everything about the
     m a + alpha x s + w x (w x s) = F,   s x a + J alpha + w x (J w) = M
     F, M: weight -m g k, normal forces f k, friction, effects, arm -(Lambda [a; alpha] + p)
 
-Wheel i stands at p_i; its centre has the height z + k.p_i and climbs at k.(v + w x p_i). Friction
-acts at the floor below O's neighbourhood, in the body's horizontal plane, on the velocities there:
+Wheel i stands at p_i; its centre has the height z + k.p_i and climbs at k.(v + w x p_i + p_i'). A
+caster's wheel stands its trail behind the pivot c_i: p_i = c_i + d_i, p_i' = psi_i' z x d_i as the
+fork swings, and the torque z.(d_i x f_i k) acts on the fork instead of the body. Friction acts at
+the floor below O's neighbourhood, in the body's horizontal plane, on the velocities there:
 u = v + w x (0, 0, -r). The forks of the casters take the matrix `relief` off the mass as they
 swing, per rate of (u_x, u_y, w_z).
 
@@ -65,10 +67,12 @@ from .mount import read_mount, write_motion
 from .wheels import (
     CASTERS,
     Drive,
+    Foot,
     Places,
     add_wheels,
     caster_parameter,
     read_caster_mass,
+    read_feet,
     read_places,
     wheel_parameter,
     write_wheels,
@@ -202,9 +206,10 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
 
     legs = _Legs(m, places, up, z, v, w)
     drives = legs.sprung_drives() if sprung else legs.rigid_drives()
-    caster_loads = legs.caster_loads()
     u_x, u_y = v[0] - r * w[1], v[1] + r * w[0]
-    wheels = add_wheels(m, places, (x, y, phi), (u_x, u_y, w[2]), drives, caster_loads)
+    u = (u_x, u_y, w[2])
+    caster_loads, forks = legs.caster_loads(read_feet(m, places, u))
+    wheels = add_wheels(m, places, (x, y, phi), u, drives, caster_loads, forks)
     legs.stand(wheels.lift, drive_mass)
     m.eliminate_last(x, y, phi, z, pitch, roll, v, w)
 
@@ -237,6 +242,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     torque = (
         ca.cross(about.first, weight_force)
         + ca.cross(legs.moment - legs.force * mu, up)
+        - ca.vertcat(0, 0, sum(forks, ca.SX(0)))
         + moment
         - ca.cross(mu, effort)
         - ca.cross(w, about.inertia @ w)
@@ -343,17 +349,19 @@ class _Legs:
         self._m.loss(name, loss)
         return force
 
-    def caster_loads(self) -> list[SX]:
-        """Normal forces of the casters, which also push the body."""
+    def caster_loads(self, feet: Sequence[Foot]) -> tuple[list[SX], list[SX]]:
+        """Normal forces of the casters, which push the body too, and what turns their forks."""
         r_c = caster_parameter(self._m, CASTER_R)
         law = [caster_parameter(self._m, quantity) for quantity in (K, B, WIDTH)]
-        loads = []
-        for (name, _, _), (x, y) in zip(CASTERS, self._places.casters, strict=True):
-            p = ca.vertcat(x, y, r_c - self._places.radius)
-            depth, rate = r_c - self._height(p), -self._rise(p)
+        loads, torques = [], []
+        for (name, _, _), foot in zip(CASTERS, feet, strict=True):
+            p = ca.vertcat(foot.pivot_x + foot.x, foot.pivot_y + foot.y, r_c - self._places.radius)
+            lean = foot.x * self._up[1] - foot.y * self._up[0]  # z.(d x k) = (z x d).k
+            depth, rate = r_c - self._height(p), -self._rise(p) - lean * foot.swing
             loads.append(self._normal(f"{name}.normal", depth, rate, law))
+            torques.append(lean * loads[-1])
             self._push(p, loads[-1])
-        return loads
+        return loads, torques
 
     def rigid_drives(self) -> tuple[Drive, Drive]:
         """Drive wheels that are fixed in the body."""

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from ..caster import M_F, M_W
+from ..caster.fork import MOMENTUM, SPIN, SWIVEL_ANGLE, Swing
 from ..laws.planar_frame import rotated
 from ..model import SX, Model
 from ..quantity import Quantity
@@ -60,6 +61,23 @@ class Places:
     def casters(self) -> list[tuple[SX, SX]]:
         """Pivots in the order of `CASTERS`."""
         return [(sx * self.x, sy * self.y) for _, sx, sy in CASTERS]
+
+
+@dataclass(frozen=True)
+class Foot:
+    """Where a caster's wheel stands, and how its place moves in the body as the fork swings.
+
+    Attributes:
+        pivot_x, pivot_y: the swivel axis, body axes [m].
+        x, y: the wheel from there [m].
+        swing: rate of the swivel angle [rad/s].
+    """
+
+    pivot_x: SX
+    pivot_y: SX
+    x: SX = 0
+    y: SX = 0
+    swing: SX = 0
 
 
 @dataclass(frozen=True)
@@ -135,6 +153,32 @@ def read_caster_mass(m: Model) -> SX:
     return caster_parameter(m, M_F) + caster_parameter(m, M_W)
 
 
+def read_feet(m: Model, places: Places, u: tuple[SX, SX, SX]) -> list[Foot]:
+    """Declare the states of the casters, on which their loads depend.
+
+    Args:
+        m: the model.
+        places: where the pivots are.
+        u: velocity of the body at the floor below O, body axes, and yaw rate.
+    """
+    if m.slots["caster"] == "point":  # it has no fork
+        return [Foot(x, y) for x, y in places.casters]
+    swing = Swing(lambda quantity: caster_parameter(m, quantity))
+    feet = []
+    for (name, _, _), (p_x, p_y) in zip(CASTERS, places.casters, strict=True):
+        _, angle, momentum = (_caster_state(m, name, q) for q in (SPIN, SWIVEL_ANGLE, MOMENTUM))
+        h_x, h_y = ca.cos(angle), ca.sin(angle)
+        aside = h_x * (u[1] + u[2] * p_x) - h_y * (u[0] - u[2] * p_y)
+        rate = swing.rate(momentum, aside) - u[2]
+        feet.append(Foot(p_x, p_y, -swing.trail * h_x, -swing.trail * h_y, rate))
+    return feet
+
+
+def _caster_state(m: Model, name: str, quantity: Quantity) -> SX:
+    start = part_values(m, "caster").get(quantity.name, quantity.start)
+    return m.state(quantity.with_start(start), part=name)
+
+
 def add_wheels(
     m: Model,
     places: Places,
@@ -142,6 +186,7 @@ def add_wheels(
     u: tuple[SX, SX, SX],
     drives: tuple[Drive, Drive],
     caster_loads: Sequence[SX],
+    caster_torques: Sequence[SX] = (0, 0, 0, 0),
 ) -> Wheels:
     """Build the six wheels in.
 
@@ -152,6 +197,7 @@ def add_wheels(
         u: velocity of the body at the floor below O, body axes, and yaw rate.
         drives: left and right drive wheel.
         caster_loads: normal forces in the order of `CASTERS`.
+        caster_torques: what they do to the forks where the body leans.
     """
     x, y, phi = pose
     u_x, u_y, w_z = u
@@ -199,7 +245,9 @@ def add_wheels(
     component, equations, _ = fidelity("caster", slot)
     values = part_values(m, "caster")
     relief = ca.SX.zeros(3, 3)
-    for (name, _, _), (p_x, p_y), load in zip(CASTERS, places.casters, caster_loads, strict=True):
+    for (name, _, _), (p_x, p_y), load, torque in zip(
+        CASTERS, places.casters, caster_loads, caster_torques, strict=True
+    ):
         d_x, d_y = rotated(phi, p_x, p_y)
         out = m.part(
             name,
@@ -211,6 +259,7 @@ def add_wheels(
                 "v_y": u_y + w_z * p_x,
                 "w_z": w_z,
                 "f_n": load,
+                "tau_f": torque,
                 "x_w": x + d_x,
                 "y_w": y + d_y,
             },

@@ -64,31 +64,82 @@ def up_axis(values: dict[str, float]) -> np.ndarray:
 # -- loads and bounce --------------------------------------------------------------------------
 
 
-def six_springs(mass: float, first_x: float, first_y: float) -> np.ndarray:
-    """Loads of six equal springs under weights with the given first moments [kg.m]."""
-    x = np.array([0, 0, 0.25, 0.25, -0.25, -0.25])
-    y = np.array([0.205, -0.205, 0.1875, -0.1875, 0.1875, -0.1875])
+TRAIL = 0.0382
+ANGLES = {"caster_fl": 2.9, "caster_fr": 2.0, "caster_rl": -2.6, "caster_rr": 1.5}
+FLANGE = 2.9  # of the arm's 20.6 kg, at the mount
+
+
+def six_springs(
+    mass: float, first: np.ndarray, angles: np.ndarray | None = None, trail: float = TRAIL
+) -> np.ndarray:
+    """Loads of six equal springs under weights with the given first moments [kg.m].
+
+    Wheels of casters stand their trail behind the pivots.
+    """
+    psi = np.zeros(4) if angles is None else angles
+    x = np.array([0, 0, *(np.array([0.25, 0.25, -0.25, -0.25]) - trail * np.cos(psi))])
+    y = np.array(
+        [0.205, -0.205, *(np.array([0.1875, -0.1875, 0.1875, -0.1875]) - trail * np.sin(psi))]
+    )
     shape = np.array([np.ones(6), x, y])
-    return shape.T @ np.linalg.solve(shape @ shape.T, G * np.array([mass, first_x, first_y]))
+    return shape.T @ np.linalg.solve(shape @ shape.T, G * np.array([mass, *first]))
+
+
+def loads(y: dict[str, float]) -> list[float]:
+    return [y[f"loads[{k}]"] for k in range(1, 7)]
+
+
+def settle(values: dict[str, float]) -> list[float]:
+    """Loads of the spatial base after a second at rest."""
+    y = Stiff(SIX_DOF, values).run(1.0, h=1e-2)
+    return loads({name: float(column[-1]) for name, column in y.items()})
 
 
 @pytest.mark.parametrize(
-    "centre", [(0.0, -0.08, 0.45), (0.344, -0.082, 0.147), (0.079, -0.353, 0.167)]
+    ("centre", "least", "most"),
+    [
+        ((0.0, -0.082, 0.512), 151, 234),  # upright
+        ((0.344, 0.082, 0.147), 89, None),  # reaching forward
+        ((0.079, -0.353, 0.167), 98, None),  # reaching to the right
+    ],
 )
-def test_loads_of_planar_and_six_dof_are_those_of_six_equal_springs(
-    centre: tuple[float, float, float],
+def test_static_loads_with_an_arm_are_those_of_six_equal_springs(
+    centre: tuple[float, float, float], least: float, most: float | None
 ) -> None:
+    """Mass centres of a UR5e of 17.7 kg in three poses; least and largest load by hand."""
     mass, c = 17.7, np.array(centre)
-    expected = six_springs(98.0 + mass, mass * c[0], mass * c[1])
-    y = Oracle(build_model(PLANAR)).outputs(upright(mass, c))
-    loads = [y[f"loads[{k}]"] for k in range(1, 7)]
-    assert loads == pytest.approx(list(expected), rel=1e-4)  # body mass rounded to 0.01 kg
+    arm = upright(mass, c)
+    arm["arm_bias[3]"] += FLANGE * G
+    total, first = 98.0 + mass + FLANGE, mass * c[:2]
+    at_pivots = six_springs(total, first, trail=0.0)
+    y = Oracle(build_model(PLANAR)).outputs(arm)
+    assert loads(y) == pytest.approx(list(at_pivots), rel=1e-4)  # body mass rounded to 0.01 kg
 
-    base = Stiff(SIX_DOF, upright(mass, c))
-    y = base.run(1.0, h=1e-2)
-    settled = [y[f"loads[{k}]"][-1] for k in range(1, 7)]
-    # the base leans by 2 mrad, which moves its mass centre by 0.6 mm
-    assert settled == pytest.approx(list(expected), rel=5e-3)
+    settled = settle(arm)
+    # the base leans by 2 mrad: the mass centre moves by 0.6 mm, 0.7 N.m, up to 0.8 N on a wheel
+    assert settled == pytest.approx(list(six_springs(total, first)), abs=0.8)
+    assert min(settled) == pytest.approx(least, abs=0.5 + 0.8)  # printed in whole newtons
+    assert most is None or max(settled) == pytest.approx(most, abs=0.5 + 0.8)
+
+
+def test_casters_stand_behind_their_pivots_wherever_these_point() -> None:
+    angles = {f"{name}.swivel_angle": angle for name, angle in ANGLES.items()}
+    expected = six_springs(98.0, np.zeros(2), np.array(list(ANGLES.values())))
+    assert np.ptp(expected) > 5.0  # else the test would not see where they stand
+    # stuck in their swivels, where the floor's reaction to settling would turn them a little
+    settled = settle({**angles, "caster.b_s": 1e4})
+    assert settled == pytest.approx(list(expected), abs=0.8)  # it leans by up to 2 mrad
+
+
+def test_a_leaning_body_turns_a_fork_downhill() -> None:
+    """Moment of the normal force about the swivel axis, roll positive lowers the right side."""
+    values = {"roll": 0.02, "caster.mu_s": 1e-6, "caster.mu_d": 0.0, "caster.b_s": 0.0}
+    base = Oracle(build_model(SIX_DOF))
+    rate, load = base.derivatives(values), base.outputs(values)["loads[4]"]
+    # k = (0, sin roll, cos roll); wheel at (-trail, 0) from the pivot: z.(d x f k) = -trail f k_y
+    expected = -TRAIL * load * np.sin(0.02)
+    assert load > 0
+    assert rate["caster_fr.momentum"] == pytest.approx(expected, rel=1e-5)  # mu of 1e-6
 
 
 def test_sprung_drive_wheels_keep_their_load() -> None:
@@ -106,8 +157,13 @@ def test_sprung_drive_wheels_keep_their_load() -> None:
 
 
 def test_heave_swings_at_11_3_hz_with_damping_0_53() -> None:
-    """118.6 kg on six springs of 1e5 N/m and 1500 N.s/m."""
-    base = Stiff(SIX_DOF + "+payload", {"payload.mass": 20.6, "payload.position[3]": 0.6})
+    """118.6 kg on six springs of 1e5 N/m and 1500 N.s/m, all casters turned inwards.
+
+    Springs that are not placed symmetrically would let it pitch as it bounces.
+    """
+    inwards = {"caster_rl.swivel_angle": np.pi, "caster_rr.swivel_angle": np.pi}
+    payload = {"payload.mass": 20.6, "payload.position[3]": 0.6}
+    base = Stiff(SIX_DOF + "+payload", payload | inwards)
     base.run(1.0, h=1e-2)
     eigenvalues = np.linalg.eigvals(base.jacobian())
     swinging = eigenvalues[eigenvalues.imag > 1]
@@ -300,10 +356,10 @@ def test_arc_drifts_outwards_as_the_formula_says(v_c: float) -> None:
 
 @pytest.mark.parametrize("variant", [SIX_DOF, SPRUNG])
 def test_spatial_bases_move_like_the_planar_one_when_slow(variant: str) -> None:
-    loads = {"preload": 0.0, "share": 1.0}
+    pressed = {"preload": 0.0, "share": 1.0}
     if variant == SPRUNG:  # the springs carry a given share, the casters the rest
-        loads = {"preload": 150.0 + 4.933 * G, "share": 0.0}
-    flat = drive(Stiff(PLANAR, {**ROTOR, **loads}), 2.0, turning=0.8, h=1e-2)
+        pressed = {"preload": 150.0 + 4.933 * G, "share": 0.0}
+    flat = drive(Stiff(PLANAR, {**ROTOR, **pressed}), 2.0, turning=0.8, h=1e-2)
     deep = drive(Stiff(variant, ROTOR), 2.0, turning=0.8, h=1e-2)
     for name in ("x", "y", "phi"):
         # pitch at 0.5 m/s2 moves O by less than 0.1 mm; load transfer changes creep by some 10 %
