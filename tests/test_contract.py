@@ -18,8 +18,6 @@ NAMES = catalogue()
 PLAIN = [name for name in NAMES if "+" not in name]
 WITH_EFFECT = [name for name in NAMES if "+" in name]
 H = 1e-3
-ROUNDED = {"ur5_arm/elastic+payload"}
-"""Effects that leave the last bits different at strength 0: known gaps, not accepted ones."""
 
 
 def exercise(slave: Slave, seed: int) -> dict[str, float]:
@@ -177,8 +175,6 @@ def test_strength_0_is_absence(name: str) -> None:
     model = build_model(name)
     strengths = [v.name for v in model.of_role("parameter") if v.of_effect and v.quantity.strength]
     assert strengths, "an effect without a strength"
-    if name in ROUNDED:
-        pytest.xfail("rounding differs, see docs/gaps.md")
     absent = dict.fromkeys(strengths, 0.0)
     with Slave(fmu(name), absent) as null, Slave(fmu(name.split("+")[0])) as base:
         shared = base.names("output")

@@ -179,13 +179,18 @@ class Posture:
     def __init__(self, chain: Chain, q: SX) -> None:
         self.chain = chain
         self._q = q
+        self._bare = chain
+        self._load: Body | None = None
         self._cos = [ca.cos(q[i]) for i in range(len(chain.links))]
         self._sin = [ca.sin(q[i]) for i in range(len(chain.links))]
 
     def carrying(self, mass: SX, first_moment: SX, inertia: SX) -> Posture:
         """The same posture with a rigid load on the flange (moments about the flange)."""
+        if self._load is not None:
+            raise ValueError("the flange carries a load already")
         loaded = copy(self)
         loaded.chain = with_load(self.chain, mass, first_moment, inertia)
+        loaded._load = Body(ca.SX(mass), ca.SX(first_moment), ca.SX(inertia))
         return loaded
 
     def _turn(self, i: int, v: SX) -> SX:
@@ -274,8 +279,24 @@ class Posture:
         return turn @ v, turn @ rates[-1]
 
     def mass_properties(self) -> Body:
-        """Mass, first moment and inertia of the whole chain about the mount."""
-        return self._composite()[0]
+        """Mass, first moment and inertia of the whole chain about the mount.
+
+        A load is added last: inside the last link it would keep products of numbers from being
+        folded, and the chain would round differently with a load of 0 than without one.
+        """
+        if self._load is None:
+            return self._composite()[0]
+        bare = copy(self)
+        bare.chain = self._bare
+        whole, load = bare._composite()[0], self._load
+        position, rotation = self.flange()
+        h = rotation @ load.first_moment
+        j = _symmetric(rotation @ load.inertia @ rotation.T)
+        return Body(
+            whole.mass + load.mass,
+            whole.first_moment + (h + load.mass * position),
+            whole.inertia + (j + _shifted(load.mass, h, position)),
+        )
 
     def _composite(self) -> list[Body]:
         """Per frame (0: mount) the mass properties of all that lies beyond it."""
