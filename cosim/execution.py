@@ -87,6 +87,7 @@ class Execution:
         self.iterated: Iterated | None = None
         self.control: StepControl | None = None
         self.started = False
+        self._advance: Callable[[int], None] | None = None
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -142,7 +143,12 @@ class Execution:
             self.bound.restart()
 
     def executor(self) -> Callable[[int], None]:
-        """What makes communication steps up to an index."""
+        """What makes communication steps up to an index; made once."""
+        if self._advance is None:
+            self._advance = self._make_executor()
+        return self._advance
+
+    def _make_executor(self) -> Callable[[int], None]:
         settings = self.plan.iteration
         if settings is None:
             return self.compiled() or self.interpreted()

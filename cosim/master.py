@@ -38,6 +38,27 @@ Driver = Signal | float | Callable[[Vector], ArrayLike]
 
 
 @dataclass(frozen=True)
+class Outline:
+    """A run, checked and outline out.
+
+    Attributes:
+        count: communication steps.
+        observed: full scalar names of what is recorded.
+        signals: scalar input -> what drives it.
+        plan: of the algorithm.
+        times: communication points [s].
+        external: values of the driven inputs, one row per communication point.
+    """
+
+    count: int
+    observed: list[str]
+    signals: dict[str, Signal]
+    plan: Plan
+    times: Vector
+    external: Vector
+
+
+@dataclass(frozen=True)
 class Master:
     """A system with an algorithm and a communication step.
 
@@ -88,22 +109,42 @@ class Master:
             AlgebraicLoopError: initial values do not settle.
             StepError: an FMU failed; carries the recording up to then.
         """
+        outline = self.outline(duration, inputs=inputs, record=record, every=every, start=start)
+        if self.isolate is not None:
+            if not self.isolate > 0.0:
+                raise ValueRangeError(f"time limit {self.isolate} s is not positive")
+            return run_isolated(
+                self, self.isolate, outline.signals, outline.external, outline.observed,
+                outline.times, every, progress,
+            )  # fmt: skip
+        with ExitStack() as stack:
+            run = Execution(
+                self, outline.plan, outline.observed, outline.external, outline.times, every,
+                outline.signals, stack,
+            )  # fmt: skip
+            return run.execute(outline.count, progress)
+
+    def outline(
+        self,
+        duration: float,
+        *,
+        inputs: Mapping[str, Driver] | None = None,
+        record: Sequence[str] | None = None,
+        every: int = 1,
+        start: float = 0.0,
+    ) -> Outline:
+        """What `run` does before it creates the FMUs: check everything, tabulate the inputs.
+
+        Raises:
+            InputError: wrong names, values or units (see the subclasses).
+        """
         count = self._count(duration, every)
         wanted = self.system.signals() if record is None else record
         observed = list(dict.fromkeys(n for name in wanted for n in self._observable(name)))
         signals = self._signals(inputs or {})
         plan = self.compile(list(signals), observed)
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
-        external = self._external(signals, times)
-        if self.isolate is not None:
-            if not self.isolate > 0.0:
-                raise ValueRangeError(f"time limit {self.isolate} s is not positive")
-            return run_isolated(
-                self, self.isolate, signals, external, observed, times, every, progress
-            )
-        with ExitStack() as stack:
-            run = Execution(self, plan, observed, external, times, every, signals, stack)
-            return run.execute(count, progress)
+        return Outline(count, observed, signals, plan, times, self._external(signals, times))
 
     def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
         """The plan of the algorithm with its options."""

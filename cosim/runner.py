@@ -17,12 +17,13 @@ from .checks import CheckResult, evaluate
 from .comparison import Comparison, compare, convert_reference
 from .errors import StepError, UnknownNameError, ValueRangeError
 from .files import write_text
-from .master import Master
+from .master import Master, Outline
 from .overview import Quantity, overview
 from .plots import plot_overview, plot_run
 from .provider import Provider
 from .recording import Recording
 from .scenario import Scenario
+from .session import Session
 from .ssp import read_scenario
 from .system import System
 from .variants import apply
@@ -208,6 +209,91 @@ def _recorded(
     return tuple(dict.fromkeys([*kept, *needed])), notes
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A scenario whose FMUs are chosen and whose values are set, ready to run.
+
+    Attributes:
+        scenario: what is run.
+        variants: instance -> variant that is used.
+        master: system, algorithm and step.
+        record: signals to record.
+        every: record every n-th communication point.
+        notes: what a changed variant made the run leave out.
+    """
+
+    scenario: Scenario
+    variants: Mapping[str, str]
+    master: Master
+    record: tuple[str, ...]
+    every: int
+    notes: tuple[str, ...]
+
+    @property
+    def _arguments(self) -> dict[str, Any]:
+        return {
+            "inputs": self.scenario.inputs,
+            "record": self.record,
+            "every": self.every,
+            "start": self.scenario.start,
+        }
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Recording:
+        """Run it once."""
+        return self.master.run(self.scenario.duration, **self._arguments, progress=progress)
+
+    def session(self) -> Session:
+        """Instances for many runs, one after the other."""
+        return Session(self.master, self.scenario.duration, **self._arguments)
+
+    def outline(self) -> Outline:
+        """Everything checked, inputs tabulated, no FMU created."""
+        return self.master.outline(self.scenario.duration, **self._arguments)
+
+    def conclude(self, recording: Recording, wall_s: float) -> RunResult:
+        """Compare and check what was recorded in `wall_s`."""
+        comparisons = {
+            name: compare(recording, reference)
+            for name, reference in self.scenario.references.items()
+        }
+        return RunResult(
+            scenario=self.scenario,
+            variants=self.variants,
+            recording=recording,
+            comparisons=comparisons,
+            checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
+            wall_s=wall_s,
+            fmu_steps=int(recording.provenance["fmu_steps"]),
+            notes=self.notes,
+        )
+
+
+def prepare(
+    scenario: Scenario,
+    provider: Provider | None,
+    *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    base: Path | None = None,
+    isolate: float | None = None,
+) -> Prepared:
+    """Choose the FMUs of a scenario and set its values; arguments as of `run_scenario`.
+
+    Raises:
+        InputError: wrong names, variants or values (see the subclasses).
+    """
+    usual = apply(scenario.system.instances, scenario.variants, provider, scenario.folder)
+    instances = apply(usual, variants or {}, provider, base)
+    changed = {name for name in instances if instances[name] != usual[name]}
+    system, notes = _system(scenario, provider, instances, changed, parameters or {})
+    record, others = _recorded(scenario, system, changed)
+    master = Master(
+        system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
+        isolate=isolate, options=scenario.options,
+    )  # fmt: skip
+    return Prepared(scenario, instances, master, record, _every(scenario), (*notes, *others))
+
+
 def run_scenario(
     scenario: Scenario,
     provider: Provider | None,
@@ -233,41 +319,15 @@ def run_scenario(
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
     """
-    usual = apply(scenario.system.instances, scenario.variants, provider, scenario.folder)
-    instances = apply(usual, variants or {}, provider, base)
-    changed = {name for name in instances if instances[name] != usual[name]}
-    system, notes = _system(scenario, provider, instances, changed, parameters or {})
-    record, others = _recorded(scenario, system, changed)
-    master = Master(
-        system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
-        isolate=isolate, options=scenario.options,
-    )  # fmt: skip
+    prepared = prepare(
+        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate
+    )
     started = time.perf_counter()
-    recording = master.run(
-        scenario.duration,
-        inputs=scenario.inputs,
-        record=record,
-        every=_every(scenario),
-        start=scenario.start,
-        progress=progress,
-    )
-    wall = time.perf_counter() - started
-    comparisons = {
-        name: compare(recording, reference) for name, reference in scenario.references.items()
-    }
-    return RunResult(
-        scenario=scenario,
-        variants=instances,
-        recording=recording,
-        comparisons=comparisons,
-        checks=tuple(evaluate(check, recording, comparisons) for check in scenario.checks),
-        wall_s=wall,
-        fmu_steps=int(recording.provenance["fmu_steps"]),
-        notes=(*notes, *others),
-    )
+    recording = prepared.run(progress)
+    return prepared.conclude(recording, time.perf_counter() - started)
 
 
-def _find(
+def find_runs(
     name: str, folder: Path | None, duration: float | None, step: float | None
 ) -> tuple[str, str, str, dict[str, Scenario]]:
     """Name and description of the whole, the run that was asked for ("" for all), the runs."""
@@ -318,23 +378,12 @@ def run(
         from .cli import default_provider  # the only place that knows the sources
 
         provider = default_provider()
-    whole, text, wanted, items = _find(name, folder, duration, step)
+    whole, text, wanted, items = find_runs(name, folder, duration, step)
     chosen = list(items)
     results: dict[str, RunResult] = {}
     files: list[Path] = []
     for run_name, item in items.items():
-        if duration is not None and duration < item.duration:
-            item = _shortened(item, duration)
-        item = replace(
-            item,
-            algorithm=algorithm or item.algorithm,
-            options={
-                **(item.options if algorithm in (None, item.algorithm) else {}),
-                **(options or {}),
-            },
-            step=step if step is not None else item.step,
-            duration=duration if duration is not None else item.duration,
-        )
+        item = adjusted(item, algorithm, options, step, duration)
         place = None if out is None else Path(out) / run_name
         told = None if progress is None else _told(progress, item.name)
         try:
@@ -368,6 +417,32 @@ def run(
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
     return final
+
+
+def adjusted(
+    item: Scenario,
+    algorithm: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+) -> Scenario:
+    """A scenario with another algorithm, step or duration where these are given.
+
+    Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
+    does not reach.
+    """
+    if duration is not None and duration < item.duration:
+        item = _shortened(item, duration)
+    return replace(
+        item,
+        algorithm=algorithm or item.algorithm,
+        options={
+            **(item.options if algorithm in (None, item.algorithm) else {}),
+            **(options or {}),
+        },
+        step=step if step is not None else item.step,
+        duration=duration if duration is not None else item.duration,
+    )
 
 
 def _shortened(scenario: Scenario, duration: float) -> Scenario:

@@ -10,7 +10,7 @@ one of its own; the compiled executor releases the interpreter lock.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Any, Self
@@ -22,6 +22,7 @@ from .block import Block, check_values
 from .errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
 from .execution import Execution
 from .master import Driver, Master
+from .recording import Recording
 
 Vector = NDArray[np.float64]
 
@@ -50,20 +51,16 @@ class Session:
         start: float = 0.0,
         targets: Sequence[str] = (),
     ) -> None:
-        count = master._count(duration, every)
-        observed = list(dict.fromkeys(n for name in record for n in master._observable(name)))
-        signals = master._signals(inputs or {})
-        plan = master.compile(list(signals), observed)
-        times: Vector = start + master.step * np.arange(count + 1, dtype=np.float64)
-        external = master._external(signals, times)
-        self.master, self.names, self.count = master, tuple(observed), count
-        self.times = times[::every].copy()
+        outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
+        self.master, self.names, self.count = master, tuple(outline.observed), outline.count
+        self.times = outline.times[::every].copy()
         self.targets = tuple(targets)
         self._stack = ExitStack()
         try:
             self._run = Execution(
-                master, plan, observed, external, times, every, signals, self._stack
-            )
+                master, outline.plan, outline.observed, outline.external, outline.times, every,
+                outline.signals, self._stack,
+            )  # fmt: skip
             self._advance = self._run.executor()
             self._blocks = {name: self._block(name) for name in self.targets}
         except BaseException:
@@ -111,6 +108,19 @@ class Session:
             messages = error.messages if isinstance(error, FmuCallError) else ()
             raise StepError(text, messages, time=time) from error
         return self.times, run.rows[: run.row].copy()
+
+    def record(self, progress: Callable[[float], None] | None = None) -> Recording:
+        """Run with the values that the system has now: change them by `master.system.set`.
+
+        Args:
+            progress: told now and then which fraction is done; what it raises ends the run.
+
+        Raises:
+            AlgebraicLoopError: initial values do not settle.
+            StepError: an FMU failed; carries the recording up to then.
+        """
+        self._run.restart()
+        return self._run.execute(self.count, progress)
 
     def close(self) -> None:
         """Free the instances."""
