@@ -28,6 +28,7 @@ from .cli_calibrate import calibrate_command
 from .cli_diagnose import diagnose_command
 from .cli_export import draw_command, export_command
 from .cli_linearize import linearize_command
+from .cli_study import study_command
 from .errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from .provider import FolderProvider, Provider
 from .runner import Result, run
@@ -48,6 +49,7 @@ app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
+app.command("study")(study_command)
 
 
 class Kind(StrEnum):

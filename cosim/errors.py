@@ -15,6 +15,7 @@
         + StepError                 the run stopped; carries what was recorded until then
       x AlgebraicLoopError          connected values that do not settle
       x CheckError                  a scenario ran, but a check of it failed
+      x StudyError                  a study ran, but runs of it failed
 
 Every text names both ends, both values and the time where there are such, and the way out.
 """
@@ -116,6 +117,10 @@ class AlgebraicLoopError(CosimError):
 
 class CheckError(CosimError):
     """A scenario ran, but a check of it failed."""
+
+
+class StudyError(CosimError):
+    """A study ran, but runs of it failed."""
 
 
 def listing(names: Iterable[str], wanted: str = "", limit: int = 12) -> str:

@@ -1,0 +1,136 @@
+"""The points of a study: lists combined, distributions sampled."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from ..errors import ScenarioError
+from .definition import Algorithm, Distribution, Sample, Study
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one run of a study is made with.
+
+    Attributes:
+        scenario: its name, with that of the run.
+        variants: short forms, "" left out.
+        parameters: full name -> value.
+        algorithm, step: None for the scenario's own.
+    """
+
+    scenario: str
+    variants: Mapping[str, str]
+    parameters: Mapping[str, Any]
+    algorithm: Algorithm | None = None
+    step: float | None = None
+
+    @property
+    def group(self) -> tuple[Any, ...]:
+        """Points with the same one differ in parameters only."""
+        return (self.scenario, tuple(self.variants.items()), str(self.algorithm), self.step)
+
+
+def draw(name: str, axis: Distribution, sample: Sample) -> list[float]:
+    """Values of a sampled parameter.
+
+    Each parameter has random numbers of its own, from the seed and its name: another parameter in
+    the study leaves them as they are, and so does a larger count with method `random`.
+    """
+    words = np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype=np.uint32)
+    random = np.random.default_rng([sample.seed, *words.tolist()])
+    if sample.method == "random":
+        u = random.random(sample.count)
+    else:
+        # one value in each of `count` equally probable intervals, in random order
+        u = (random.permutation(sample.count) + random.random(sample.count)) / sample.count
+    found: Vector
+    if axis.kind == "uniform":
+        found = axis.first + (axis.second - axis.first) * u
+    elif axis.kind == "log_uniform":
+        found = axis.first * (axis.second / axis.first) ** u
+    else:
+        low, high = (ndtr((end - axis.first) / axis.second) for end in (axis.minimum, axis.maximum))
+        found = axis.first + axis.second * ndtri(low + (high - low) * u)
+        found = np.clip(found, axis.minimum, axis.maximum)  # rounding may leave the interval
+    return [float(value) for value in found]
+
+
+def points(study: Study, scenarios: list[str]) -> list[Point]:
+    """All points, without reference runs.
+
+    Raises:
+        ScenarioError: lists of different lengths in a `zip`.
+    """
+    sampled = {k: v for k, v in study.parameters.items() if isinstance(v, Distribution)}
+    drawn: list[dict[str, float]] = [{}]
+    if study.sample is not None:
+        columns = [draw(name, axis, study.sample) for name, axis in sampled.items()]
+        drawn = [dict(zip(sampled, row, strict=True)) for row in zip(*columns, strict=True)]
+    return [
+        replace(point, scenario=scenario, parameters={**point.parameters, **values})
+        for scenario in scenarios
+        for point in _listed(study)
+        for values in drawn
+    ]
+
+
+def _listed(study: Study) -> Iterator[Point]:
+    """Points of the lists alone; those that differ in parameters only follow each other."""
+    axes: list[tuple[str, str, tuple[Any, ...]]] = [
+        *(("set", name, values) for name, values in study.variants.items()),
+        ("algorithm", "", study.algorithms or (None,)),
+        ("step", "", study.steps or (None,)),
+        *(
+            ("param", name, values)
+            for name, values in study.parameters.items()
+            if not isinstance(values, Distribution)
+        ),
+    ]
+    rows: Iterator[tuple[Any, ...]]
+    if study.combine == "grid":
+        rows = itertools.product(*(values for _, _, values in axes))
+    else:
+        longest = max(axes, key=lambda axis: len(axis[2]))
+        for kind, name, values in axes:
+            if len(values) not in (1, len(longest[2])):
+                raise ScenarioError(
+                    f'{study.name}: combine = "zip" takes lists of one length, but '
+                    f"{_called(kind, name)} has {len(values)} values and "
+                    f"{_called(*longest[:2])} has {len(longest[2])}"
+                )
+        count = len(longest[2])
+        rows = zip(*(v * count if len(v) == 1 else v for _, _, v in axes), strict=True)
+    for row in rows:
+        found: dict[str, dict[str, Any]] = {"set": {}, "param": {}, "algorithm": {}, "step": {}}
+        for (kind, name, _), value in zip(axes, row, strict=True):
+            if kind != "set" or value:
+                found[kind][name] = value
+        yield Point("", found["set"], found["param"], found["algorithm"][""], found["step"][""])
+
+
+def _called(kind: str, name: str) -> str:
+    return f"[{kind}] {name}" if name else kind
+
+
+def reference_of(point: Point, study: Study) -> Point:
+    """The point that a point is compared with; it may be itself."""
+    wanted = study.reference
+    assert wanted is not None  # asked only where there is one
+    return Point(
+        point.scenario,
+        {k: v for k, v in {**point.variants, **wanted.variants}.items() if v},
+        {**point.parameters, **wanted.parameters},
+        wanted.algorithm or point.algorithm,
+        min(study.steps) if wanted.finest else wanted.step or point.step,
+    )

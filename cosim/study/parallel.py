@@ -1,0 +1,212 @@
+"""Where the runs of a study are made: threads of this machine, or workers of a dask scheduler."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from ..errors import CosimError, InputError
+from .compute import Outcome, Pool, compute, lost
+from .planning import Found, Group, Task
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Finished = Callable[[Task, Outcome], None]
+AHEAD = 4
+"""Runs that are handed to a scheduler per thread of its workers, before results come back."""
+
+
+class _Stopped(Exception):
+    """The study ends while this run is under way."""
+
+
+def in_threads(
+    tasks: Iterable[Task], pool: Pool, workers: int, keep: Finished, told: Finished
+) -> None:
+    """Make runs in threads.
+
+    The compiled executor releases the interpreter lock, so runs of FMUs take as many cores as there
+    are threads.
+
+    Args:
+        tasks: what to run; taken one by one.
+        pool: gives instances.
+        workers: threads.
+        keep: called in the thread with each result.
+        told: called after that, in the calling thread.
+
+    Raises:
+        KeyboardInterrupt: and runs under way are given up; those that are finished are kept.
+    """
+    waiting, lock, stop = iter(tasks), threading.Lock(), threading.Event()
+    events: queue.SimpleQueue[tuple[Task, Outcome] | BaseException | None] = queue.SimpleQueue()
+
+    def check(_: float) -> None:
+        if stop.is_set():
+            raise _Stopped
+
+    def work() -> None:
+        try:
+            while not stop.is_set():
+                with lock:
+                    task = next(waiting, None)
+                if task is None:
+                    break
+                outcome = compute(task, pool, check)
+                keep(task, outcome)
+                events.put((task, Outcome(outcome.result, None)))
+        except _Stopped:
+            pass
+        except BaseException as error:
+            events.put(error)
+        finally:
+            events.put(None)
+
+    threads = [threading.Thread(target=work, name=f"study-{i}") for i in range(workers)]
+    running = 0
+    try:
+        for thread in threads:
+            thread.start()
+            running += 1
+        while running:
+            try:
+                event = events.get(timeout=0.5)  # endless waiting cannot be interrupted everywhere
+            except queue.Empty:
+                continue
+            if event is None:
+                running -= 1
+            elif isinstance(event, BaseException):
+                raise event
+            else:
+                told(*event)
+    finally:
+        stop.set()
+        for thread in threads:
+            if thread.ident is not None:
+                thread.join()
+        pool.close()
+
+
+# -- dask ------------------------------------------------------------------------------------------
+
+_pools: dict[tuple[str, float | None], Pool] = {}
+_pools_lock = threading.Lock()
+
+
+def _pool(study: str, provider: Found, isolate: float | None) -> Pool:
+    """The pool of a worker process; that of an earlier study is freed."""
+    with _pools_lock:
+        if (study, isolate) not in _pools:
+            for pool in _pools.values():
+                pool.close()
+            _pools.clear()
+            _pools[study, isolate] = Pool(provider, os.cpu_count() or 1, isolate)
+        return _pools[study, isolate]
+
+
+def _remote(
+    study: str, group: Group, provider: Found, isolate: float | None, task: dict[str, Any]
+) -> Outcome:
+    """One run on a worker."""
+    return compute(Task(group=group, **task), _pool(study, provider, isolate))
+
+
+def on_scheduler(
+    tasks: Iterable[Task],
+    address: str,
+    provider: Found,
+    isolate: float | None,
+    study: str,
+    keep: Finished,
+    told: Finished,
+) -> None:
+    """Make runs on the workers of a dask scheduler; results are kept here.
+
+    Workers need the same version of cosim, and must reach the .fmu files under the same paths.
+
+    Args:
+        tasks: what to run.
+        address: of the scheduler, e.g. `tcp://host:8786`.
+        provider: where the FMUs are.
+        isolate: as of `Line`.
+        study: a text that no other study has.
+        keep: called with each result.
+        told: called after that.
+
+    Raises:
+        InputError: dask is not installed, or the scheduler does not answer.
+    """
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"--scheduler needs {error.name}, which is not installed: pip install 'cosim[study]'"
+        ) from error
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:  # TimeoutError is an OSError
+        raise InputError(
+            f"scheduler {address}: does not answer ({error}); start one with 'dask scheduler' and "
+            "workers with 'dask worker ADDRESS'"
+        ) from error
+    with client:
+        _on_client(client, iter(tasks), provider, isolate, study, keep, told)
+
+
+def _on_client(
+    client: Client,
+    waiting: Iterator[Task],
+    provider: Found,
+    isolate: float | None,
+    study: str,
+    keep: Finished,
+    told: Finished,
+) -> None:
+    from distributed import KilledWorker, as_completed
+
+    threads = sum(client.nthreads().values())
+    if not threads:
+        raise InputError(
+            f"scheduler {client.scheduler.address}: has no workers; start some with "
+            "'dask worker ADDRESS'"
+        )
+    sent: dict[Group, Any] = {}
+    under_way: dict[str, Task] = {}
+
+    def submit() -> Any:
+        task = next(waiting, None)
+        if task is None:
+            return None
+        if task.group not in sent:
+            for group in [g for g in sent if g not in {t.group for t in under_way.values()}]:
+                del sent[group]
+            sent[task.group] = client.scatter(task.group, hash=False)
+        content = {
+            "key": task.key, "point": task.point, "reference": task.reference,
+            "designed": task.designed, "notes": task.notes,
+        }  # fmt: skip
+        future = client.submit(
+            _remote, study, sent[task.group], provider, isolate, content, pure=False
+        )
+        under_way[future.key] = task
+        return future
+
+    first = [future for future in (submit() for _ in range(AHEAD * threads)) if future is not None]
+    results = as_completed(first)
+    for future in results:
+        task = under_way.pop(future.key)
+        try:
+            outcome = future.result()
+        except KilledWorker as error:
+            outcome = lost(task, f"the workers that made this run died, the last on {error}")
+        if not isinstance(outcome, Outcome):
+            raise CosimError(f"{task.label}: a worker gave {outcome!r}; is it of this version?")
+        keep(task, outcome)
+        told(task, Outcome(outcome.result, None))
+        following = submit()
+        if following is not None:
+            results.add(following)

@@ -1,0 +1,355 @@
+"""From a study to its runs: FMUs found, every name and value checked, each run with a key.
+
+Nothing is run here, and no FMU is created.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ScenarioError, UnknownNameError, VariantError, listing
+from ..provider import Provider
+from ..runner import Prepared, adjusted, find_runs, prepare
+from ..scenario import Scenario
+from .definition import Study
+from .design import Point, points, reference_of
+
+FORMAT = 1
+"""Of the result files; another one makes all results anew."""
+
+
+class Found:
+    """A provider that remembers what it found, and can be sent to another process.
+
+    Args:
+        inner: asked for what is not known yet; stays behind when this is sent.
+    """
+
+    def __init__(self, inner: Provider | None) -> None:
+        self.inner = inner
+        self.paths: dict[str, Path] = {}
+
+    def path(self, variant: str) -> Path:
+        """Path of the variant's FMU."""
+        if variant not in self.paths:
+            if self.inner is None:
+                raise VariantError(f"{variant!r} was not needed when the study was planned")
+            self.paths[variant] = Path(self.inner.path(variant)).resolve()
+        return self.paths[variant]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"inner": None, "paths": dict(self.paths)}
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Runs that differ in parameters only: the same instances can make them all.
+
+    Attributes:
+        scenario: with the study's algorithm, step and signals.
+        variants: short forms.
+        base: folder against which .fmu paths among them are taken.
+        wanted: signals whose recordings are kept.
+        repeats, reuse: as of `Study`.
+        digest: of all that determines its results besides the runs' parameters.
+    """
+
+    scenario: Scenario
+    variants: Mapping[str, str]
+    base: Path
+    wanted: tuple[str, ...]
+    repeats: int
+    reuse: bool
+    digest: str = ""
+
+    def prepare(self, provider: Provider | None, isolate: float | None = None) -> Prepared:
+        """Open its FMUs and connect them."""
+        return prepare(
+            self.scenario, provider, variants=self.variants, base=self.base, isolate=isolate
+        )
+
+    def channels(self, prepared: Prepared) -> tuple[str, ...]:
+        """Full scalar names of the kept signals that its variants have."""
+        system = prepared.master.system
+        names = [name for name in prepared.record if name in self.wanted]
+        return tuple(dict.fromkeys(item for name in names for item in system.elements(name)))
+
+    def fingerprint(self, prepared: Prepared) -> str:
+        """Hash of all that determines its results besides the runs' parameters."""
+        scenario, master, outline = prepared.scenario, prepared.master, prepared.outline()
+        columns = np.ascontiguousarray(outline.external.T)
+        return _hash(
+            {
+                "format": FORMAT,
+                "versions": versions(),
+                "instances": [
+                    [member.name, member.fmu.digest, _plain(member.parameters)]
+                    for member in master.system.members.values()
+                ],
+                "connections": [list(asdict(c).values()) for c in master.system.connections],
+                "algorithm": [master.algorithm, _plain(master.options)],
+                "times": [scenario.start, scenario.duration, master.step, prepared.every],
+                "tolerance": master.tolerance,
+                "observed": outline.observed,
+                "channels": self.channels(prepared),
+                "inputs": {
+                    name: _bytes(column)
+                    for name, column in zip(outline.signals, columns, strict=True)
+                },
+                "references": {
+                    name: [item.signals, item.unit, _bytes(item.times), _bytes(item.values)]
+                    for name, item in scenario.references.items()
+                },
+                "checks": [asdict(check) for check in scenario.checks],
+                "repeats": self.repeats,
+                "reuse": self.reuse,
+            }
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One run of a study.
+
+    Attributes:
+        key: hash of all that determines it; the name of its result file.
+        group: what it shares with others.
+        point: what it is made with; parameters that its variants lack are left out.
+        reference: key of the run that it is compared with, "" for none.
+        designed: whether the study asks for it; else it is a reference run only.
+        notes: what was left out.
+    """
+
+    key: str
+    group: Group
+    point: Point
+    reference: str
+    designed: bool
+    notes: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """What it is made with, in one line."""
+        point = self.point
+        parts = [f"{name}={value}" for name, value in point.variants.items()]
+        parts += [str(point.algorithm)] if point.algorithm else []
+        parts += [f"{point.step:g} s"] if point.step else []
+        parts += [f"{name}={_short(value)}" for name, value in point.parameters.items()]
+        return ", ".join([point.scenario, *parts])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study runs.
+
+    Attributes:
+        study: what was planned.
+        tasks: by key, in the order of the study, reference runs that nobody asked for last.
+        signals: what is compared with the reference runs.
+        provider: where the FMUs are.
+        points: how many points the study has; more than tasks where some are the same run.
+        single: instances whose FMU allows one instance per process only.
+    """
+
+    study: Study
+    tasks: Mapping[str, Task]
+    signals: tuple[str, ...]
+    provider: Found
+    points: int
+    single: tuple[str, ...] = ()
+
+
+def make_plan(study: Study, provider: Provider | None) -> Plan:
+    """Find the FMUs of a study (building those that are missing), check it, list its runs.
+
+    Raises:
+        InputError: wrong names, variants or values (see the subclasses).
+    """
+    found = Found(provider)
+    runs = _scenarios(study)
+    signals = _signals(study, runs)
+    asked = points(study, list(runs))
+    compared = [reference_of(point, study) for point in asked] if study.reference else []
+    everything = [*asked, *compared]
+    single: dict[str, None] = {}
+    keys, details = _keys(study, runs, everything, signals, found, single)
+    tasks: dict[str, Task] = {}
+    for index, key in enumerate(keys):
+        if key in tasks:
+            continue
+        group, parameters, notes = details[index]
+        designed = index < len(asked)
+        reference = keys[len(asked) + index] if designed and compared else ""
+        point = replace(everything[index], parameters=parameters)
+        tasks[key] = Task(key, group, point, reference, designed, notes)
+    return Plan(study, tasks, signals, found, len(asked), tuple(single))
+
+
+def _scenarios(study: Study) -> dict[str, Scenario]:
+    """All runs of the study's scenarios, by full name."""
+    found: dict[str, Scenario] = {}
+    known: list[str] = []
+    for name in study.scenarios:
+        is_file = name.endswith((".toml", ".ssp", ".ssd"))
+        place = str(study.folder / name) if is_file else name
+        step = study.steps[0] if study.steps else None
+        items = find_runs(place, None, study.duration, step)[3]
+        known += [run for run in items if run]
+        for run, item in items.items():
+            if study.runs and run not in study.runs:
+                continue
+            if item.name in found:
+                raise ScenarioError(
+                    f"{study.name}: scenario {name!r} brings a second run {item.name!r}; "
+                    "name it once"
+                )
+            found[item.name] = item
+    for run in study.runs:
+        if run not in known:
+            raise UnknownNameError(
+                f"{study.name}: no scenario has a run {run!r}; {listing(known, run)}"
+            )
+    return found
+
+
+def _signals(study: Study, runs: Mapping[str, Scenario]) -> tuple[str, ...]:
+    if study.reference is None:
+        return ()
+    compared = dict.fromkeys(
+        name
+        for item in runs.values()
+        for reference in item.references.values()
+        for name in reference.signals
+    )
+    signals = study.signals or tuple(compared) or study.keep
+    if not signals:
+        raise ScenarioError(
+            f"{study.name}: a reference run is given, but no signal to compare with it; give "
+            'signals = ["instance.variable"]'
+        )
+    return signals
+
+
+def _group(study: Study, item: Scenario, point: Point, signals: tuple[str, ...]) -> Group:
+    algorithm = point.algorithm
+    item = adjusted(
+        item,
+        algorithm.name if algorithm else None,
+        algorithm.options if algorithm else None,
+        point.step,
+        study.duration,
+    )
+    period = study.period or item.period
+    if period is None and study.reference and len(study.steps) > 1:
+        period = max(study.steps)  # the same instants for all, so that nothing is interpolated
+    wanted = tuple(dict.fromkeys([*study.keep, *signals]))
+    item = replace(item, period=period, record=wanted, plot=None, plots=())
+    return Group(item, point.variants, study.folder, wanted, study.repeats, study.reuse)
+
+
+Detail = tuple[Group, dict[str, Any], tuple[str, ...]]
+
+
+def _keys(
+    study: Study,
+    runs: Mapping[str, Scenario],
+    everything: list[Point],
+    signals: tuple[str, ...],
+    provider: Found,
+    single: dict[str, None],
+) -> tuple[list[str], list[Detail]]:
+    """Key of each point, and its group, parameters that it has, and notes on those it lacks."""
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for index, point in enumerate(everything):
+        groups.setdefault(point.group, []).append(index)
+    keys = [""] * len(everything)
+    details: dict[int, Detail] = {}
+    missing: dict[str, UnknownNameError] = {}
+    present: set[str] = set()
+    for members in groups.values():
+        first = everything[members[0]]
+        group = _group(study, runs[first.scenario], first, signals)
+        prepared = group.prepare(provider)
+        group = replace(group, digest=group.fingerprint(prepared))
+        system = prepared.master.system
+        for member in system.members.values():
+            if member.description.can("canBeInstantiatedOnlyOncePerProcess"):
+                single[member.name] = None
+        for index in members:
+            kept, notes = {}, list(prepared.notes)
+            for name, value in everything[index].parameters.items():
+                try:
+                    system.variables(name)
+                except UnknownNameError as error:
+                    missing.setdefault(name, error)
+                    reference = prepared.variants.get(name.partition(".")[0], "this system")
+                    notes.append(f"{name} is left out: {reference} has none")
+                    continue
+                system.set(name, value)
+                present.add(name)
+                kept[name] = value
+            keys[index] = _hash({"group": group.digest, "parameters": _plain(kept)})
+            details[index] = (group, kept, tuple(notes))
+    for name, unknown in missing.items():
+        if name not in present:
+            raise unknown
+    return keys, [details[index] for index in range(len(everything))]
+
+
+# -- hashes ----------------------------------------------------------------------------------------
+
+
+@lru_cache
+def versions() -> dict[str, str]:
+    """Versions that determine results; `code` changes with every file of this package."""
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        if path.suffix in (".py", ".c", ".h"):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes())
+    try:
+        version = importlib.metadata.version("cosim")
+    except importlib.metadata.PackageNotFoundError:
+        version = "not installed"
+    return {
+        "cosim": version,
+        "code": digest.hexdigest(),
+        "numpy": np.__version__,
+        "machine": f"{sys.platform} {platform.machine()}",
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats, so that 1 and 1.0 are the same value."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    return value
+
+
+def _bytes(values: Any) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values, dtype=np.float64).tobytes()).hexdigest()
+
+
+def _hash(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:40]
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

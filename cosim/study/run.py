@@ -1,0 +1,239 @@
+"""Runs a study: computes what is missing, tabulates everything."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UnknownNameError, ValueRangeError
+from ..files import write_text
+from ..provider import Provider
+from ..recording import Recording
+from .compute import Outcome, Pool
+from .definition import Study, read_study
+from .parallel import in_threads, on_scheduler
+from .planning import Plan, Task, make_plan
+from .store import Store
+from .table import StudyTable, plot, tabulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is.
+
+    Attributes:
+        total, done: runs; those of an earlier start count as done.
+        failed: of those done.
+        label: what the last run was made with, "" at the start.
+    """
+
+    total: int
+    done: int
+    failed: int
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """What a study gave.
+
+    Attributes:
+        study: what was run.
+        folder: where it is.
+        table: one row per run.
+        computed, reused: runs that were made now, and at an earlier start.
+        corrupt: result files that could not be used and were made again.
+        notes: what was left out, and why.
+        files: table and plot.
+        wall_s: time that this start took [s].
+    """
+
+    study: Study
+    folder: Path
+    table: StudyTable
+    computed: int
+    reused: int
+    corrupt: tuple[Path, ...]
+    notes: tuple[str, ...]
+    files: tuple[Path, ...]
+    wall_s: float
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """Rows of the runs that failed."""
+        return [row for row in self.table.rows if row["status"] != "ok"]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The table as a data frame; units are in its `attrs`."""
+        return self.table.to_pandas()
+
+    def recording(self, key: str) -> Recording:
+        """The kept signals of a run, by its row's `key`.
+
+        Raises:
+            UnknownNameError: no such run, or it keeps none.
+        """
+        store = Store(self.folder / "runs", _warn)
+        if not store.channels(key).is_file():
+            raise UnknownNameError(
+                f"{self.study.name}: run {key!r} has no recording; name signals in keep"
+            )
+        return store.recording(key)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `cosim study --json` prints it."""
+        return {
+            "study": self.study.name,
+            "runs": len(self.table.rows),
+            "computed": self.computed,
+            "reused": self.reused,
+            "failed": len(self.failures),
+            "corrupt": [str(path) for path in self.corrupt],
+            "notes": list(self.notes),
+            "units": {name: unit for name, unit in self.table.units.items() if unit},
+            "variants": self.table.variants(),
+            "rows": self.table.rows,
+            "files": [str(path) for path in self.files],
+            "wall_s": self.wall_s,
+        }
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, stacklevel=2)
+
+
+def run_study(
+    study: Study | Path | str,
+    *,
+    out: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str = "",
+    isolate: float | None = None,
+    retry: bool = False,
+    provider: Provider | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    warn: Callable[[str], None] = _warn,
+) -> StudyResult:
+    """Run a study, or what is missing of it.
+
+    Args:
+        study: or the path of a study file.
+        out: folder for the results, `out/STUDY` by default. Runs whose results are there are not
+            made again.
+        workers: threads, one per core by default.
+        scheduler: address of a dask scheduler, whose workers make the runs then.
+        isolate: as of `Master`: each run in a process of its own, much slower.
+        retry: make runs again that failed at an earlier start.
+        provider: where variants come from; as of `cosim.run`.
+        progress: told after each run.
+        warn: told about result files that cannot be used.
+
+    Raises:
+        InputError: the study is wrong; nothing was run.
+        KeyboardInterrupt: what is finished is kept.
+    """
+    started = time.perf_counter()
+    if not isinstance(study, Study):
+        study = read_study(study)
+    if provider is None:
+        from ..cli import default_provider  # the only place that knows the sources
+
+        provider = default_provider()
+    if workers is not None and workers < 1:
+        raise ValueRangeError(f"{workers} workers: at least 1 is needed")
+    plan = make_plan(study, provider)
+    folder = Path(out) if out is not None else Path("out") / study.name
+    store = Store(folder / "runs", warn)
+    store.tidy()
+    missing, failed = _missing(plan, store, retry)
+    state = Progress(len(plan.tasks), len(plan.tasks) - len(missing), failed)
+
+    def told(task: Task, outcome: Outcome) -> None:
+        nonlocal state
+        bad = outcome.result["status"] != "ok"
+        state = Progress(state.total, state.done + 1, state.failed + bad, task.label)
+        if progress is not None:
+            progress(state)
+
+    def keep(_: Task, outcome: Outcome) -> None:
+        store.write(outcome.result, outcome.recording)
+
+    if progress is not None:
+        progress(state)
+    notes = _notes(plan)
+    if missing and scheduler:
+        name = f"{study.name} {time.time_ns()}"
+        on_scheduler(missing, scheduler, plan.provider, isolate, name, keep, told)
+    elif missing:
+        count = min(workers or os.cpu_count() or 1, len(missing))
+        if plan.single and isolate is None and count > 1:
+            notes.append(
+                f"one thread only: the FMU of {plan.single[0]} allows one instance per process; "
+                "--isolate gives each run a process of its own"
+            )
+            count = 1
+        in_threads(missing, Pool(plan.provider, count, isolate), count, keep, told)
+    table = tabulate(plan, store)
+    files = _write(study, folder, table)
+    return StudyResult(
+        study=study,
+        folder=folder,
+        table=table,
+        computed=len(missing),
+        reused=len(plan.tasks) - len(missing),
+        corrupt=tuple(store.corrupt),
+        notes=tuple(notes),
+        files=tuple(files),
+        wall_s=time.perf_counter() - started,
+    )
+
+
+def _missing(plan: Plan, store: Store, retry: bool) -> tuple[list[Task], int]:
+    """Runs to be made, those that share instances one after the other, and failures kept."""
+    groups: dict[str, list[Task]] = {}
+    failed = 0
+    for task in plan.tasks.values():
+        result = store.read(task.key)
+        if result is None or (retry and result["status"] != "ok"):
+            groups.setdefault(task.group.digest, []).append(task)
+        else:
+            failed += result["status"] != "ok"
+    return [task for tasks in groups.values() for task in tasks], failed
+
+
+def _notes(plan: Plan) -> list[str]:
+    notes = list(dict.fromkeys(note for task in plan.tasks.values() for note in task.notes))
+    same = plan.points - sum(task.designed for task in plan.tasks.values())
+    if same:
+        notes.append(f"{same} of {plan.points} points are the same run as another one")
+    return notes
+
+
+def _write(study: Study, folder: Path, table: StudyTable) -> list[Path]:
+    files = [
+        table.write_csv(folder / "study.csv"),
+        table.write_parquet(folder / "study.parquet"),
+        folder / "study.png",
+        folder / "study.json",
+    ]
+    plot(table, study.text or study.name, files[2])
+    write_text(files[3], json.dumps(_rows(study, table), indent=1) + "\n")
+    return files
+
+
+def _rows(study: Study, table: StudyTable) -> Mapping[str, Any]:
+    return {
+        "study": study.name,
+        "description": study.text,
+        "units": {name: unit for name, unit in table.units.items() if unit},
+        "rows": table.rows,
+    }
