@@ -58,11 +58,14 @@ class Line:
             present.update(usual)
         for name, value in parameters.items():
             self.prepared.master.system.set(name, value)
-        if not self.lasting:
-            return self.prepared.run(progress)
         if self._session is None:
-            self._session = self.prepared.session()
+            return self.prepared.run(progress)
         return self._session.record(progress)
+
+    def ready(self) -> None:
+        """Create the instances, so that it does not count as cost of a run."""
+        if self.lasting and self._session is None:
+            self._session = self.prepared.session()
 
     def close(self) -> None:
         """Free the instances."""
@@ -151,6 +154,7 @@ def _compute(task: Task, line: Line, progress: Callable[[float], None] | None) -
     first: RunResult | None = None
     started, error, recording = time.perf_counter(), None, None
     try:
+        line.ready()
         for _ in range(task.group.repeats):
             cpu, started = time.thread_time(), time.perf_counter()
             recording = line.run(task.point.parameters, progress)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Finished = Callable[[Task, Outcome], None]
+ANSWER = 10.0
+"""Time within which a scheduler must answer [s]."""
 AHEAD = 4
 """Runs that are handed to a scheduler per thread of its workers, before results come back."""
 
@@ -115,6 +117,10 @@ def _remote(
     return compute(Task(group=group, **task), _pool(study, provider, isolate))
 
 
+def _same(group: Group) -> Group:
+    return group
+
+
 def on_scheduler(
     tasks: Iterable[Task],
     address: str,
@@ -147,7 +153,7 @@ def on_scheduler(
             f"--scheduler needs {error.name}, which is not installed: pip install 'cosim[study]'"
         ) from error
     try:
-        client = Client(address, timeout="10s")
+        client = Client(address, timeout=ANSWER)
     except (OSError, ValueError) as error:  # TimeoutError is an OSError
         raise InputError(
             f"scheduler {address}: does not answer ({error}); start one with 'dask scheduler' and "
@@ -184,7 +190,8 @@ def _on_client(
         if task.group not in sent:
             for group in [g for g in sent if g not in {t.group for t in under_way.values()}]:
                 del sent[group]
-            sent[task.group] = client.scatter(task.group, hash=False)
+            # a task, because what is scattered is lost with the worker that holds it
+            sent[task.group] = client.submit(_same, task.group, pure=False)
         content = {
             "key": task.key, "point": task.point, "reference": task.reference,
             "designed": task.designed, "notes": task.notes,

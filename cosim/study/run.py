@@ -122,6 +122,7 @@ def run_study(
     provider: Provider | None = None,
     progress: Callable[[Progress], None] | None = None,
     warn: Callable[[str], None] = _warn,
+    picture: bool = True,
 ) -> StudyResult:
     """Run a study, or what is missing of it.
 
@@ -136,6 +137,7 @@ def run_study(
         provider: where variants come from; as of `cosim.run`.
         progress: told after each run.
         warn: told about result files that cannot be used.
+        picture: plot error against cost into study.png.
 
     Raises:
         InputError: the study is wrong; nothing was run.
@@ -183,7 +185,7 @@ def run_study(
             count = 1
         in_threads(missing, Pool(plan.provider, count, isolate), count, keep, told)
     table = tabulate(plan, store)
-    files = _write(study, folder, table)
+    files = _write(study, folder, table, picture)
     return StudyResult(
         study=study,
         folder=folder,
@@ -218,15 +220,16 @@ def _notes(plan: Plan) -> list[str]:
     return notes
 
 
-def _write(study: Study, folder: Path, table: StudyTable) -> list[Path]:
+def _write(study: Study, folder: Path, table: StudyTable, picture: bool) -> list[Path]:
     files = [
         table.write_csv(folder / "study.csv"),
         table.write_parquet(folder / "study.parquet"),
-        folder / "study.png",
         folder / "study.json",
     ]
-    plot(table, study.text or study.name, files[2])
-    write_text(files[3], json.dumps(_rows(study, table), indent=1) + "\n")
+    write_text(files[2], json.dumps(_rows(study, table), indent=1) + "\n")
+    if picture:
+        files.append(folder / "study.png")
+        plot(table, study.text or study.name, files[3])
     return files
 
 
