@@ -30,7 +30,9 @@ SHOWN_FAILURES = 5
 
 
 def study_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A study file (.toml).")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A study file (.toml), or the name of one.")
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder for results; what is there is kept [out/FILE].")
     ] = None,
@@ -54,7 +56,7 @@ def study_command(
 ) -> None:
     """Run a scenario over variants, parameters, algorithms and steps; go on where it stopped.
 
-    Example: `cosim study scenarios/studies/motor_bench.toml --out out/swap`
+    Example: `cosim study motor_bench --out out/swap`, or `cosim study my/study.toml`
     """
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
@@ -122,7 +124,8 @@ def _print(result: StudyResult) -> None:
     )
     cost = ["wall", "fmu_steps", "x_real_time"]
     if len(rows) <= SHOWN:
-        names = [*table.varied, *table.errors, *cost]
+        role = ["role"] if any(row["role"] for row in rows) else []
+        names = [*table.varied, *role, *table.errors, *cost]
         shown = rows
     else:
         shown = table.variants()
@@ -140,7 +143,7 @@ def _print(result: StudyResult) -> None:
             printed.add_row(*(escape(_text(row.get(name))) for name in names))
         else:
             made = [escape(_text(row.get(name))) for name in table.varied]
-            printed.add_row(*made, "FAILED")
+            printed.add_row(*made, "FAILED")  # the errors follow on stderr
     console.print(printed)
     for path in result.files:
         console.print(str(path), soft_wrap=True)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError, listing
+from .. import library
+from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 
 KEYS = {
@@ -124,12 +125,21 @@ class Study:
 
 
 def read_study(path: Path | str) -> Study:
-    """Read a study file.
+    """Read a study file: its path, or the name of one that comes with cosim.
 
     Raises:
         ScenarioError: not TOML, or a wrong key or value.
+        UnknownNameError: there is none of this name.
     """
     path = Path(path)
+    if path.suffix != ".toml" and not path.is_file():
+        known = {item.stem: item for item in (library.scenarios() / "studies").glob("*.toml")}
+        if str(path) not in known:
+            raise UnknownNameError(
+                f"there is no study {str(path)!r}; {listing(sorted(known), str(path))}; or give "
+                "the path of a .toml file"
+            )
+        path = known[str(path)]
     return study_from(read_toml(path), path.stem, path.parent, str(path))
 
 

@@ -18,9 +18,10 @@ from ..recording import Recording
 from .compute import Outcome, Pool
 from .definition import Study, read_study
 from .parallel import in_threads, on_scheduler
+from .picture import plot
 from .planning import Plan, Task, make_plan
 from .store import Store
-from .table import StudyTable, plot, tabulate
+from .table import StudyTable, tabulate
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -216,68 +215,3 @@ def _compare(
         )  # fmt: skip
         for of, value in (("error", found.rms), ("error_max", found.max)):
             row[f"{of}.{name}"], units[f"{of}.{name}"] = value, found.unit
-
-
-def plot(table: StudyTable, title: str, path: Path) -> None:
-    """Error against cost: one axes per error, one marker per variant."""
-    from matplotlib.figure import Figure
-
-    names = [name for name in table.errors if any(row.get(name) for row in table.rows)]
-    cost = "cpu" if all(row.get("cpu") for row in table.rows if row["status"] == "ok") else "wall"
-    rows = [row for row in table.rows if row["status"] == "ok" and row.get(cost)]
-    keys = [n for n in table.varied if not n.startswith("param.")]
-    lines = [n for n in keys if n != "step"] or keys
-    count = max(len(names), 1)
-    across = min(count, 3)
-    down = math.ceil(count / across)
-    figure = Figure(figsize=(1.0 + 4.2 * across, 1.2 + 3.4 * down), layout="constrained")
-    axes = figure.subplots(down, across, squeeze=False).ravel()
-    for axis, name in zip(axes, names, strict=False):
-        for index, (label, members) in enumerate(_grouped(rows, lines)):
-            shown = sorted((r for r in members if r.get(name)), key=lambda row: row["step"])
-            x = [row[cost] / row["simulated"] for row in shown]
-            steps_only = len({row["step"] for row in shown}) == len(shown)
-            axis.plot(
-                x, [row[name] for row in shown], marker="osD^vP*X"[index % 8], label=label,
-                linewidth=1.0 if steps_only else 0.0, markersize=5.0, alpha=0.8,
-            )  # fmt: skip
-        positive = [row[name] for row in rows if row.get(name)]
-        axis.set_xscale("log")
-        _few_ticks(axis.xaxis)
-        if max(positive) > 20.0 * min(positive):
-            axis.set_yscale("log")
-        else:
-            axis.set_ylim(bottom=0.0)
-        unit = table.units.get(name, "")
-        axis.set_ylabel(f"{name}" + (f" [{unit}]" if unit else ""))
-        axis.set_xlabel(f"{'CPU' if cost == 'cpu' else 'wall'} time per simulated second [s]")
-        axis.grid(True, which="both", alpha=0.3)
-    for axis in axes[len(names) :]:
-        axis.set_visible(bool(not names))
-        axis.text(0.5, 0.5, "nothing to compare with", ha="center", transform=axis.transAxes)
-    handles, labels = axes[0].get_legend_handles_labels()
-    if 1 < len(labels) <= 16:
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize="small")
-    figure.suptitle(title)
-    with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=120)
-
-
-def _few_ticks(axis: Any) -> None:
-    """1, 2 and 5 of each decade, as plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _grouped(
-    rows: Iterable[dict[str, Any]], keys: Sequence[str]
-) -> list[tuple[str, list[dict[str, Any]]]]:
-    groups: dict[str, list[dict[str, Any]]] = {}
-    for row in rows:
-        parts = [f"{row[name]:g} s" if name == "step" else str(row.get(name) or "-")
-                 for name in keys]  # fmt: skip
-        groups.setdefault(", ".join(parts), []).append(row)
-    return list(groups.items())

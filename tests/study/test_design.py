@@ -188,6 +188,11 @@ def test_wrong_files_are_refused_by_name(table: dict[str, Any], text: str) -> No
 def test_no_file_and_no_toml(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="there is no such file"):
         read_study(tmp_path / "none.toml")
+    with pytest.raises(
+        UnknownNameError, match=r"no study 'motor_banch'; did you mean 'motor_bench'"
+    ):
+        read_study("motor_banch")
+    assert read_study("motor_bench").scenarios == ("motor_bench/ST1",)
     path = tmp_path / "cut.toml"
     path.write_text("scenario = [")
     with pytest.raises(ScenarioError, match=rf"{re.escape(str(path))}: is not TOML"):

@@ -14,6 +14,7 @@ import cosim
 from cosim.errors import UnknownNameError, ValueRangeError
 from cosim.study import study_from
 from cosim.study.compute import Line, StudyChangedError
+from cosim.study.picture import _points
 from cosim.study.planning import make_plan
 from tests.coupling.faulty import MODES
 from tests.study.test_resume import figures
@@ -253,3 +254,16 @@ def test_memory_does_not_grow_with_the_number_of_runs(run: Any, tmp_path: Path) 
     assert len(pages) == 301
     # 200 runs; 5 kB each would be 250 pages of 4 kB; allocators' pools move by some
     assert pages[-1] - pages[100] < 250
+
+
+def test_points_of_the_picture_are_medians_with_their_range() -> None:
+    rows = [
+        {"step": step, "error.x": error, "cpu": cost, "simulated": 2.0}
+        for step, error, cost in (
+            (1e-4, 1.0, 0.4), (1e-3, 5.0, 0.2), (1e-4, 3.0, 0.6), (1e-4, 2.0, 0.8), (1e-4, None, 9.0)
+        )
+    ]  # fmt: skip
+    assert _points(rows, "error.x", "cpu") == [
+        (pytest.approx(100.0), 5.0, 5.0, 5.0),
+        (pytest.approx(300.0), 2.0, 1.0, 3.0),
+    ]
