@@ -37,11 +37,15 @@ class Line:
     def __init__(self, group: Group, provider: Provider | None, isolate: float | None) -> None:
         self.group = group
         self.prepared = group.prepare(provider, isolate)
-        if group.fingerprint(self.prepared) != group.digest:
+        parts = group.fingerprint(self.prepared)
+        other = [
+            name for name in {**group.parts, **parts} if group.parts.get(name) != parts.get(name)
+        ]
+        if other:
             raise StudyChangedError(
-                f"{group.scenario.name}: an FMU, a data file or the version of cosim is not what "
-                "it was when the study began (on another machine: what it is there); start the "
-                "study again, and install the same versions on all machines"
+                f"{group.scenario.name}: {', '.join(other[:5])} is not what it was when the study "
+                "began (on another machine: what it is there). Start the study again; results that "
+                "are there are kept"
             )
         self.channels = group.channels(self.prepared)
         self.lasting = isolate is None and group.reuse

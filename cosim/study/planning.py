@@ -11,8 +11,8 @@ import json
 import platform
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +62,7 @@ class Group:
         base: folder against which .fmu paths among them are taken.
         wanted: signals whose recordings are kept.
         repeats, reuse: as of `Study`.
-        digest: of all that determines its results besides the runs' parameters.
+        parts: hashes of all that determines its results besides the runs' parameters, by name.
     """
 
     scenario: Scenario
@@ -71,7 +71,12 @@ class Group:
     wanted: tuple[str, ...]
     repeats: int
     reuse: bool
-    digest: str = ""
+    parts: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of the parts."""
+        return _hash(dict(self.parts))
 
     def prepare(self, provider: Provider | None, isolate: float | None = None) -> Prepared:
         """Open its FMUs and connect them."""
@@ -85,37 +90,35 @@ class Group:
         names = [name for name in prepared.record if name in self.wanted]
         return tuple(dict.fromkeys(item for name in names for item in system.elements(name)))
 
-    def fingerprint(self, prepared: Prepared) -> str:
-        """Hash of all that determines its results besides the runs' parameters."""
+    def fingerprint(self, prepared: Prepared) -> dict[str, str]:
+        """Hashes of all that determines its results besides the runs' parameters, by name."""
         scenario, master, outline = prepared.scenario, prepared.master, prepared.outline()
+        members = master.system.members.values()
         columns = np.ascontiguousarray(outline.external.T)
-        return _hash(
-            {
-                "format": FORMAT,
-                "versions": versions(),
-                "instances": [
-                    [member.name, member.fmu.digest, _plain(member.parameters)]
-                    for member in master.system.members.values()
-                ],
-                "connections": [list(asdict(c).values()) for c in master.system.connections],
-                "algorithm": [master.algorithm, _plain(master.options)],
-                "times": [scenario.start, scenario.duration, master.step, prepared.every],
-                "tolerance": master.tolerance,
-                "observed": outline.observed,
-                "channels": self.channels(prepared),
-                "inputs": {
-                    name: _bytes(column)
-                    for name, column in zip(outline.signals, columns, strict=True)
-                },
-                "references": {
-                    name: [item.signals, item.unit, _bytes(item.times), _bytes(item.values)]
-                    for name, item in scenario.references.items()
-                },
-                "checks": [asdict(check) for check in scenario.checks],
-                "repeats": self.repeats,
-                "reuse": self.reuse,
-            }
-        )
+        parts: dict[str, Any] = {
+            "format": FORMAT,
+            **{f"version of {name}": value for name, value in versions().items()},
+            **{f"FMU of {member.name}": member.fmu.digest for member in members},
+            "parameters": {member.name: member.parameters for member in members},
+            "connections": [
+                [member.name for member in members],
+                [list(asdict(c).values()) for c in master.system.connections],
+            ],
+            "algorithm": [master.algorithm, master.options, master.tolerance],
+            "times": [scenario.start, scenario.duration, master.step, prepared.every],
+            "signals": [outline.observed, self.channels(prepared)],
+            **{
+                f"input {name}": _bytes(column)
+                for name, column in zip(outline.signals, columns, strict=True)
+            },
+            **{
+                f"reference {name}": [r.signals, r.unit, _bytes(r.times), _bytes(r.values)]
+                for name, r in scenario.references.items()
+            },
+            "checks": [asdict(check) for check in scenario.checks],
+            "making": [self.repeats, self.reuse],
+        }
+        return {name: _hash(_plain(part)) for name, part in parts.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +284,7 @@ def _keys(
         first = everything[members[0]]
         group = _group(study, runs[first.scenario], first, signals)
         prepared = group.prepare(provider)
-        group = replace(group, digest=group.fingerprint(prepared))
+        group = replace(group, parts=group.fingerprint(prepared))
         system = prepared.master.system
         for member in system.members.values():
             if member.description.can("canBeInstantiatedOnlyOncePerProcess"):

@@ -233,7 +233,7 @@ def test_an_fmu_that_changes_during_the_study_is_noticed(
     Line(task.group, plan.provider, None).close()
     with (folder / "faulty.fmu").open("ab") as file:
         file.write(b"\0")
-    with pytest.raises(StudyChangedError, match="is not what it was when the study began"):
+    with pytest.raises(StudyChangedError, match="pair: FMU of good, FMU of bad is not what"):
         Line(task.group, plan.provider, None)
 
 
@@ -260,7 +260,8 @@ def test_points_of_the_picture_are_medians_with_their_range() -> None:
     rows = [
         {"step": step, "error.x": error, "cpu": cost, "simulated": 2.0}
         for step, error, cost in (
-            (1e-4, 1.0, 0.4), (1e-3, 5.0, 0.2), (1e-4, 3.0, 0.6), (1e-4, 2.0, 0.8), (1e-4, None, 9.0)
+            (1e-4, 1.0, 0.4), (1e-3, 5.0, 0.2), (1e-4, 3.0, 0.6), (1e-4, 2.0, 0.8),
+            (1e-4, None, 9.0),
         )
     ]  # fmt: skip
     assert _points(rows, "error.x", "cpu") == [
