@@ -76,8 +76,9 @@ def build_functions(model: Model) -> Functions:
     seeds = [ca.SX.sym(f"d_{index}", item.numel()) for index, item in enumerate(arguments)]
     tangent = ca.jtimes(ca.vertcat(xdot, y), ca.vertcat(*arguments), ca.vertcat(*seeds))
     split = xdot.numel()
-    known = ca.vertcat(x, u, z)
+    known = ca.vertcat(x, u, z, t)
     known_names = [v.name for role in ("state", "input", "discrete") for v in roles[role]]
+    known_names.append("time")
 
     def dependencies(expression: Any, names: list[str]) -> dict[str, tuple[str, ...]]:
         sparsity = ca.jacobian_sparsity(expression, known) if names else None

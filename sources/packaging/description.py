@@ -103,7 +103,7 @@ def _method_items(parent: ET.Element) -> None:
 
 
 def _dependencies(entry: Entry, functions: Functions, index: dict[str, int]) -> list[int]:
-    """Positions or references of the states and inputs that an entry depends on."""
+    """Positions or references of what an entry depends on, as far as `index` knows it."""
     if entry.part == "output":
         names = functions.output_dependencies[entry.name]
     else:
@@ -212,9 +212,7 @@ def describe_fmi2(
         ]
         for part in ("output", "derivative")
     }
-    sections = [("Outputs", calculated["output"])]
-    if native:
-        sections.append(("Derivatives", calculated["derivative"]))
+    sections = [("Outputs", calculated["output"]), ("Derivatives", calculated["derivative"])]
     for title, items in sections:
         if items:
             section = ET.SubElement(structure, title)
@@ -299,6 +297,7 @@ def describe_fmi3(
         ET.SubElement(variables, "Float64", attributes)
     structure = ET.SubElement(root, "ModelStructure")
     known = {e.name: reference_of[e.name] for _, e in shown if e.part in ("state", "input")}
+    known["time"] = 0  # the independent variable, which FMI 2 does not list here
     for part, tag in (("output", "Output"), ("derivative", "ContinuousStateDerivative")):
         for reference, entry in shown:
             if entry.part == part:

@@ -116,7 +116,7 @@ def test_messages_reach_printf_loggers_unharmed() -> None:
     slave = Slave(fmu("gearbox/ratio"), initialize=False)
     with pytest.raises(Exception, match="instantiate"):
         Slave(fmu("gearbox/ratio"), token="%s%n%d")
-    slave.close()
+    slave.fmu.freeInstance()
 
 
 def test_periods_of_clocks_are_fixed(monkeypatch: pytest.MonkeyPatch) -> None:

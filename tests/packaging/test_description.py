@@ -132,10 +132,11 @@ def test_the_unit_of_a_derivative_is_that_of_its_state_per_second(described: Des
             assert units[variable["unit"]] == (expected, factor), variable["name"]
 
 
-def test_dependencies_are_inputs_and_states_only(described: Described) -> None:
+def test_dependencies_are_inputs_states_and_time_only(described: Described) -> None:
     """Known in continuous time; the clocks' values are not: they change in events."""
     variant, two, three = described
     known = {v.name for role in ("state", "input") for v in variant.model.of_role(role)}
+    known.add("time")
     listed = variables(two)
     for unknown in two.findall("ModelStructure/*/Unknown"):
         for index in unknown.attrib.get("dependencies", "").split():

@@ -70,6 +70,17 @@ static int report(Instance *c, int status, const char *format, ...) {
   return status;
 }
 
+static const char *const MODE_NAMES[] = {"not initialized", "in initialization mode", "in event mode",
+                                         "in continuous-time mode", "in step mode", "terminated",
+                                         "stopped by a failed step"};
+#define IN(mode) (1u << (mode))
+
+/* Refuse a call in a mode in which the standards do not allow it. */
+static int only_in(Instance *c, unsigned modes, const char *call) {
+  if (modes & IN(c->m.mode)) return OK;
+  return report(c, ERROR, "%s: %s is not allowed while the FMU is %s", MODEL, call, MODE_NAMES[c->m.mode]);
+}
+
 /* -- model functions ------------------------------------------------------------------------ */
 
 static void evaluate_outputs(double *v) {
@@ -158,6 +169,9 @@ static int set_value(Instance *c, uint32_t k, double value) {
     return report(c, ERROR, "%s: state %s can only be set before the end of initialization (time %.9g s)",
                   MODEL, NAMES[k], v[0]);
   if (parameter) {
+    if (c->m.mode == CONTINUOUS)
+      return report(c, ERROR, "%s: parameter %s can be set in event mode, not in continuous-time mode", MODEL,
+                    NAMES[k]);
     if (FIXED[k] && c->m.mode > INITIALIZING)
       return report(c, ERROR, "%s: fixed parameter %s can only be set before the end of initialization",
                     MODEL, NAMES[k]);
@@ -172,6 +186,7 @@ static int set_value(Instance *c, uint32_t k, double value) {
 
 static int set_values(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
   double *v = c->m.v;
+  if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
   for (size_t i = 0; i < n; i++) {
     uint32_t k = vr[i];
     if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input */
@@ -407,6 +422,45 @@ static int do_step(Instance *c, double t, double h) {
 
 /* -- modes --------------------------------------------------------------------------------------- */
 
+static int enter_initialization(Instance *c) {
+  const int status = only_in(c, IN(INSTANTIATED), "entering initialization mode");
+  if (status == OK) c->m.mode = INITIALIZING;
+  return status;
+}
+
+static int terminate(Instance *c) {
+  const unsigned initialized = IN(EVENT) | IN(CONTINUOUS) | IN(STEPPING) | IN(FAILED);
+  const int status = only_in(c, initialized, "terminating");
+  if (status == OK) c->m.mode = TERMINATED;
+  return status;
+}
+
+/* Model exchange only: co-simulation is in step mode once it is initialized. */
+static int change_mode(Instance *c, int from, int to, const char *call) {
+  const int status = only_in(c, IN(from), call);
+  if (status == OK) c->m.mode = to;
+  return status;
+}
+
+static int set_time(Instance *c, double time) {
+  const int status = only_in(c, IN(EVENT) | IN(CONTINUOUS), "setting the time");
+  if (status != OK) return status;
+  if (!isfinite(time)) return report(c, ERROR, "%s: time cannot be set to %g: not finite", MODEL, time);
+  c->m.v[0] = time;
+  c->m.stale = 1;
+  return OK;
+}
+
+/* Messages of both categories are always given; only their names are checked. */
+static int set_logging(Instance *c, int on, size_t n, const char *const categories[]) {
+  for (size_t i = 0; i < n; i++)
+    if (!categories[i] || (strcmp(categories[i], "logStatusError") && strcmp(categories[i], "logStatusDiscard")))
+      return report(c, ERROR, "%s: there is no log category %s; there are logStatusError and logStatusDiscard",
+                    MODEL, categories[i] ? categories[i] : "(null)");
+  c->logging = on;
+  return OK;
+}
+
 static int leave_initialization(Instance *c) {
   if (c->m.mode != INITIALIZING) return report(c, ERROR, "%s: initialization mode was not entered", MODEL);
   int status = start_clocks(c);
@@ -448,6 +502,7 @@ static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const 
 /* -- saved states --------------------------------------------------------------------------------- */
 
 static int save_state(Instance *c, void **state) {
+  if (!state) return report(c, ERROR, "%s: no place given for the state", MODEL);
   if (!*state) *state = malloc(sizeof(Memory));
   if (!*state) return report(c, ERROR, "%s: out of memory", MODEL);
   memcpy(*state, &c->m, sizeof(Memory));
@@ -457,6 +512,7 @@ static int save_state(Instance *c, void **state) {
 enum { TOKEN_BYTES = 16 };
 
 static int serialize(Instance *c, const void *state, uint8_t bytes[], size_t size) {
+  if (!state || !bytes) return report(c, ERROR, "%s: no state given", MODEL);
   if (size < TOKEN_BYTES + sizeof(Memory))
     return report(c, ERROR, "%s: %zu bytes are too few for a state", MODEL, size);
   memcpy(bytes, TOKEN, TOKEN_BYTES);
@@ -465,7 +521,8 @@ static int serialize(Instance *c, const void *state, uint8_t bytes[], size_t siz
 }
 
 static int deserialize(Instance *c, const uint8_t bytes[], size_t size, void **state) {
-  if (size != TOKEN_BYTES + sizeof(Memory) || memcmp(bytes, TOKEN, TOKEN_BYTES))
+  if (!state) return report(c, ERROR, "%s: no place given for the state", MODEL);
+  if (!bytes || size != TOKEN_BYTES + sizeof(Memory) || memcmp(bytes, TOKEN, TOKEN_BYTES))
     return report(c, ERROR, "%s: these %zu bytes are not a state of this FMU", MODEL, size);
   if (!*state) *state = malloc(sizeof(Memory));
   if (!*state) return report(c, ERROR, "%s: out of memory", MODEL);

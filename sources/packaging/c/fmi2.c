@@ -19,10 +19,7 @@ EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
 EXPORT fmi2Status fmi2SetDebugLogging(Instance *c, fmi2Boolean on, size_t n, const char *const categories[]) {
-  (void)n;
-  (void)categories;
-  c->logging = on;
-  return OK;
+  return set_logging(c, on, n, categories);
 }
 
 EXPORT Instance *fmi2Instantiate(const char *name, int type, const char *token, const char *resources,
@@ -57,18 +54,11 @@ EXPORT fmi2Status fmi2SetupExperiment(Instance *c, fmi2Boolean tolerance_defined
   return OK;
 }
 
-EXPORT fmi2Status fmi2EnterInitializationMode(Instance *c) {
-  if (c->m.mode != INSTANTIATED) return report(c, ERROR, "%s: the FMU is already initialized", MODEL);
-  c->m.mode = INITIALIZING;
-  return OK;
-}
+EXPORT fmi2Status fmi2EnterInitializationMode(Instance *c) { return enter_initialization(c); }
 
 EXPORT fmi2Status fmi2ExitInitializationMode(Instance *c) { return leave_initialization(c); }
 
-EXPORT fmi2Status fmi2Terminate(Instance *c) {
-  c->m.mode = TERMINATED;
-  return OK;
-}
+EXPORT fmi2Status fmi2Terminate(Instance *c) { return terminate(c); }
 
 EXPORT fmi2Status fmi2Reset(Instance *c) {
   set_start(c);
@@ -94,6 +84,7 @@ EXPORT fmi2Status fmi2GetInteger(Instance *c, const uint32_t vr[], size_t n, int
 EXPORT fmi2Status fmi2SetInteger(Instance *c, const uint32_t vr[], size_t n, const int values[]) {
   for (size_t i = 0; i < n; i++) {
     if (vr[i] != METHOD) return report(c, ERROR, "%s: value reference %u is no Integer", MODEL, vr[i]);
+    if (c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
     const int status = set_value(c, METHOD, values[i]);
     if (status != OK) return status;
   }
@@ -169,22 +160,27 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(Instance *c, const uint32_t unkno
 /* model exchange */
 
 EXPORT fmi2Status fmi2EnterEventMode(Instance *c) {
-  c->m.mode = EVENT;
-  return OK;
+  return change_mode(c, CONTINUOUS, EVENT, "entering event mode");
 }
 
 EXPORT fmi2Status fmi2NewDiscreteStates(Instance *c, fmi2EventInfo *info) {
+  memset(info, 0, sizeof *info);
+  const int status = only_in(c, IN(EVENT), "updating discrete states");
+  if (status != OK) return status;
   run_ticks(c);
   const double next = next_tick(c, INFINITY);
-  memset(info, 0, sizeof *info);
   info->nextEventTimeDefined = isfinite(next);
   info->nextEventTime = isfinite(next) ? next : 0;
   return check_finite(c, IZ, NZ);
 }
 
 EXPORT fmi2Status fmi2EnterContinuousTimeMode(Instance *c) {
-  c->m.mode = CONTINUOUS;
-  return OK;
+  return change_mode(c, EVENT, CONTINUOUS, "entering continuous-time mode");
+}
+
+static int completed_step(Instance *c) {
+  const int status = only_in(c, IN(CONTINUOUS), "completing an integrator step");
+  return status == OK ? check_finite(c, IX, NX) : status;
 }
 
 EXPORT fmi2Status fmi2CompletedIntegratorStep(Instance *c, fmi2Boolean no_rollback, fmi2Boolean *event,
@@ -192,16 +188,14 @@ EXPORT fmi2Status fmi2CompletedIntegratorStep(Instance *c, fmi2Boolean no_rollba
   (void)no_rollback;
   *event = 0;
   *terminate = 0;
-  return check_finite(c, IX, NX);
+  return completed_step(c);
 }
 
-EXPORT fmi2Status fmi2SetTime(Instance *c, double time) {
-  c->m.v[0] = time;
-  c->m.stale = 1;
-  return OK;
-}
+EXPORT fmi2Status fmi2SetTime(Instance *c, double time) { return set_time(c, time); }
 
 static int set_states(Instance *c, const double x[], size_t n) {
+  const int status = only_in(c, IN(CONTINUOUS), "setting continuous states");
+  if (status != OK) return status;
   if (n != NX) return report(c, ERROR, "%s: %zu states given, the FMU has %d", MODEL, n, NX);
   for (size_t i = 0; i < n; i++) c->m.v[IX + i] = x[i];
   c->m.stale = 1;

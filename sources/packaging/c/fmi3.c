@@ -7,10 +7,7 @@ typedef void (*fmi3LogMessageCallback)(void *, int, const char *, const char *);
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 EXPORT fmi3Status fmi3SetDebugLogging(Instance *c, fmi3Boolean on, size_t n, const char *const categories[]) {
-  (void)n;
-  (void)categories;
-  c->logging = on;
-  return OK;
+  return set_logging(c, on, n, categories);
 }
 
 static Instance *instantiate3(const char *name, const char *token, int model_exchange, fmi3Boolean logging,
@@ -41,11 +38,14 @@ EXPORT Instance *fmi3InstantiateCoSimulation(const char *name, const char *token
                                              void *environment, fmi3LogMessageCallback log, void *update) {
   (void)resources;
   (void)visible;
-  (void)event_mode;
   (void)early_return;
   (void)required;
   (void)n;
   (void)update;
+  if (event_mode) {
+    if (log) log(environment, ERROR, "logStatusError", MODEL ": co-simulation has no event mode");
+    return 0;
+  }
   return instantiate3(name, token, 0, logging, environment, log);
 }
 
@@ -99,6 +99,7 @@ EXPORT fmi3Status fmi3GetInt64(Instance *c, const uint32_t vr[], size_t n, int64
 EXPORT fmi3Status fmi3SetInt64(Instance *c, const uint32_t vr[], size_t n, const int64_t values[], size_t nv) {
   for (size_t i = 0; i < n; i++) {
     if (vr[i] != METHOD || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
+    if (c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
     const int status = set_value(c, METHOD, (double)values[i]);
     if (status != OK) return status;
   }
@@ -267,8 +268,7 @@ NO_CLOCK_DECIMAL(fmi3SetShiftDecimal, const)
 NO_CLOCK_FRACTION(fmi3SetShiftFraction, const)
 
 EXPORT fmi3Status fmi3EvaluateDiscreteStates(Instance *c) {
-  (void)c;
-  return OK;
+  return report(c, ERROR, "%s: evaluating discrete states is not provided", MODEL);
 }
 
 EXPORT fmi3Status fmi3UpdateDiscreteStates(Instance *c, fmi3Boolean *needed, fmi3Boolean *terminate,
@@ -288,7 +288,7 @@ EXPORT fmi3Status fmi3CompletedIntegratorStep(Instance *c, fmi3Boolean no_rollba
                                               fmi3Boolean *terminate) {
   (void)no_rollback;
   *event = *terminate = false;
-  return check_finite(c, IX, NX);
+  return completed_step(c);
 }
 
 EXPORT fmi3Status fmi3SetTime(Instance *c, double time) { return fmi2SetTime(c, time); }
@@ -321,8 +321,7 @@ EXPORT fmi3Status fmi3GetNumberOfContinuousStates(Instance *c, size_t *n) {
 }
 
 EXPORT fmi3Status fmi3EnterStepMode(Instance *c) {
-  c->m.mode = STEPPING;
-  return OK;
+  return report(c, ERROR, "%s: co-simulation has no event mode to leave", MODEL);
 }
 
 EXPORT fmi3Status fmi3GetOutputDerivatives(Instance *c, const uint32_t vr[], size_t n, const int32_t order[],
