@@ -85,6 +85,8 @@ def study_command(
                 warn=lambda text: typer.echo(f"warning: {text}", err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
+        if not last.total:
+            raise  # nothing was run
         text = f"interrupted: {last.done} of {last.total} runs are done and kept in {folder}"
         typer.echo(f"{text}; the same command goes on from there", err=True)
         raise SystemExit(130) from None

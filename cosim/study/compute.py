@@ -117,7 +117,7 @@ class Pool:
         """Keep a line for the next run, unless its FMUs have failed."""
         with self._lock:
             self._busy -= 1
-            if usable and line.lasting:
+            if usable:
                 self._idle.append(line)
                 return
         line.close()

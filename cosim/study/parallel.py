@@ -132,7 +132,7 @@ def on_scheduler(
 ) -> None:
     """Make runs on the workers of a dask scheduler; results are kept here.
 
-    Workers need the same version of cosim, and must reach the .fmu files under the same paths.
+    Workers need the same version of cosim, and must reach the FMUs under the same paths.
 
     Args:
         tasks: what to run.

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
+from ..files import atomic
 from ..provider import Provider
 from ..runner import Prepared, adjusted, find_runs, prepare
 from ..scenario import Scenario
@@ -47,6 +48,17 @@ class Found:
                 raise VariantError(f"{variant!r} was not needed when the study was planned")
             self.paths[variant] = Path(self.inner.path(variant)).resolve()
         return self.paths[variant]
+
+    def pin(self, folder: Path) -> None:
+        """Copy what was found, so that a build meanwhile does not change the study's FMUs."""
+        for variant, path in self.paths.items():
+            content = path.read_bytes()
+            digest = hashlib.sha256(content).hexdigest()
+            target = folder.resolve() / digest[:16] / path.name
+            if not target.exists():
+                with atomic(target) as temporary:
+                    temporary.write_bytes(content)
+            self.paths[variant] = target
 
     def __getstate__(self) -> dict[str, Any]:
         return {"inner": None, "paths": dict(self.paths)}

@@ -158,6 +158,8 @@ def run_study(
     store = Store(folder / "runs", warn)
     store.tidy()
     missing, failed = _missing(plan, store, retry)
+    if missing:
+        plan.provider.pin(folder / "fmus")
     state = Progress(len(plan.tasks), len(plan.tasks) - len(missing), failed)
 
     def told(task: Task, outcome: Outcome) -> None:

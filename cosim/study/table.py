@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -184,13 +185,18 @@ def _row(task: Task, result: Mapping[str, Any], units: dict[str, str]) -> dict[s
     }
     for name, item in result["comparison"].items():
         for of in ("rms", "max"):
-            row[f"{of}.{name}"], units[f"{of}.{name}"] = item[of], item["unit"]
+            row[f"{of}.{name}"], units[f"{of}.{name}"] = _finite(item[of]), item["unit"]
     for check in result["checks"]:
         row[f"check.{check['name']}"], units[f"check.{check['name']}"] = (
-            check["value"], check["unit"],
+            _finite(check["value"]), check["unit"],
         )  # fmt: skip
     row["error"] = error["text"] if error else ""
     return row
+
+
+def _finite(value: float) -> float | None:
+    """None for what JSON cannot write."""
+    return value if math.isfinite(value) else None
 
 
 def _compare(

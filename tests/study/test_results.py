@@ -12,11 +12,13 @@ import pytest
 
 import cosim
 from cosim.errors import UnknownNameError, ValueRangeError
-from cosim.study import study_from
+from cosim.study import run_study, study_from
 from cosim.study.compute import Line, StudyChangedError
 from cosim.study.picture import _points
 from cosim.study.planning import make_plan
+from tests.cosim_fmus import rewrite
 from tests.coupling.faulty import MODES
+from tests.study.conftest import BASE
 from tests.study.test_resume import figures
 
 SWAP = {
@@ -221,6 +223,30 @@ def test_isolated_crashes_and_hangs_are_failures(run: Any, faulty: Path) -> None
     assert "did not return within 1 s and was ended" in failure["error"]
 
 
+def test_an_fmu_that_is_allowed_once_per_process_runs_in_one_thread(
+    run: Any, tmp_path: Path, faulty: Path
+) -> None:
+    rewrite(
+        faulty / "faulty.fmu",
+        tmp_path / "once.fmu",
+        xml=lambda text: text.replace(
+            "canGetAndSet", 'canBeInstantiatedOnlyOncePerProcess="true" canGetAndSet'
+        ),
+    )
+    (tmp_path / "one.toml").write_text('[instances]\nbad = "once.fmu"\n')
+    (tmp_path / "alone.toml").write_text('system = "one.toml"\nduration = 1.0\nstep = 0.1\n')
+    table = {
+        "scenario": "alone.toml",
+        "algorithm": ["jacobi", "gauss_seidel"],
+        "param": {"bad.mode": 1, "bad.fail_at": [1e9, 0.35, 2e9]},
+    }
+    result = run(study_from(table, "once", tmp_path), workers=2)
+    statuses = [row["status"] for row in result.table.rows]
+    assert statuses == 2 * ["ok", "failed", "ok"]
+    assert all("failed with status 'error'" in row["error"] for row in result.failures)
+    assert any(note.startswith("one thread only: the FMU of bad") for note in result.notes)
+
+
 def test_an_fmu_that_changes_during_the_study_is_noticed(
     tmp_path: Path, faulty: Path, provider: Any
 ) -> None:
@@ -235,6 +261,34 @@ def test_an_fmu_that_changes_during_the_study_is_noticed(
         file.write(b"\0")
     with pytest.raises(StudyChangedError, match="pair: FMU of good, FMU of bad is not what"):
         Line(task.group, plan.provider, None)
+
+
+def test_building_meanwhile_does_not_change_the_study(
+    run: Any, tmp_path: Path, provider: Any
+) -> None:
+    """A provider whose FMU becomes another one as soon as it was planned with."""
+    names = {"gearbox.lab_bench/ratio": "lossy", "gearbox.lab_bench/elastic": "lossy"}
+    folder = tmp_path / "built"
+    folder.mkdir()
+
+    class Rebuilding:
+        def path(self, variant: str) -> Path:
+            path = folder / (variant.replace("/", "-") + ".fmu")
+            path.write_bytes(provider.path(variant).read_bytes())
+            return path
+
+    def rebuild(_: Any) -> None:
+        for variant, other in names.items():
+            path = folder / (variant.replace("/", "-") + ".fmu")
+            path.write_bytes(provider.path(f"gearbox.lab_bench/{other}").read_bytes())
+
+    plain = run(SWAP, out=tmp_path / "plain")
+    study = study_from({**BASE, **SWAP})
+    other = run_study(
+        study, out=tmp_path / "other", provider=Rebuilding(), progress=rebuild, workers=1,
+        picture=False,
+    )  # fmt: skip
+    assert figures(plain.table.rows) == figures(other.table.rows)
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's statm")
