@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 Finished = Callable[[Task, Outcome], None]
 ANSWER = 10.0
 """Time within which a scheduler must answer [s]."""
+INTERRUPTED = 0.2
+"""Time within which it is known that an interruption ended an isolated run [s]."""
 AHEAD = 4
 """Runs that are handed to a scheduler per thread of its workers, before results come back."""
 
@@ -59,6 +61,9 @@ def in_threads(
                 if task is None:
                     break
                 outcome = compute(task, pool, check)
+                failed = outcome.result["status"] != "ok"
+                if failed and pool.isolate is not None and stop.wait(INTERRUPTED):
+                    break  # Ctrl-C goes to the processes of isolated runs, too
                 keep(task, outcome)
                 events.put((task, Outcome(outcome.result, None)))
         except _Stopped:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +87,35 @@ def test_failures_and_corrupt_files_are_named(tmp_path: Path, faulty: Path) -> N
     assert content["failed"] == 1 and len(content["corrupt"]) == 2
     assert process.stderr.count("cannot be used (not a result of a study)") == 2
     assert "error: 1 of 2 runs failed" in process.stderr and "Traceback" not in process.stderr
+
+
+def children(pid: int) -> list[int]:
+    paths = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for path in paths for child in path.read_text().split()]
+
+
+@pytest.mark.skipif(
+    not Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").exists(),
+    reason="finds processes by Linux's /proc",
+)
+def test_interrupted_isolated_runs_are_no_failures(tmp_path: Path, faulty: Path) -> None:
+    file, out = faulty / "hang.toml", tmp_path / "out"
+    file.write_text('scenario = "scenario.toml"\n[param.bad]\nmode = 6\nfail_at = 0.35\n')
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim", "study", str(file), "--out", str(out), "--isolate"],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    end = time.monotonic() + 60.0
+    while not children(process.pid) and time.monotonic() < end:
+        time.sleep(0.02)
+    found = children(process.pid)
+    time.sleep(0.5)  # any time before the limit of 60 s will do
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130 and "interrupted: 0 of 1 runs are done" in said
+    assert found and not any(Path(f"/proc/{pid}").exists() for pid in found)
+    assert not list(out.glob("runs/*"))
 
 
 def test_wrong_usage(tmp_path: Path) -> None:
