@@ -151,7 +151,7 @@ def cluster() -> Any:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),  # dask's own is 3: slower
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
         ) as found,
     ):
         yield found
