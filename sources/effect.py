@@ -44,6 +44,7 @@ KINDS: dict[str, Kind] = {
         _names(
             angle="angle of the shaft [rad]",
             load="torque transmitted through the shaft [N.m]",
+            reaction="torque of weight and process on the shaft [N.m]",
             normal="normal force that presses the friction partners together [N]",
             radius="radius of the wheel on the shaft [m]",
         ),

@@ -26,7 +26,7 @@ from ..measurement import Run as DataRun
 from ..provider import Provider
 from ..signals import Table
 from ..system_file import SystemFile, read_system
-from .problem import Channel, Parameter, Problem, Run, check_parameters
+from .problem import COINCIDENT, Channel, Parameter, Problem, Run, check_parameters
 
 Vector = NDArray[np.float64]
 KEYS = {
@@ -173,6 +173,18 @@ def _resampled(times: Vector, own: Vector, values: Vector) -> Vector:
     place = np.clip(np.searchsorted(own, times), 1, own.size - 1)
     gap = own[place] - own[place - 1] > GAP * float(np.median(np.diff(own)))
     return np.where(gap, np.nan, result)
+
+
+def snapped(times: Vector, step: float) -> Vector:
+    """Times on the grid of communication steps where they miss it by no more than rounding.
+
+    A set value whose time is a rounding error late would otherwise act one step late.
+    """
+    if times.size < 2:
+        return times
+    nearest = np.rint(times / step) * step
+    near = np.abs(times - nearest) <= COINCIDENT * float(np.median(np.diff(times)))
+    return np.asarray(np.where(near, nearest, times), dtype=np.float64)
 
 
 class _Mapping:
@@ -393,7 +405,8 @@ class _Mapping:
 
     def _input(self, log: Log, column: str, entry: Mapping[str, Any], lead: float) -> Table:
         values = log[column] * float(entry.get("gain", 1.0))
-        times, how = log.time + lead, str(entry.get("interpolation", "hold"))
+        times = snapped(log.time + lead, float(self.table["step"]))
+        how = str(entry.get("interpolation", "hold"))
         if how == "slope":  # of the interval that begins
             values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
             before = 0.0

@@ -130,9 +130,19 @@ def _check_columns(problem: Problem, run: Run) -> Iterator[Finding]:
             start = int(edges[int(np.argmax(np.diff(edges)))]) + 1
             text = (
                 f"stands at {values[start]:.6g} {channel.unit} for {longest} samples from "
-                f"{run.times[good][start]:.4g} s on, though it carries noise: a frozen sensor"
+                f"{run.times[good][start]:.4g} s on, "
             )
-            yield Finding("error", "frozen", run.name, channel.name, text)
+            # rounding hides noise that is smaller than the quantum: a machine at rest reads so, too
+            quantum = float(np.min(np.abs(np.diff(values)[changes])))
+            if quantum > channel.sigma:
+                text += (
+                    f"to its resolution of {quantum:.3g}: the machine is at rest there, or the "
+                    "sensor is frozen"
+                )
+                yield Finding("warning", "frozen", run.name, channel.name, text)
+            else:
+                text += "though it carries noise: a frozen sensor"
+                yield Finding("error", "frozen", run.name, channel.name, text)
         elif not changes.size:
             text = f"is {values[0]:g} {channel.unit} throughout: a constant channel"
             yield Finding("error", "constant", run.name, channel.name, text)

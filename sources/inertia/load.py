@@ -14,7 +14,10 @@ def rotation(m: Model, gravity: Callable[[SX], tuple[SX, SX]] | None = None) -> 
     inertia, friction = m.parameter(J), m.parameter(B)
     angle, speed = m.state(ANGLE), m.state(SPEED)
     weight, height = gravity(angle) if gravity else (0.0, 0.0)
-    flange = m.balance("flange", "rotation", velocity=speed, angle=angle, load=torque)
+    signals = {"velocity": speed, "angle": angle, "load": torque}
+    if gravity:
+        signals["reaction"] = weight
+    flange = m.balance("flange", "rotation", **signals)
     m.derivative(angle, speed)
     m.derivative(speed, (torque + weight - friction * speed + flange.effort) / (inertia + added))
     m.output(W, speed)

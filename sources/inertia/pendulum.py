@@ -1,8 +1,8 @@
 """Disc with an eccentric mass on a horizontal axis: the load of a servo bench.
 
-    phi' = w,   (J + J_added) w' = tau - b w - m g l sin(phi)
+    phi' = w,   (J + J_added) w' = tau - b w - m g l sin(phi - phi_0)
 
-`phi = 0` hangs down. `J` is the whole inertia about the axis and includes m l^2.
+`phi = phi_0` hangs down. `J` is the whole inertia about the axis and includes m l^2.
 
 Not modelled: inclined axis, elasticity of the arm.
 
@@ -23,13 +23,15 @@ SOLVER = Solver("rodas3", 1e-3)
 MASS = Quantity("m", "kg", "eccentric mass", start=1.0, minimum=0.0)
 DISTANCE = Quantity("l", "m", "distance of its centre from the axis", start=0.1, minimum=0.0)
 GRAVITY = Quantity("g", "m/s2", "gravity across the axis", start=9.81, minimum=0.0)
+HANGING = Quantity("phi_0", "rad", "angle at which the mass hangs: the zero of the angle's sensor")
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
     moment = m.parameter(MASS) * m.parameter(GRAVITY) * m.parameter(DISTANCE)
+    hanging = m.parameter(HANGING)
 
     def gravity(angle: SX) -> tuple[SX, SX]:
-        return -moment * ca.sin(angle), moment * (1 - ca.cos(angle))
+        return -moment * ca.sin(angle - hanging), moment * (1 - ca.cos(angle - hanging))
 
     rotation(m, gravity)

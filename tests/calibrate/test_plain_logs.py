@@ -9,6 +9,7 @@ import pytest
 from scipy.io import savemat
 
 from cosim.calibrate import Problem, read_problem
+from cosim.calibrate.mapping import snapped
 from cosim.errors import ScenarioError
 
 MAPPING = """
@@ -92,3 +93,12 @@ def test_faults_of_a_mapping_are_named(tmp_path: Path) -> None:
     np.savez(tmp_path / "one.npz", t_ms=np.arange(100.0), cmd_rpm=np.zeros(100))
     with pytest.raises(ScenarioError, match="current: has no key 'sorce'"):
         read_problem(tmp_path)
+
+
+def test_times_that_miss_the_grid_by_rounding_act_in_their_own_step() -> None:
+    exact = np.arange(2000) * 1e-3
+    rounded = exact.astype(np.float32).astype(np.float64)
+    assert np.any(rounded > exact)  # such a set value would act one step late
+    np.testing.assert_array_equal(snapped(rounded, 5e-4), exact)
+    apart = exact + 2e-5  # a fiftieth of the interval is no rounding
+    np.testing.assert_array_equal(snapped(apart, 5e-4), apart)

@@ -93,6 +93,21 @@ def test_short_run_and_clock_that_goes_back(noisy) -> None:
     assert all(f.column == "time" for f in found)
 
 
+def test_a_column_coarser_than_its_noise_may_rest(noisy) -> None:
+    """Rounding hides the noise of a machine at rest: no reason to call its sensor frozen."""
+    quantum = 1.0  # V, against a noise of some 0.1 V
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        result = quantum * np.round(values / quantum)
+        result[900:] = result[900]
+        return result
+
+    found = findings(changed(noisy(0), "voltage", rest))
+    mine = [f for f in found if f.column == "voltage" and f.kind == "frozen"]
+    assert mine
+    assert all(f.severity == "warning" and "resolution of 1" in f.text for f in mine)
+
+
 def test_all_problems_are_listed_at_once(noisy) -> None:
     problem = changed(changed(noisy(0), "voltage", freeze), "current", lambda x: -x)
     runs = [

@@ -43,6 +43,7 @@ SHAFT_LAWS: dict[str, tuple[Point, Callable[[float, float, float], float]]] = {
         {"tau_c": 0.5, "a": 0.6, "w_0": 1e-3},
         lambda w, phi, tau: -0.8 if w > 0 else 0.2,
     ),
+    "asymmetric_viscous": ({"b_d": 0.03}, lambda w, phi, tau: 0.03 * abs(w)),
     "cogging": (
         {"tau_c": 0.1, "n": 7.0, "psi": 0.3},
         lambda w, phi, tau: -0.1 * math.sin(7 * phi + 0.3),
@@ -61,6 +62,23 @@ def test_torque_on_a_shaft(effect: str, point: tuple[float, float, float]) -> No
     values |= {f"{effect}.{name}": value for name, value in parameters.items()}
     # rounding of accelerations near 50 rad/s2
     assert torque_of(effect, values) == pytest.approx(law(speed, angle, load), rel=1e-9)
+
+
+@pytest.mark.parametrize(("speed", "angle", "tau"), [(1.5, 0.4, 0.9), (-0.2, -1.0, 0.3)])
+def test_gear_friction_counts_both_sides(speed: float, angle: float, tau: float) -> None:
+    """Of a pendulum: the motor's torque and the weight press the teeth together."""
+    name = "gear_friction"
+    own = {"mu": 0.2, "r": 0.6, "e": 0.5, "w_s": 0.4, "g": 2.0, "w_0": 0.05}
+    arm = {"J": 0.05, "b": 0.0, "m": 0.5, "l": 0.1, "phi_0": 0.1}
+    point = {**arm, "speed": speed, "angle": angle, "tau": tau}
+    values = {**point, **{f"{name}.{key}": value for key, value in own.items()}}
+    loaded = Oracle(build_model(f"inertia/pendulum+{name}")).derivatives(values)["speed"]
+    plain = Oracle(build_model("inertia/pendulum")).derivatives(point)["speed"]
+    weight = -0.5 * 9.81 * 0.1 * math.sin(angle - 0.1)
+    load = abs(tau - 0.6 * weight)
+    low = 1 + 0.5 * math.exp(-((speed / 0.4) ** 2))
+    expected = -0.2 * load * (1 + 2.0 * load) * low * math.tanh(speed / 0.05)
+    assert 0.05 * (loaded - plain) == pytest.approx(expected, rel=1e-9)  # rounding
 
 
 def voltage_of(effect: str, point: Point) -> float:
