@@ -370,6 +370,30 @@ def test_spatial_bases_move_like_the_planar_one_when_slow(variant: str) -> None:
 # -- effects -----------------------------------------------------------------------------------
 
 
+def test_a_slippery_patch_lies_under_the_wheels_that_it_is_given_to() -> None:
+    """Casters and drive wheels know where they are; a patch has parameters for each kind."""
+    base = Oracle(
+        build_model(PLANAR + "+low_friction_patch@drive_wheel.mu+low_friction_patch@caster.mu")
+    )
+    sliding = {"vel_y": 0.5, "pose_x": 2.0, "pose_phi": np.pi / 2}
+    dry = {f"{kind}.mu.low_friction_patch.reduction": 0.0 for kind in ("drive_wheel", "caster")}
+
+    def force(wheels: str, x: float, y: float) -> float:
+        patch = {
+            f"{wheels}.mu.low_friction_patch.{name}": value
+            for name, value in (("reduction", 1.0), ("x_p", x), ("y_p", y), ("radius", 0.1))
+        }
+        return base.derivatives({**sliding, **dry, **patch})["vel_y"]
+
+    nowhere = force("caster", 9.0, 9.0)
+    front_left = (2.0 - 0.1875, 0.25)  # the base looks along the world's y axis
+    assert nowhere < 0
+    # one of six wheels brakes no more: g mu_d/6 = 0.8 m/s2, less where a fork gives way
+    assert force("caster", *front_left) > nowhere + 0.3
+    assert force("drive_wheel", *front_left) == nowhere  # d = 0.25 m, exp(-40) rounds to nothing
+    assert force("drive_wheel", 2.0 - 0.205, 0.0) > nowhere + 0.3
+
+
 def test_effect_on_a_group_acts_on_all_its_members_with_one_set_of_parameters() -> None:
     model = build_model(PLANAR + "+coulomb@caster.swivel")
     assert [v.name for v in model.of_role("parameter") if v.of_effect] == [
