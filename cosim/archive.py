@@ -6,6 +6,7 @@ import hashlib
 import os
 import platform
 import shutil
+import struct
 import sys
 import tempfile
 import zipfile
@@ -87,18 +88,46 @@ class Fmu:
 
         Raises:
             PlatformError: it has none; the text lists those that it has.
+            FmuFileError: it is cut short; loading it would end the process.
         """
         wanted = platform_folders(self.description.fmi)
         name = self.description.identifier + library_suffix()
         for folder in wanted:
             path = self.folder / "binaries" / folder / name
             if path.is_file():
+                size, needed = path.stat().st_size, _elf_size(path)
+                if size < needed:
+                    raise FmuFileError(
+                        f"{self.path}: its binary binaries/{folder}/{name} is cut short: {size} "
+                        f"bytes of at least {needed}. Build or fetch it again"
+                    )
                 return path
         present = ", ".join(self.platforms()) or "none at all"
         raise PlatformError(
             f"{self.path.name}: has no binary for this machine ({wanted[0]}); it has {present}. "
             "Build it for this platform ('cosim fmus build --platform all') or ask its supplier"
         )
+
+
+def _elf_size(path: Path) -> int:
+    """Bytes that the segments of a 64-bit ELF library reach to, 0 for other formats.
+
+    The loaders of the other formats refuse a library that is cut short; that of ELF maps it and the
+    process dies of a bus error.
+    """
+    with path.open("rb") as file:
+        header = file.read(64)
+        if len(header) < 64 or header[:6] != b"\x7fELF\x02\x01":
+            return 0
+        table = int(struct.unpack_from("<Q", header, 32)[0])
+        entry, count = (int(value) for value in struct.unpack_from("<HH", header, 54))
+        file.seek(table)
+        entries = file.read(entry * count)
+    needed = table + entry * count
+    for place in range(0, len(entries) - 39, entry):
+        offset, size = (int(struct.unpack_from("<Q", entries, place + at)[0]) for at in (8, 32))
+        needed = max(needed, offset + size)
+    return needed
 
 
 def unpack(path: Path, folder: Path) -> None:

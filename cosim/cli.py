@@ -103,6 +103,11 @@ def _bad_names() -> Iterator[None]:
         raise VariantError(str(error)) from error
     except RuntimeError as error:  # the C compiler
         raise CosimError(str(error)) from error
+    except OSError as error:  # a folder that cannot be written, most likely the given one
+        raise InputError(
+            f"{error.filename}: cannot be written ({error.strerror}); choose another folder with "
+            "--out or COSIM_CACHE"
+        ) from error
 
 
 class Builder:

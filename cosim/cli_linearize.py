@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from . import scenario as scenarios
+from .files import atomic, write_text
 from .linearize import Linear, Margins, connect, loop_margins, operating_point, plot_bode
 from .master import Driver, Master
 from .system import System
@@ -45,12 +46,12 @@ def linearize_command(
     loops = loop_margins(master, parts, names[:MOST] if not cut else names, delay)
     content = _content(name, system, loops)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         if loops:
-            plot_bode(loops, out / "bode.png")
+            with atomic(out / "bode.png") as picture:
+                plot_bode(loops, picture)
         matrices = {key: getattr(system, key).tolist() for key in "abcd"}
         text = json.dumps({**content, **matrices}, indent=1)
-        (out / "linear.json").write_text(text + "\n", encoding="utf-8")
+        write_text(out / "linear.json", text + "\n")
     if as_json:
         typer.echo(json.dumps(content, indent=2))
     else:

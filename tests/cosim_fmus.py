@@ -74,8 +74,9 @@ def rewrite(
     target: Path,
     xml: Callable[[str], str] = lambda text: text,
     keep: Callable[[str], bool] = lambda name: True,
+    limit: int | None = None,
 ) -> Path:
-    """A copy of an FMU with another model description or without some files."""
+    """A copy of an FMU with another description, without some files, or with short binaries."""
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
         for name in old.namelist():
             if not keep(name):
@@ -83,5 +84,7 @@ def rewrite(
             content = old.read(name)
             if name == "modelDescription.xml":
                 content = xml(content.decode()).encode()
+            if name.startswith("binaries/"):
+                content = content[:limit]
             new.writestr(name, content)
     return target

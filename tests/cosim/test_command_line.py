@@ -147,11 +147,14 @@ RUN = ["run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.1", "--out",
         ([*RUN, "--set", "gearbox=lost.fmu"], "lost.fmu: there is no such file"),
         ([*RUN, "--set", "gearbox=cut.fmu"], "cut.fmu: is not a complete FMU archive"),
         ([*RUN, "--set", "gearbox=plan9.fmu"], "has no binary for this machine"),
+        ([*RUN, "--set", "gearbox=short.fmu"], "is cut short: 2000 bytes of at least"),
         ([*RUN, "--set", "load=volts.fmu"], "unit 'N.m' (SI kg.m2.s-2) does not convert"),
         (["run", "motor_bensh"], "there is no scenario 'motor_bensh'; did you mean 'motor_bench'"),
         (["run", "motor_bench/XX"], "ST1, MX1 as run, not 'XX'"),
         (["run", "motor_bench/ST1", "--step", "0"], "communication step 0.0 s is not positive"),
         (["fmus", "build", "gearbox/rubber", "--out", "results"], "called 'rubber'"),
+        (["fmus", "build", "gearbox/ratio", "--out", "cut.fmu"], "choose another folder"),
+        (["linearize", "motor_bench/ST1", "--out", "cut.fmu/x"], "choose another folder"),
         (["fmus", "build", "gearbox", "--out", "results"], "'gearbox' is not a variant name"),
         (["fmus", "build", "gearbox/ratio", "--kind", "python", "--fmi", "3", "--out", "results"],
          "python FMUs are FMI 2.0 only"),
@@ -163,6 +166,7 @@ def test_bad_input(command: Command, tmp_path: Path, arguments: list[str], messa
     source = fmu("gearbox.lab_bench/ratio")
     (tmp_path / "cut.fmu").write_bytes(source.read_bytes()[:3000])
     rewrite(source, tmp_path / "plan9.fmu", keep=lambda name: not name.startswith("binaries"))
+    rewrite(source, tmp_path / "short.fmu", limit=2000)
     rewrite(
         fmu("inertia.lab_bench/disc"), tmp_path / "volts.fmu",
         xml=lambda text: text.replace('unit="N.m"', 'unit="rad/s"'),
