@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
 from tests.cosim_fmus import SLAVE2, SLAVE3, slave
 from tests.fmus import fmu
+from tests.ssp_files import package
 
 
 class Built:
@@ -39,3 +41,14 @@ def affine(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def foreign3(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Foreign FMI 3 FMU: y = 2 u, next = n + 1, off = not on, after a step."""
     return slave(tmp_path_factory.mktemp("slave3"), "foreign", SLAVE3, "pythonfmu3")
+
+
+@pytest.fixture
+def make(tmp_path: Path, affine: Path):
+    """Writes a package with the FMU y = a u + b at resources/affine.fmu."""
+
+    def write(structure: str, files: Mapping[str, str | Path] | None = None) -> Path:
+        content = {"resources/affine.fmu": affine, **(files or {})}
+        return package(tmp_path / "foreign.ssp", structure, content)
+
+    return write

@@ -4,122 +4,30 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim import Master, ssp
-from cosim.errors import ConnectError, InputError, ScenarioError, UnitError
+from cosim.errors import InputError, ScenarioError, UnitError
 from tests.cosim_fmus import rewrite, slave
 from tests.fmus import fmu
-
-NAMES = " ".join(
-    f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
-    for prefix, name in {
-        "ssd": "Description", "ssc": "Common", "ssv": "ParameterValues", "ssm": "ParameterMapping",
-        "ssb": "SignalDictionary",
-    }.items()
-)  # fmt: skip
-UNITS = """
-<ssc:Unit name="rad/s"><ssc:BaseUnit rad="1" s="-1"/></ssc:Unit>
-<ssc:Unit name="rpm"><ssc:BaseUnit rad="1" s="-1" factor="0.10471975511965977"/></ssc:Unit>
-<ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit>
-<ssc:Unit name="kg.m2"><ssc:BaseUnit kg="1" m="2"/></ssc:Unit>
-<ssc:Unit name="g.m2"><ssc:BaseUnit kg="1" m="2" factor="0.001"/></ssc:Unit>
-<ssc:Unit name="1"><ssc:BaseUnit/></ssc:Unit>
-"""
-
-
-def ssd(system: str, experiment: str = "", version: str = "1.0") -> str:
-    return f"""<?xml version="1.0" encoding="UTF-8"?>
-<ssd:SystemStructureDescription {NAMES} version="{version}" name="foreign">
-<ssd:System name="root">{system}</ssd:System>
-<ssd:Units>{UNITS}</ssd:Units>{experiment}</ssd:SystemStructureDescription>"""
-
-
-def ssv(*parameters: str) -> str:
-    return (
-        f'<ssv:ParameterSet {NAMES} version="1.0" name="values"><ssv:Parameters>'
-        f"{''.join(parameters)}</ssv:Parameters><ssv:Units>{UNITS}</ssv:Units></ssv:ParameterSet>"
-    )
-
-
-def real(name: str, value: object, unit: str = "") -> str:
-    declared = f' unit="{unit}"' if unit else ""
-    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}"{declared}/></ssv:Parameter>'
-
-
-def ssm(*entries: str) -> str:
-    return f'<ssm:ParameterMapping {NAMES} version="1.0">{"".join(entries)}</ssm:ParameterMapping>'
-
-
-def binding(values: str, mapping: str = "", attributes: str = "") -> str:
-    inner = f"<ssd:ParameterMapping>{mapping}</ssd:ParameterMapping>" if mapping else ""
-    return (
-        f"<ssd:ParameterBindings><ssd:ParameterBinding {attributes}><ssd:ParameterValues>{values}"
-        f"</ssd:ParameterValues>{inner}</ssd:ParameterBinding></ssd:ParameterBindings>"
-    )
-
-
-def connectors(**kinds: str) -> str:
-    """`y="output"` or `y="output Real rpm"`."""
-    found = ""
-    for name, text in kinds.items():
-        kind, type_, unit = text.split(" ") if " " in text else (text, "Real", "")
-        declared = f' unit="{unit}"' if unit else ""
-        found += (
-            f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{type_}{declared}/></ssd:Connector>'
-        )
-    return f"<ssd:Connectors>{found}</ssd:Connectors>"
-
-
-def component(name: str, source: str, inner: str = "", attributes: str = "") -> str:
-    return f'<ssd:Component name="{name}" source="{source}" {attributes}>{inner}</ssd:Component>'
-
-
-def connection(start: str, end: str, inner: str = "", attributes: str = "") -> str:
-    """Ends as `element.connector`, or `.connector` of the system itself."""
-    ends = ""
-    for side, text in (("start", start), ("end", end)):
-        element, _, connector = text.rpartition(".")
-        ends += f' {side}Element="{element}"' if element else ""
-        ends += f' {side}Connector="{connector}"'
-    return f"<ssd:Connection{ends} {attributes}>{inner}</ssd:Connection>"
-
-
-def system(
-    elements: str, *connections: str, inner: str = "", name: str = "", after: str = ""
-) -> str:
-    content = f"{inner}<ssd:Elements>{elements}</ssd:Elements>"
-    if connections:
-        content += f"<ssd:Connections>{''.join(connections)}</ssd:Connections>"
-    content += after
-    return f'<ssd:System name="{name}">{content}</ssd:System>' if name else content
-
-
-def package(path: Path, structure: str, files: Mapping[str, str | Path]) -> Path:
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", structure)
-        for name, content in files.items():
-            archive.writestr(name, content.read_bytes() if isinstance(content, Path) else content)
-    return path
-
-
-@pytest.fixture
-def make(tmp_path: Path, affine: Path):
-    """Writes a package with the FMU y = a u + b at resources/affine.fmu."""
-
-    def write(structure: str, files: Mapping[str, str | Path] | None = None) -> Path:
-        content = {"resources/affine.fmu": affine, **(files or {})}
-        return package(tmp_path / "foreign.ssp", structure, content)
-
-    return write
-
-
-A = "resources/affine.fmu"
-GEAR = "resources/gearbox.fmu"
+from tests.ssp_files import (
+    GEAR,
+    NAMES,
+    A,
+    binding,
+    component,
+    connection,
+    connectors,
+    package,
+    real,
+    ssd,
+    ssm,
+    ssv,
+    system,
+)
 
 
 def wires(found: object) -> set[tuple[str, str, float, float]]:
@@ -485,82 +393,3 @@ def test_folders_and_other_structures_of_a_package(make, tmp_path: Path) -> None
         ScenarioError, match=r"has no New.ssd; it has Other.ssd, SystemStructure.ssd"
     ):
         ssp.read(path, ssd="New.ssd")
-
-
-# -- errors ----------------------------------------------------------------------------------------
-
-INTEGERS = (
-    '<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/>'
-    "</ssc:IntegerMappingTransformation>"
-)
-TWO = component("a", A) + component("b", A)
-
-
-@pytest.mark.parametrize(
-    ("root", "message"),
-    [
-        (system(component("a", "resources/none.fmu")),
-         r"component 'a' refers to 'resources/none.fmu', which the package does not hold"),
-        (system(component("a", "../x.fmu")), r"component 'a' refers to .* leaves the package"),
-        (system(component("a", "http://x/a.fmu")),
-         r"component 'a' .* only files inside the package"),
-        (system(component("a", A, attributes='implementation="ModelExchange"')),
-         r"component 'a' asks for ModelExchange; only co-simulation is run"),
-        (system(component("a", A, attributes='type="application/x-python"')),
-         r"component 'a' is of type 'application/x-python'; FMUs and SSP can be read"),
-        (system(component("a", A) * 2), r"the root system has two elements named 'a'"),
-        (system(TWO, connection("a.y", "c.u")), r"names element 'c'; there is a, b"),
-        (system(TWO, connection("a.yy", "b.u")),
-         r"connector 'yy' of a is no variable of 'affine'; did you mean 'y'"),
-        (system(TWO, connection("a.y", "b.u"), connection(".x", "b.u")),
-         r"names connector 'x' of the root system; there is none"),
-        (system(TWO, connection("a.next", "b.n", INTEGERS)),
-         r"a.next - b.n has an integer mapping, which cannot be run between FMUs"),
-        (system(component("a", A, connectors(y="output Real stone"))),
-         r"connector 'y' of 'a' has unit 'stone', which the file does not define"),
-        (system(component("a", A, binding(ssv(real("a", "much"))))), r"parameter 'a': could not"),
-        (system(component("a", A, binding(ssv('<ssv:Parameter name="a"><ssv:Binary value="00"/>'
-                                              "</ssv:Parameter>")))),
-         r"parameter 'a' is of type Binary, which cannot be given to an FMU"),
-        (system(component("a", A, binding(ssv(real("a", "1 2"))))),
-         r"parameter 'a' has 2 values, but a.a takes 1"),
-        (system(component("a", A, binding("<x/>"))), r"of a has neither source nor ParameterSet"),
-        (system(""), "holds no FMU"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_read_is_named(make, root: str, message: str) -> None:
-    with pytest.raises(ScenarioError, match=message):
-        ssp.read(make(ssd(root)))
-
-
-def test_two_sources_for_one_input(make) -> None:
-    double = system(TWO, connection("a.y", "b.u"), connection("b.y", "b.u"))
-    with pytest.raises(ConnectError, match=r"b.u is already driven by a.y"):
-        ssp.read(make(ssd(double)))
-    outputs = system(TWO, connection("a.y", "b.y"))
-    with pytest.raises(ConnectError, match=r"a.y and b.y are both outputs but connected"):
-        ssp.read(make(ssd(outputs)))
-
-
-def test_bad_files(make, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"none.ssp: there is no such file"):
-        ssp.read(tmp_path / "none.ssp")
-    path = tmp_path / "broken.ssp"
-    path.write_text("not a zip archive")
-    with pytest.raises(ScenarioError, match=r"broken.ssp: is not a complete SSP archive"):
-        ssp.read(path)
-    good = ssd(system(component("a", A)))
-    for text, message in (
-        (good[:200], r"SystemStructure.ssd: cannot be read"),
-        (good.replace('version="1.0" name', 'version="3.0" name'), r"is of SSP version 3.0"),
-        (good.replace("ssd:SystemStructureDescription", "ssd:System"), r"root element is 'System'"),
-    ):
-        with pytest.raises(ScenarioError, match=message):
-            ssp.read(make(text))
-    itself = ssd(
-        system(
-            component("a", "SystemStructure.ssd", attributes='type="application/x-ssp-definition"')
-        )
-    )
-    with pytest.raises(ScenarioError, match="contains itself as a component"):
-        ssp.read(make(itself))
