@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from ..component import Solver
 from ..laws import contact
+from ..laws.floor import MU, REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .fork import fork
 
 LEVEL = 2
 SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
-MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
 C_H = Quantity(
     "c_h",
     "m/(N.s)",
@@ -31,21 +31,6 @@ C_H = Quantity(
 )
 C_N = Quantity(
     "c_n", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12, nominal=1e-6
-)
-REST = Quantity(
-    "rest",
-    "1",
-    "creep coefficients at standstill over the rolling ones",
-    start=1.0,
-    minimum=1e-6,
-)
-V_CREEP = Quantity(
-    "v_creep",
-    "m/s",
-    "rolling speed between standstill and rolling",
-    start=0.02,
-    minimum=1e-6,
-    nominal=0.02,
 )
 
 

@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.history import NEVER, History
+from ..laws.history import NEVER, PERIOD, History
 from ..quantity import Quantity
 
 SAMPLES = 64
@@ -37,14 +37,6 @@ HORIZON = Quantity(
     "duration over which the lost time is kept",
     start=120.0,
     minimum=0.0,
-    variability="fixed",
-)
-PERIOD = Quantity(
-    "period",
-    "s",
-    "shortest distance of the samples of the past",
-    start=1e-3,
-    minimum=1e-6,
     variability="fixed",
 )
 

@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.history import NEVER, History
+from ..laws.history import NEVER, PERIOD, History
 from ..quantity import Quantity
 
 SAMPLES = 64
@@ -29,14 +29,6 @@ T_D = Quantity(
     minimum=0.0,
     maximum=100.0,
     strength=True,
-    variability="fixed",
-)
-PERIOD = Quantity(
-    "period",
-    "s",
-    "shortest distance of the samples of the past",
-    start=1e-3,
-    minimum=1e-6,
     variability="fixed",
 )
 

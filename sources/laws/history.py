@@ -14,6 +14,15 @@ SX = Any
 NEVER = 1e9
 """Period [s] of a clock that has nothing to do: it ticks at the start and interrupts no solver."""
 
+PERIOD = Quantity(
+    "period",
+    "s",
+    "shortest distance of the samples of the past",
+    start=1e-3,
+    minimum=1e-6,
+    variability="fixed",
+)
+
 
 class History:
     """Keeps `slots` samples of a signal, `period` apart, and reads them back.

@@ -97,6 +97,15 @@ def _value_attributes(entry: Entry) -> dict[str, str]:
     )
 
 
+def _logs_and_experiment(root: ET.Element) -> None:
+    categories = ET.SubElement(root, "LogCategories")
+    for category in LOG_CATEGORIES:
+        ET.SubElement(categories, "Category", name=category)
+    ET.SubElement(
+        root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)
+    )
+
+
 def _method_items(parent: ET.Element) -> None:
     for name, (value, text) in METHODS.items():
         ET.SubElement(parent, "Item", _attributes(name=name, value=value, description=text))
@@ -170,12 +179,7 @@ def describe_fmi2(
         types = ET.SubElement(root, "TypeDefinitions")
         simple = ET.SubElement(types, "SimpleType", name="SolverMethod")
         _method_items(ET.SubElement(simple, "Enumeration"))
-    categories = ET.SubElement(root, "LogCategories")
-    for category in LOG_CATEGORIES:
-        ET.SubElement(categories, "Category", name=category)
-    ET.SubElement(
-        root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)
-    )
+    _logs_and_experiment(root)
     variables = ET.SubElement(root, "ModelVariables")
     position = {entry.name: place + 1 for place, (_, entry) in enumerate(shown)}
     for reference, entry in shown:
@@ -268,12 +272,7 @@ def describe_fmi3(
     if any(entry.part == "solver" for _, entry in shown):
         types = ET.SubElement(root, "TypeDefinitions")
         _method_items(ET.SubElement(types, "EnumerationType", name="SolverMethod"))
-    categories = ET.SubElement(root, "LogCategories")
-    for category in LOG_CATEGORIES:
-        ET.SubElement(categories, "Category", name=category)
-    ET.SubElement(
-        root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)
-    )
+    _logs_and_experiment(root)
     variables = ET.SubElement(root, "ModelVariables")
     reference_of = {entry.name: reference for reference, entry in enumerate(entries)}
     for reference, entry in [(0, entries[0]), *shown]:

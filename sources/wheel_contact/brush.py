@@ -23,9 +23,9 @@ import casadi as ca
 from ..component import Solver
 from ..laws.bristle import STICK
 from ..laws.contact import SMALL
+from ..laws.floor import MU_D, MU_S
 from ..model import SX, Model
 from ..quantity import Quantity
-from .stick_slip import MU_D, MU_S
 from .wheel import Contact, wheel
 
 LEVEL = 4

@@ -16,14 +16,13 @@ from __future__ import annotations
 
 from ..component import Solver
 from ..laws import contact
+from ..laws.floor import MU
 from ..model import SX, Model
-from ..quantity import Quantity
 from .rolling import creep_coefficients
 from .wheel import Contact, wheel
 
 LEVEL = 1
 SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
-MU = Quantity("mu", "1", "friction coefficient of the wheel on the floor", start=0.7, minimum=0.0)
 
 
 def equations(m: Model) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from ..component import Solver
 from ..laws.contact import creep_coefficient
+from ..laws.floor import REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .wheel import Contact, wheel
@@ -30,21 +31,6 @@ C_X = Quantity(
 )
 C_Y = Quantity(
     "c_y", "m/(N.s)", "creep velocity per side force", start=1e-6, minimum=1e-12, nominal=1e-6
-)
-REST = Quantity(
-    "rest",
-    "1",
-    "creep coefficients at standstill over the rolling ones",
-    start=1.0,
-    minimum=1e-6,
-)
-V_CREEP = Quantity(
-    "v_creep",
-    "m/s",
-    "rolling speed between standstill and rolling",
-    start=0.02,
-    minimum=1e-6,
-    nominal=0.02,
 )
 
 

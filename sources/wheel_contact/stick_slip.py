@@ -16,33 +16,20 @@ velocity); the blending is ours, MathWorks does not publish its own.
 from __future__ import annotations
 
 from ..component import Solver
-from ..laws import contact
+from ..laws import floor
 from ..model import SX, Model
-from ..quantity import Quantity
 from .wheel import Contact, Friction, wheel
 
 LEVEL = 2
 SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
-MU_S = Quantity("mu_s", "1", "static friction coefficient", start=0.7, minimum=1e-6)
-MU_D = Quantity("mu_d", "1", "dynamic friction coefficient", start=0.5, minimum=0.0)
-V_C = Quantity(
-    "v_c",
-    "m/s",
-    "critical velocity, where friction is largest",
-    start=0.002,
-    minimum=1e-6,
-    nominal=2e-3,
-)
 
 
 def stick_slip(m: Model) -> Friction:
-    """The friction law with its parameters; effects act on `mu`, and on mu_d in proportion."""
-    mu_s, mu_d, v_c = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_C)
+    """The friction law with its parameters."""
+    law = floor.stick_slip(m)
 
     def friction(c: Contact) -> tuple[SX, SX]:
-        patch = m.balance("mu", "coefficient", unit="1", value=mu_s, x=c.x, y=c.y)
-        share = 1 + patch.effort / mu_s
-        return contact.stick_slip(c.s_x, c.s_y, c.f_n * share, mu_s, mu_d, v_c)
+        return law(c.s_x, c.s_y, c.f_n, c.x, c.y)
 
     return friction
 
