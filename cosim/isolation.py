@@ -184,11 +184,11 @@ def _wait(
             process.wait(0.05)
             return False
         except subprocess.TimeoutExpired:
+            if progress is not None:
+                progress(int(state[INDEX]) / count)  # in a hang, too: it may end the run
             calls = int(state[CALLS])
             if calls != seen:
                 seen, since = calls, time.monotonic()
-                if progress is not None:
-                    progress(int(state[INDEX]) / count)
             elif time.monotonic() - since > limit + (0 if calls else STARTING):
                 return True
 

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -89,16 +91,32 @@ def test_failures_and_corrupt_files_are_named(tmp_path: Path, faulty: Path) -> N
     assert "error: 1 of 2 runs failed" in process.stderr and "Traceback" not in process.stderr
 
 
-def children(pid: int) -> list[int]:
-    paths = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(child) for path in paths for child in path.read_text().split()]
+def isolated(pid: int) -> list[int]:
+    """Processes of isolated runs that a process has started."""
+    found = []
+    for path in Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, path.read_text().split()):
+            with suppress(OSError):  # it has ended
+                if b"cosim.isolated" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    found.append(child)
+    return found
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    end = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
 
 
 @pytest.mark.skipif(
     not Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").exists(),
     reason="finds processes by Linux's /proc",
 )
-def test_interrupted_isolated_runs_are_no_failures(tmp_path: Path, faulty: Path) -> None:
+@pytest.mark.parametrize("hanging", [False, True])
+def test_interrupted_isolated_runs_are_no_failures(
+    tmp_path: Path, faulty: Path, hanging: bool
+) -> None:
+    """While Python starts there the interruption ends it; in an FMU that hangs it does not."""
     file, out = faulty / "hang.toml", tmp_path / "out"
     file.write_text('scenario = "scenario.toml"\n[param.bad]\nmode = 6\nfail_at = 0.35\n')
     process = subprocess.Popen(
@@ -106,15 +124,18 @@ def test_interrupted_isolated_runs_are_no_failures(tmp_path: Path, faulty: Path)
         stderr=subprocess.PIPE, text=True, start_new_session=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    end = time.monotonic() + 60.0
-    while not children(process.pid) and time.monotonic() < end:
-        time.sleep(0.02)
-    found = children(process.pid)
-    time.sleep(0.5)  # any time before the limit of 60 s will do
-    os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=30)
+    try:
+        wait_for(lambda: isolated(process.pid))
+        [child] = isolated(process.pid)
+        if hanging:  # the binary is loaded some milliseconds before the loop
+            wait_for(lambda: "faulty.so" in Path(f"/proc/{child}/maps").read_text())
+            time.sleep(0.3)
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=30)  # half of the time limit of a call
+    finally:
+        process.kill()
     assert process.returncode == 130 and "interrupted: 0 of 1 runs are done" in said
-    assert found and not any(Path(f"/proc/{pid}").exists() for pid in found)
+    assert not Path(f"/proc/{child}").exists()
     assert not list(out.glob("runs/*"))
 
 
