@@ -15,7 +15,8 @@ from .planning import Found, Group, Task
 if TYPE_CHECKING:
     from distributed import Client
 
-Finished = Callable[[Task, Outcome], None]
+Keep = Callable[[Task, Outcome], None]
+Told = Callable[[str], None]
 ANSWER = 10.0
 """Time within which a scheduler must answer [s]."""
 INTERRUPTED = 0.2
@@ -28,9 +29,7 @@ class _Stopped(Exception):
     """The study ends while this run is under way."""
 
 
-def in_threads(
-    tasks: Iterable[Task], pool: Pool, workers: int, keep: Finished, told: Finished
-) -> None:
+def in_threads(tasks: Iterable[Task], pool: Pool, workers: int, keep: Keep, told: Told) -> None:
     """Make runs in threads.
 
     The compiled executor releases the interpreter lock, so runs of FMUs take as many cores as there
@@ -41,13 +40,13 @@ def in_threads(
         pool: gives instances.
         workers: threads.
         keep: called in the thread with each result.
-        told: called after that, in the calling thread.
+        told: called after that in the calling thread, with what the run was made with.
 
     Raises:
         KeyboardInterrupt: and runs under way are given up; those that are finished are kept.
     """
     waiting, lock, stop = iter(tasks), threading.Lock(), threading.Event()
-    events: queue.SimpleQueue[tuple[Task, Outcome] | BaseException | None] = queue.SimpleQueue()
+    events: queue.SimpleQueue[str | BaseException | None] = queue.SimpleQueue()
 
     def check(_: float) -> None:
         if stop.is_set():
@@ -65,7 +64,7 @@ def in_threads(
                 if failed and pool.isolate is not None and stop.wait(INTERRUPTED):
                     break  # Ctrl-C goes to the processes of isolated runs, too
                 keep(task, outcome)
-                events.put((task, Outcome(outcome.result, None)))
+                events.put(task.label)
         except _Stopped:
             pass
         except BaseException as error:
@@ -89,7 +88,7 @@ def in_threads(
             elif isinstance(event, BaseException):
                 raise event
             else:
-                told(*event)
+                told(event)
     finally:
         stop.set()
         for thread in threads:
@@ -132,8 +131,8 @@ def on_scheduler(
     provider: Found,
     isolate: float | None,
     study: str,
-    keep: Finished,
-    told: Finished,
+    keep: Keep,
+    told: Told,
 ) -> None:
     """Make runs on the workers of a dask scheduler; results are kept here.
 
@@ -146,7 +145,7 @@ def on_scheduler(
         isolate: as of `Line`.
         study: a text that no other study has.
         keep: called with each result.
-        told: called after that.
+        told: called after that, with what the run was made with.
 
     Raises:
         InputError: dask is not installed, or the scheduler does not answer.
@@ -174,8 +173,8 @@ def _on_client(
     provider: Found,
     isolate: float | None,
     study: str,
-    keep: Finished,
-    told: Finished,
+    keep: Keep,
+    told: Told,
 ) -> None:
     from distributed import KilledWorker, as_completed
 
@@ -218,7 +217,7 @@ def _on_client(
         if not isinstance(outcome, Outcome):
             raise CosimError(f"{task.label}: a worker gave {outcome!r}; is it of this version?")
         keep(task, outcome)
-        told(task, Outcome(outcome.result, None))
+        told(task.label)
         following = submit()
         if following is not None:
             results.add(following)

@@ -160,33 +160,35 @@ def run_study(
     missing, failed = _missing(plan, store, retry)
     if missing:
         plan.provider.pin(folder / "fmus")
-    state = Progress(len(plan.tasks), len(plan.tasks) - len(missing), failed)
-
-    def told(task: Task, outcome: Outcome) -> None:
-        nonlocal state
-        bad = outcome.result["status"] != "ok"
-        state = Progress(state.total, state.done + 1, state.failed + bad, task.label)
-        if progress is not None:
-            progress(state)
+    done, kept = len(plan.tasks) - len(missing), list[bool]()
 
     def keep(_: Task, outcome: Outcome) -> None:
         store.write(outcome.result, outcome.recording)
+        kept.append(outcome.result["status"] != "ok")
 
-    if progress is not None:
-        progress(state)
+    def report(label: str = "") -> None:
+        if progress is not None:
+            state = Progress(len(plan.tasks), done + len(kept), failed + sum(kept), label)
+            progress(state)
+
+    report()
     notes = _notes(plan)
-    if missing and scheduler:
-        name = f"{study.name} {time.time_ns()}"
-        on_scheduler(missing, scheduler, plan.provider, isolate, name, keep, told)
-    elif missing:
-        count = min(workers or os.cpu_count() or 1, len(missing))
-        if plan.single and isolate is None and count > 1:
-            notes.append(
-                f"one thread only: the FMU of {plan.single[0]} allows one instance per process; "
-                "--isolate gives each run a process of its own"
-            )
-            count = 1
-        in_threads(missing, Pool(plan.provider, count, isolate), count, keep, told)
+    try:
+        if missing and scheduler:
+            name = f"{study.name} {time.time_ns()}"
+            on_scheduler(missing, scheduler, plan.provider, isolate, name, keep, report)
+        elif missing:
+            count = min(workers or os.cpu_count() or 1, len(missing))
+            if plan.single and isolate is None and count > 1:
+                notes.append(
+                    f"one thread only: the FMU of {plan.single[0]} allows one instance per "
+                    "process; --isolate gives each run a process of its own"
+                )
+                count = 1
+            in_threads(missing, Pool(plan.provider, count, isolate), count, keep, report)
+    except KeyboardInterrupt:
+        report()  # runs may have been kept since the last report
+        raise
     table = tabulate(plan, store)
     files = _write(study, folder, table, picture)
     return StudyResult(

@@ -29,7 +29,8 @@ step = 2e-5
 
 def files(folder: Path) -> dict[str, int]:
     """Result files and when they were written."""
-    return {path.name: path.stat().st_mtime_ns for path in folder.glob("runs/*.json")}
+    paths = folder.glob("runs/[!.]*.json")  # a killed process leaves a temporary file
+    return {path.name: path.stat().st_mtime_ns for path in paths}
 
 
 def figures(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
