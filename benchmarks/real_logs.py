@@ -50,7 +50,7 @@ def model_of(problem: Problem, entry: Mapping[str, Any], known: Mapping[str, flo
         for p in problem.parameters
         if p.role == "effect" and not p.strength and p.name not in free
     }
-    problem = problem.hold(held)
+    problem = problem.hold({**held, **entry.get("hold", {})})
     changed = []
     for p in problem.parameters:
         value = min(max(start.get(p.name, p.nominal), p.minimum), p.maximum)

@@ -97,13 +97,23 @@ def _parquet(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
     return columns, units
 
 
+def _split(name: str, values: Vector) -> dict[str, Vector]:
+    """A column, or the columns `name_1`, `name_2` of a table with one row per sample."""
+    if values.ndim == 1:
+        return {name: values}
+    if values.ndim == 2:
+        return {f"{name}_{i}": column for i, column in enumerate(values.T, 1)}
+    return {}
+
+
 def _npz(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
     try:
         with np.load(path) as archive:
             columns = {
-                name: archive[name].astype(np.float64)
+                one: values
                 for name in archive.files
-                if archive[name].ndim == 1 and archive[name].dtype.kind in "fiub"
+                if archive[name].dtype.kind in "fiub"
+                for one, values in _split(name, archive[name].astype(np.float64)).items()
             }
     except (ValueError, OSError, EOFError) as error:
         raise ScenarioError(f"{path}: is not an npz archive of numbers ({error})") from error

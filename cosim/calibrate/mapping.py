@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
 
 from .. import library
 from ..errors import ScenarioError, UnknownNameError, listing
@@ -38,7 +39,7 @@ _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings
             "window", "unit", "shift"}  # fmt: skip
 GAP = 3.0
 """Intervals of a clock longer than this many usual ones are gaps."""
-_COLUMN = {"source", "time", "late", "scale", "offset", "unit"}
+_COLUMN = {"source", "time", "late", "scale", "offset", "unit", "lowpass", "derivative"}
 _INPUT = {"column", "columns", "gain", "unit", "interpolation"}
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 _ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
@@ -187,6 +188,26 @@ def snapped(times: Vector, step: float) -> Vector:
     return np.asarray(np.where(near, nearest, times), dtype=np.float64)
 
 
+def _filtered(times: Vector, values: Vector, entry: Mapping[str, Any], where: str) -> Vector:
+    """Low-pass without phase (fifth-order Butterworth, forward and back) and derivative."""
+    cutoff = float(entry.get("lowpass", 0.0))
+    if not cutoff and not entry.get("derivative", False):
+        return values
+    share = 2.0 * cutoff * float(np.median(np.diff(times)))
+    if share >= 1.0:
+        raise ScenarioError(f"{where}: a low-pass of {cutoff:g} is above half the sample rate")
+    if not np.isfinite(values).all():
+        raise ScenarioError(f"{where}: has gaps, which a filter does not bridge")
+
+    def smooth(rough: Vector) -> Vector:
+        return filtfilt(*butter(5, share), rough) if share else rough
+
+    values = smooth(values)
+    if entry.get("derivative", False):
+        values = smooth(np.gradient(values, times))
+    return np.asarray(values, dtype=np.float64)
+
+
 class _Mapping:
     """Joins a mapping file and a data set."""
 
@@ -219,7 +240,17 @@ class _Mapping:
             column: values for column, values in log.columns.items() if values.shape == time.shape
         }
         units = dict(log.units)
-        for column, entry in entries.items():
+        for column, entry in (
+            (
+                one,
+                {
+                    key: str(value).replace("{}", str(i)) if key == "source" else value
+                    for key, value in entry.items()
+                },
+            )
+            for name_, entry in entries.items()
+            for i, one in enumerate(expand(name_), 1)
+        ):
             where = f"{self.path}: column {column}"
             unknown = set(entry) - _COLUMN
             if unknown:
@@ -235,11 +266,18 @@ class _Mapping:
                 )
             if entry.get("time", name) != name or entry.get("late", 0.0):
                 values = _resampled(time, own, values)
+            values = _filtered(time, values, entry, where)
             columns[column] = values * float(entry.get("scale", 1.0)) + float(
                 entry.get("offset", 0.0)
             )
             units[column] = str(entry.get("unit", units.get(column, "")))
         clock = columns.get("time", time)
+        first, last = log.values.get("samples", (1, clock.size))
+        part = slice(int(first) - 1, int(last))
+        columns = {column: values[part] for column, values in columns.items()}
+        clock = clock[part]
+        if clock.size == 0:
+            raise ScenarioError(f"{log.name}: has {time.size} samples, none from {first} to {last}")
         columns["time"] = clock - clock[0]
         self.units.update({column: unit for column, unit in units.items() if unit})
         return replace(log, columns=columns, units=units)

@@ -132,13 +132,14 @@ def _check_columns(problem: Problem, run: Run) -> Iterator[Finding]:
                 f"stands at {values[start]:.6g} {channel.unit} for {longest} samples from "
                 f"{run.times[good][start]:.4g} s on, "
             )
-            # rounding hides noise that is smaller than the quantum: a machine at rest reads so, too
+            # rounding hides noise that is smaller than the quantum: a machine at rest reads so,
+            # too; and it comes back to the value that it rests at, which no frozen sensor does
             quantum = float(np.min(np.abs(np.diff(values)[changes])))
-            if quantum > channel.sigma:
-                text += (
-                    f"to its resolution of {quantum:.3g}: the machine is at rest there, or the "
-                    "sensor is frozen"
-                )
+            lasting = edges[:-1][np.diff(edges) > SHORT] + 1
+            again = int(np.sum(values[lasting] == values[start])) > 1
+            if quantum > channel.sigma or again:
+                how = "as it does elsewhere" if again else f"to its resolution of {quantum:.3g}"
+                text += f"{how}: the machine is at rest there, or the sensor is frozen"
                 yield Finding("warning", "frozen", run.name, channel.name, text)
             else:
                 text += "though it carries noise: a frozen sensor"

@@ -95,6 +95,61 @@ def test_faults_of_a_mapping_are_named(tmp_path: Path) -> None:
         read_problem(tmp_path)
 
 
+def arm_log(folder: Path, samples: str = "", lowpass: float = 5.0) -> Path:
+    """Six joints as tables with one row per sample, and a mapping that filters them."""
+    times = np.arange(800) * 0.01
+    angles = np.sin(2.0 * times)[:, None] * np.arange(1, 7)
+    np.savez(folder / "one.npz", t=times, q=angles, qd=2.0 * np.cos(2.0 * times)[:, None]
+             * np.arange(1, 7), i=angles)  # fmt: skip
+    text = f"""
+system = "system.toml"
+step = 1e-2
+time = "t"
+[columns]
+"a_1..6" = {{ source = "qd_{{}}", lowpass = {lowpass}, derivative = true }}
+[inputs]
+"arm.qdd" = {{ columns = "a_1..6", interpolation = "linear" }}
+[channels]
+"i_1..6" = {{ signal = "arm.i[{{}}]", sigma = 0.1, unit = "A" }}
+[[parameter]]
+name = "F_v"
+nominal = 1.0
+min = 0.0
+max = 2.0
+targets = "arm.F_v[1]"
+[[run]]
+name = "one"
+file = "one.npz"
+purpose = "identification"
+{samples}
+"""
+    (folder / "dataset.toml").write_text(text)
+    (folder / "system.toml").write_text(
+        'description = "Arm."\nconnections = []\n[instances]\narm = "moved_arm/rigid"\n'
+    )
+    return folder
+
+
+def test_tables_filters_and_parts_of_a_log(tmp_path: Path) -> None:
+    run = read_problem(arm_log(tmp_path, "samples = [101, 700]")).run("one")
+    times = np.arange(100, 700) * 0.01
+    assert run.times[0] == 0.0
+    assert run.data.shape == (600, 6)
+    np.testing.assert_array_equal(run.data[:, 2], 3.0 * np.sin(2.0 * times))
+    exact = -4.0 * 3.0 * np.sin(2.0 * times)
+    found = np.asarray(run.inputs["arm.qdd[3]"].at(run.times))
+    # 0.3 Hz through 5 Hz of fifth order twice passes to 1e-6; the difference quotient errs by
+    # (w h)^2 / 6 = 7e-5 of 12 rad/s2
+    np.testing.assert_allclose(found, exact, rtol=0, atol=12 * 1e-4)
+
+
+def test_wrong_filters_and_parts_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="low-pass of 60 is above half the sample rate"):
+        read_problem(arm_log(tmp_path, lowpass=60.0))
+    with pytest.raises(ScenarioError, match="has 800 samples, none from 900 to 950"):
+        read_problem(arm_log(tmp_path, "samples = [900, 950]"))
+
+
 def test_times_that_miss_the_grid_by_rounding_act_in_their_own_step() -> None:
     exact = np.arange(2000) * 1e-3
     rounded = exact.astype(np.float32).astype(np.float64)

@@ -108,6 +108,20 @@ def test_a_column_coarser_than_its_noise_may_rest(noisy) -> None:
     assert all(f.severity == "warning" and "resolution of 1" in f.text for f in mine)
 
 
+def test_a_machine_comes_back_to_rest(noisy) -> None:
+    """Noise that is absent at rest, twice at the same value: no frozen sensor."""
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        result = values.copy()
+        result[:200] = result[900:] = 0.0
+        return result
+
+    found = findings(changed(noisy(0), "speed", rest))
+    mine = [f for f in found if f.column == "speed" and f.kind == "frozen"]
+    assert mine
+    assert all(f.severity == "warning" and "as it does elsewhere" in f.text for f in mine)
+
+
 def test_all_problems_are_listed_at_once(noisy) -> None:
     problem = changed(changed(noisy(0), "voltage", freeze), "current", lambda x: -x)
     runs = [

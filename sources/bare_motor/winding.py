@@ -1,0 +1,28 @@
+"""Winding with inductance under the commanded voltage.
+
+    L_a i' = u_set - R_a i - K_t w,   tau = K_t i - b_m w
+
+Not modelled: switching of the amplifier within its PWM period, its voltage limit, saturation.
+
+Source: Leonhard, Control of Electrical Drives, 2001, ch. 5.
+"""
+
+from __future__ import annotations
+
+from ..component import Solver
+from ..dc_motor import CURRENT, W
+from ..dc_motor.machine import machine
+from ..model import Model
+from . import U_SET
+
+LEVEL = 0
+# L-stable: the winding's time constant may be below the step.
+SOLVER = Solver("rodas3", 1e-3)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    command, speed = m.input(U_SET), m.input(W)
+    command = command + m.balance("command", "signal", unit="V", value=command).effort
+    current = m.state(CURRENT)
+    machine(m, current, current, command, speed)
