@@ -47,6 +47,8 @@ def means(
     position = {name: index for index, name in enumerate(layout.instances)}
     rank = {name: index for index, name in enumerate(stepped or ())}
     continuous = smooth(system, layout)
+    moving = {name: interpolates(system, name) for name in layout.instances}
+    bonded = set(layout.bond_input.tolist())
     found: list[Mean] = []
     spans: dict[int, tuple[int, int]] = {}
     for name in layout.instances:
@@ -59,8 +61,8 @@ def means(
             passed = description.dependencies.get(
                 variable, description.dependencies.get(variable.rpartition("[")[0], ())
             )
-            # an output with direct feedthrough is not yet that of the inputs at the end
-            ahead = bool(rank) and rank[giver] < rank[name] and not passed
+            # an output with direct feedthrough is that of the inputs at the end if these move there
+            ahead = bool(rank) and rank[giver] < rank[name] and (moving[giver] or not passed)
             if order and continuous[index]:
                 found.append(
                     Mean(
@@ -70,10 +72,25 @@ def means(
                         float(layout.copy_offset[index]),
                         order,
                         ahead,
+                        position[name],
+                        moving[name],
+                        int(layout.copy_target[index]) in bonded,
                     )
                 )
         spans[position[name]] = (begin, len(found))
     return found, spans
+
+
+def interpolates(system: System, instance: str) -> bool:
+    """Whether an instance's inputs can move within a step (FMI 2's canInterpolateInputs)."""
+    description = system.members[instance].description
+    return description.fmi == 2 and description.can("canInterpolateInputs")
+
+
+def ramps(found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int) -> Rows:
+    """The operation that tells an instance how its inputs move, if it can use it."""
+    first, last = spans[index]
+    return [(Op.RAMP, first, last)] if first < last and found[first].moving else []
 
 
 def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int]:
@@ -95,7 +112,10 @@ def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int
 
 
 def side_by_side(
-    layout: Layout, parts: Mapping[str, int], spans: Mapping[int, tuple[int, int]]
+    layout: Layout,
+    parts: Mapping[str, int],
+    found: Sequence[Mean],
+    spans: Mapping[int, tuple[int, int]],
 ) -> Rows:
     """One communication step in which instances step with inputs from where the others stand.
 
@@ -116,6 +136,9 @@ def side_by_side(
             if spans[index][0] < spans[index][1] and parts[layout.instances[index]] == 1:
                 rows.append((Op.EXTRAPOLATE, *spans[index]))
         rows += [(Op.SET, index) for index in starting]
+        for index in starting:
+            if parts[layout.instances[index]] == 1:
+                rows += ramps(found, spans, index)
         for index in starting:
             n = parts[layout.instances[index]]
             rows.append(whole_or_part(index, n, int(instant * n)))

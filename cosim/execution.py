@@ -19,8 +19,10 @@ from .instance import Instance
 from .iteration import Iterated
 from .loops import Newton
 from .plan import PARTS, Loop, Mean, Op, Plan
+from .ramps import Ramps, bend
 from .recording import Recording
 from .signals import Signal
+from .start import find_past
 from .step_control import StepControl
 
 if TYPE_CHECKING:
@@ -82,8 +84,12 @@ class Execution:
         self.instants: list[float] = times.tolist()
         self.bound: kernel.Kernel | None = None
         self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
-        self.history = np.zeros((len(plan.means), 3))
+        self.history = np.zeros((len(plan.means), 4))
+        self.past = np.zeros(1, dtype=np.int64)  # values in the history before the first step
+        self.ramps = Ramps(plan, self.instances)
         self.held = np.zeros(len(self.layout.bond_input))
+        moving = {mean.target: i for i, mean in enumerate(plan.means) if mean.moving}
+        self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
         self.iterated: Iterated | None = None
         self.control: StepControl | None = None
         self.started = False
@@ -101,6 +107,7 @@ class Execution:
         self.initialize()
         shown = max(count // 100, 1)
         try:
+            find_past(self)
             advance = self.executor()
             while self.index < count:
                 advance(min(self.index + shown, count))
@@ -127,6 +134,7 @@ class Execution:
         self.bond_energy[:] = 0.0
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
+        self.past[0] = 0
         self.started = False
         if self.iterated is not None:
             self.iterated.restart()
@@ -186,7 +194,7 @@ class Execution:
             bound = kernel.Kernel(
                 self.plan, self.instances, self.outputs, self.inputs, self.values, self.times,
                 self.master.step, self.external, self.rows, self.bond_energy, self.every,
-                self.newtons, self.history,
+                self.newtons, self.history, self.past, self.ramps, self.bond_mean,
             )  # fmt: skip
         except FileNotFoundError as error:
             raise ValueRangeError(
@@ -216,6 +224,8 @@ class Execution:
         if op is Op.GET or self.index:  # it has stepped: where it is by its own count
             last = self.index if op is Op.GET else self.index - 1
             instance.time = self.instants[last] + self.master.step
+        if op is Op.RAMP:
+            raise instance.failed_ramp(part, status)
         if status == kernel.UNFIT:
             raise self.inputs[self.instances.index(instance)].unfit(part)
         raise instance.failed_access(op is Op.GET, part, status)
@@ -368,6 +378,9 @@ class Execution:
                 self.account(self.held if a == 1 else values[layout.bond_input])
             case Op.HOLD:
                 self.held = values[layout.bond_input]
+                for term, index in enumerate(self.bond_mean):
+                    if index >= 0:
+                        self.held[term] = self.ramps.average[index]
             case Op.SOLVE:
                 self.solve(a)
             case Op.ITERATE:
@@ -377,27 +390,57 @@ class Execution:
                 self.history[:, 1:] = self.history[:, :-1].copy()
                 self.history[:, 0] = [values[mean.source] for mean in self.plan.means]
             case Op.EXTRAPOLATE:
-                for mean, past in zip(self.plan.means[a:b], self.history[a:b], strict=True):
-                    values[mean.target] = self.mean(mean, past.tolist()) * mean.gain + mean.offset
+                for index in range(a, b):
+                    self.extrapolate(index, self.plan.means[index])
+            case Op.RAMP:
+                self.ramps.tell(a, b)
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 size = self.master.step
                 time = self.instants[self.index] + part * size / parts
                 self.instances[a].step(time, size / parts)
 
+    def extrapolate(self, index: int, mean: Mean) -> None:
+        """Let an input follow the polynomial through the last values of its source."""
+        past = self.history[index].tolist()
+        if mean.bonded or not mean.moving:
+            average = self.mean(mean, past) * mean.gain + mean.offset
+            self.ramps.average[index] = average
+        if not mean.moving:
+            self.values[mean.target] = average
+            return
+        slope, curve = self.slopes(mean, past)
+        self.values[mean.target] = past[0] * mean.gain + mean.offset
+        self.ramps.slope[index], self.ramps.curve[index] = slope * mean.gain, curve * mean.gain
+
+    def slopes(self, mean: Mean, past: list[float]) -> tuple[float, float]:
+        """Derivatives at the begin of the step of the polynomial through the last values."""
+        now, inverse = float(self.values[mean.source]), 1.0 / self.master.step
+        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
+        if order == 0:
+            return 0.0, 0.0
+        if order == 1:
+            return (now - past[0] if mean.ahead else past[0] - past[1]) * inverse, 0.0
+        half, square = 0.5 * inverse, inverse * inverse
+        if mean.ahead:
+            second = bend(now, *past[:3])
+            return (2.0 * (now - past[0]) - second) * half, second * square
+        second = bend(*past)
+        return (2.0 * (past[0] - past[1]) + second) * half, second * square
+
     def mean(self, mean: Mean, past: list[float]) -> float:
         """Mean over the step of the polynomial through the last values of a source."""
         now = float(self.values[mean.source])
-        order = min(mean.order, self.index + mean.ahead)
+        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
         if mean.ahead:
             if order == 1:
                 return 0.5 * (now + past[0])
-            return (5.0 * now + 8.0 * past[0] - past[1]) / 12.0
+            return 0.5 * (now + past[0]) - bend(now, *past[:3]) / 12.0
         if order == 0:
             return past[0]
         if order == 1:
             return 1.5 * past[0] - 0.5 * past[1]
-        return (23.0 * past[0] - 16.0 * past[1] + 5.0 * past[2]) / 12.0
+        return past[0] + 0.5 * (past[0] - past[1]) + 5.0 * bend(*past) / 12.0
 
     def record(self) -> None:
         """Keep observed values if it is their turn; note outputs for the energy of bonds."""

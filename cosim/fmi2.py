@@ -77,6 +77,7 @@ class Fmi2:
         "fmi2SerializeFMUstate": (_P, _P, _P, _Z),
         "fmi2DeSerializeFMUstate": (_P, _P, _Z, _P),
         "fmi2GetDirectionalDerivative": (_P, _P, _Z, _P, _Z, _P, _P),
+        "fmi2SetRealInputDerivatives": (_P, _P, _Z, _P, _P),
     }
     STATE = "FMUstate"
     GET: ClassVar[dict[str, str]] = {

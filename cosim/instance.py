@@ -218,6 +218,21 @@ class Instance:
         if status > 1:
             raise self.failed_access(False, part, status)
 
+    def ramp(
+        self, references: NDArray[np.uint32], orders: NDArray[np.int32], values: Vector
+    ) -> None:
+        """Derivatives of inputs in time, by which they move in the steps to come (FMI 2)."""
+        status = self._functions["fmi2SetRealInputDerivatives"](
+            self.address, references.ctypes.data, references.size, orders.ctypes.data,
+            values.ctypes.data,
+        )  # fmt: skip
+        if status > 1:
+            raise self.failed_ramp(references, status)
+
+    def failed_ramp(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
+        """The error for derivatives of inputs that the FMU refused."""
+        return self.failure(f"setting derivatives of {self._names(references, 'Float64')}", status)
+
     def failed_access(self, getting: bool, part: Part, status: int) -> FmuCallError:
         """The error for a get or set call that returned `status`."""
         verb = "getting" if getting else "setting"

@@ -33,10 +33,11 @@ class Op(IntEnum):
     ENERGY = 6  # add the energy that went over each bond in this step; a = 1: with inputs of HOLD
     SOLVE = 7  # solve algebraic loop a
     NOTE = 8  # remember the outputs that are extrapolated
-    EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step * gain + offset
+    EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step (begin, if moving)
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
     HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
     ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
+    RAMP = 13  # tell an instance how its inputs move: means a <= i < b, all of them its own
 
 
 PARTS = 1 << 16
@@ -98,13 +99,17 @@ class Loop:
 
 @dataclass(frozen=True)
 class Mean:
-    """An input that gets the mean of a polynomial through its source's values.
+    """An input that follows a polynomial through its source's values.
 
     Attributes:
         source, target: slots.
-        gain, offset: target = gain * mean + offset.
+        gain, offset: target = gain * source + offset.
         order: of the polynomial.
         ahead: the source is at the end of the step already (interpolation).
+        instance: whose input it is.
+        moving: the instance takes value and derivatives at the begin of the step; else it takes the
+            mean over the step, held.
+        bonded: the input belongs to a power bond, whose energy needs the mean in any case.
     """
 
     source: int
@@ -113,6 +118,9 @@ class Mean:
     offset: float
     order: int
     ahead: bool
+    instance: int
+    moving: bool
+    bonded: bool
 
 
 @dataclass(frozen=True)
@@ -148,7 +156,7 @@ class Plan:
         loops: what SOLVE solves.
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
-        means: what EXTRAPOLATE sets.
+        means: what EXTRAPOLATE and RAMP set.
         iteration: what ITERATE and step control need.
     """
 

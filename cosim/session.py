@@ -23,6 +23,7 @@ from .errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
 from .execution import Execution
 from .master import Driver, Master
 from .recording import Recording
+from .start import find_past
 
 Vector = NDArray[np.float64]
 
@@ -100,6 +101,7 @@ class Session:
             block.set(check_values(name, variables, value))
         run.initialize()
         try:
+            find_past(run)
             self._advance(self.count)
             run.finish()
         except (FmuCallError, AlgebraicLoopError) as error:

@@ -60,11 +60,12 @@ class Solver:
 
     Attributes:
         method: `rk4` (explicit, order 4), `rodas3` (linearly implicit, L-stable, order 3),
-            `dopri5` or `rodas3_adaptive` (error-controlled).
+            `dopri5`, `rodas3_adaptive` or, with a Jacobian that is kept for several steps,
+            `rosw3_adaptive` (error-controlled).
         step: internal step (largest step of the error-controlled ones) [s].
         tolerance: relative local error of the error-controlled ones.
     """
 
-    method: Literal["rk4", "rodas3", "dopri5", "rodas3_adaptive"] = "rk4"
+    method: Literal["rk4", "rodas3", "dopri5", "rodas3_adaptive", "rosw3_adaptive"] = "rk4"
     step: float = 1e-3
     tolerance: float = 1e-6

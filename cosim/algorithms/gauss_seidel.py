@@ -7,9 +7,11 @@ feedthrough passes a signal on without delay. First order in the communication s
 depends on the order.
 
 Options:
-    extrapolation: order 1 or 2 gives continuous inputs the mean over the step of the polynomial
-        through the last outputs; where the source has stepped already and has no direct
-        feedthrough, its new value counts too (weights of Adams and Moulton). Second order.
+    extrapolation: order 1 or 2 lets continuous inputs follow the polynomial through the last
+        outputs; where the source has stepped already (and has no direct feedthrough, or follows its
+        own inputs within the step), its new value counts too. Second order. FMUs that cannot
+        interpolate inputs get the mean of the polynomial over the step (weights of Adams and
+        Bashforth, of Adams and Moulton).
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (sequential scheme); Busch,
 Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
@@ -19,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..coupling import means
+from ..coupling import interpolates, means, ramps
 from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 from ..system import System
@@ -34,7 +36,10 @@ def compile_plan(
     extrapolated, spans = means(system, layout, extrapolation, system.order())
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
-    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too
+    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too;
+    # where all inputs move, outputs are those of the inputs at the end already
+    moving = bool(extrapolated) and all(interpolates(system, name) for name in system.members)
+    after = consistent(system, layout, loops, only_loops=True) if moving else fresh
     again = extrapolation == 0 or reached(system, layout)
     step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
     if extrapolated:
@@ -45,14 +50,14 @@ def compile_plan(
         step.append(copy)
         if spans[index][0] < spans[index][1]:
             step.append((Op.EXTRAPOLATE, *spans[index]))
-        step += [set_, (Op.STEP, index), (Op.GET, index)]
-    step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
+        step += [set_, *ramps(extrapolated, spans, index), (Op.STEP, index), (Op.GET, index)]
+    step += [(Op.HOLD,), *after, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "gauss_seidel",
         layout,
         initial_sweep(system, layout),
         operations(step),
-        final_operations(fresh),
+        final_operations(fresh if again else after),
         tuple(loop for _, loop in loops),
         operations(consistent(system, layout, loops, only_loops=False)),
         tuple(extrapolated),

@@ -6,9 +6,10 @@ First order in the communication step. An output with direct feedthrough is that
 so a chain of n such instances delays a signal by n steps. Independent of the order of instances.
 
 Options:
-    extrapolation: order 1 or 2 gives continuous inputs the mean over the step of the polynomial
-        through the last outputs (weights of Adams and Bashforth), and outputs with direct
-        feedthrough are fetched anew at t_k; second order in the communication step.
+    extrapolation: order 1 or 2 lets continuous inputs follow the polynomial through the last
+        outputs, and outputs with direct feedthrough are fetched anew at t_k; second order in the
+        communication step. FMUs that cannot interpolate inputs get the mean of the polynomial over
+        the step (weights of Adams and Bashforth).
     substeps: instance -> n, for instances that go n steps per communication step and exchange at
         each; what comes from slower instances is held. The energy of their power bonds is not
         accounted for.
@@ -21,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..coupling import factors, means, side_by_side, without_parts
+from ..coupling import factors, means, ramps, side_by_side, without_parts
 from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..system import System
@@ -48,12 +49,15 @@ def compile_plan(
     if extrapolated:
         step.append((Op.NOTE,))
     if max(parts.values()) > 1:
-        step += side_by_side(layout, parts, spans)
+        step += side_by_side(layout, parts, extrapolated, spans)
     else:
         step.append((Op.COPY, 0, len(layout.copy_source)))
         if extrapolated:
             step.append((Op.EXTRAPOLATE, 0, len(extrapolated)))
-        step += [(op, index) for op in (Op.SET, Op.STEP, Op.GET) for index in everyone]
+        step += [(Op.SET, index) for index in everyone]
+        for index in everyone:
+            step += ramps(extrapolated, spans, index)
+        step += [(op, index) for op in (Op.STEP, Op.GET) for index in everyone]
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "jacobi",

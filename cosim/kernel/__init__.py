@@ -12,7 +12,7 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ from ..block import Block
 from ..instance import Instance
 from ..loops import Newton
 from ..plan import Op, Plan
+from ..ramps import Ramps
 
 SOURCE = Path(__file__).with_name("kernel.c")
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
@@ -57,7 +58,7 @@ class _Copy(ct.Structure):
 class _Term(ct.Structure):
     _fields_ = (
         ("sign", _D), ("previous", _D), ("held", _D), ("output", _I64),
-        ("input", _I64), ("bond", _I64),
+        ("input", _I64), ("bond", _I64), ("mean", _I64),
     )  # fmt: skip
 
 
@@ -71,7 +72,14 @@ class _Loop(ct.Structure):
 class _Mean(ct.Structure):
     _fields_ = (
         ("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64), ("order", _I64),
-        ("ahead", _I64),
+        ("ahead", _I64), ("moving", _I64), ("bonded", _I64),
+    )  # fmt: skip
+
+
+class _Ramp(ct.Structure):
+    _fields_ = (
+        ("component", _P), ("function", _P), ("references", _P), ("orders", _P), ("values", _P),
+        ("n", _I64),
     )  # fmt: skip
 
 
@@ -82,8 +90,11 @@ class _Run(ct.Structure):
         ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
-        ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P), ("n_means", _I64),
+        ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
+        ("past", _P), ("n_means", _I64),
+        ("average", _P), ("slope", _P), ("curve", _P), ("ramps", _P),
         ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
+        ("failed_ramp", _I64),
     )  # fmt: skip
 
 
@@ -106,13 +117,14 @@ class _Code(IntEnum):
     EXTRAPOLATE = 13
     SUBSTEP = 14
     HOLD = 15
+    RAMP = 16
 
 
 UNFIT = 7
 """Status of a set call that was not made, because a number does not fit the variable's type."""
 UNSETTLED = 8
 """Status of an algebraic loop that has no solution or does not settle."""
-_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean)
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Ramp)
 
 
 def library_name() -> str:
@@ -169,7 +181,9 @@ class Kernel:
         rows: where observed values go.
         bond_energy: where the bonds' energy goes.
         newtons: one per algebraic loop.
-        history: of extrapolated inputs.
+        history, past: of extrapolated inputs, and how many values it has before the first step.
+        ramps: derivatives of the inputs that move within a step.
+        bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
 
     def __init__(
@@ -187,6 +201,9 @@ class Kernel:
         every: int,
         newtons: Sequence[Newton] = (),
         history: NDArray[np.float64] | None = None,
+        past: NDArray[np.int64] | None = None,
+        ramps: Ramps | None = None,
+        bond_mean: Sequence[int] = (),
     ) -> None:
         path = find()
         if path is None:
@@ -196,6 +213,7 @@ class Kernel:
         self._keep: list[Any] = [instances, outputs, inputs]
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
+        self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
         calls: list[_Call] = []
         spans: dict[tuple[Op, int], tuple[int, int]] = {}
         for op, blocks, slots in (
@@ -239,19 +257,21 @@ class Kernel:
                 zip(
                     layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
                     layout.bond_output.tolist(), layout.bond_input.tolist(),
-                    layout.bond_index.tolist(), strict=True,
+                    layout.bond_index.tolist(),
+                    bond_mean or [-1] * len(layout.bond_sign), strict=True,
                 ),
             ),
             bond_energy=self._array(bond_energy),
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
-        instructions = _instructions(plan, plan.step, spans, calls, instances)
+        told = self._ramps(ramps) if ramps is not None else {}
+        instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
         loops = []
         for loop, newton in zip(plan.loops, newtons, strict=True):
             first = len(instructions)
-            instructions += _instructions(plan, loop.sweep, spans, calls, instances)
+            instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
             loops.append(
                 _Loop(
                     self._array(loop.sources),
@@ -267,11 +287,36 @@ class Kernel:
         self.run.instructions = self._structures(_Instruction, instructions)
         self.run.means = self._structures(
             _Mean,
-            ((m.gain, m.offset, m.source, m.target, m.order, m.ahead) for m in plan.means),
+            (
+                (m.gain, m.offset, m.source, m.target, m.order, m.ahead, m.moving, m.bonded)
+                for m in plan.means
+            ),
         )
         self.run.n_means = len(plan.means)
-        if history is not None:
-            self.run.history = self._array(history)
+        if history is not None and past is not None:
+            self.run.history, self.run.past = self._array(history), self._array(past)
+
+    def _ramps(self, ramps: Ramps) -> dict[tuple[int, int], tuple[int, int]]:
+        """Bind the calls of derivatives; per RAMP operation the first and behind the last."""
+        self.run.average = self._array(ramps.average)
+        self.run.slope, self.run.curve = self._array(ramps.slope), self._array(ramps.curve)
+        self._keep.append(ramps)
+        rows: list[_Ramp] = []
+        told = {}
+        for key, told_calls in ramps.calls.items():
+            for call in told_calls:
+                instance = self._instances[call.instance]
+                rows.append(
+                    _Ramp(
+                        instance.address, instance.functions["fmi2SetRealInputDerivatives"],
+                        call.references.ctypes.data, call.orders.ctypes.data,
+                        call.values.ctypes.data, call.references.size,
+                    )
+                )  # fmt: skip
+                self._told.append((instance, call.references))
+            told[key] = (len(rows) - len(told_calls), len(rows))
+        self.run.ramps = self._structures(_Ramp, rows)
+        return told
 
     def _array(self, array: NDArray[Any]) -> int:
         """Address of an array of 8-byte numbers, which is kept alive."""
@@ -308,13 +353,19 @@ class Kernel:
         self.run.index = self.run.row = self.run.next_record = 0
 
     def failed(self) -> tuple[Op, Instance | None, Any]:
-        """What failed: operation, the instance and, for get and set calls, the part of its block.
+        """What failed: operation, instance and what it was about.
 
+        That is the part of its block for get and set calls, and the value references of inputs
+        whose derivatives were refused.
         A recorded value that is not finite belongs to no instance.
         """
         call, member = int(self.run.failed_call), int(self.run.failed_member)
+        ramp = int(self.run.failed_ramp)
         if call >= 0:
             return self._parts[call]
+        if ramp >= 0:
+            instance, references = self._told[ramp]
+            return Op.RAMP, instance, references
         if member >= 0:
             return Op.STEP, self._instances[member], None
         return Op.RECORD, None, None
@@ -330,6 +381,7 @@ def _instructions(
     spans: dict[tuple[Op, int], tuple[int, int]],
     calls: Sequence[_Call],
     instances: Sequence[Instance],
+    told: Mapping[tuple[int, int], tuple[int, int]],
 ) -> list[tuple[int, int, int]]:
     """The operations of these rows, in order; neighbours of one kind become one."""
     found: list[tuple[int, int, int]] = []
@@ -349,6 +401,8 @@ def _instructions(
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
             add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+        elif op is Op.RAMP:
+            add(_Code.RAMP, *told[a, b])
         elif op is Op.SUBSTEP:
             found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
         elif op in (Op.SET, Op.GET):

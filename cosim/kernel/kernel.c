@@ -17,7 +17,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, RAMP };
 enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8 }; /* beyond the statuses of FMI */
 enum { PARTS = 1 << 16, ITERATIONS = 60 }; /* as in cosim/plan.py and cosim/loops.py */
 #define SETTLED 1e-10
@@ -54,6 +54,7 @@ typedef struct {
   double sign, previous, held; /* previous: the output at the beginning of the step */
   int64_t output, input;
   int64_t bond; /* terms of a bond follow each other */
+  int64_t mean; /* of the input if it moves within a step, else -1 */
 } Term;
 
 /* An algebraic loop, z = G(z), cut at some outputs: see cosim/loops.py. */
@@ -65,11 +66,20 @@ typedef struct {
   int64_t n, first, last;    /* instructions of a sweep */
 } Loop;
 
-/* An input that gets the mean of a polynomial over the step: see cosim/coupling.py. */
+/* An input that follows a polynomial through its source's values: see cosim/plan.py. */
 typedef struct {
   double gain, offset;
-  int64_t source, target, order, ahead;
+  int64_t source, target, order, ahead, moving, bonded;
 } Mean;
+
+/* One call that tells an FMU derivatives of its inputs: see cosim/ramps.py. */
+typedef struct {
+  void *component, *function;
+  const uint32_t *references;
+  const int32_t *orders;
+  const double *values;
+  size_t n;
+} Ramp;
 
 typedef struct {
   const Member *members;
@@ -93,13 +103,17 @@ typedef struct {
   int64_t next_record; /* the next one to be kept */
   const Loop *loops;
   const Mean *means;
-  double *history; /* per mean the source at the beginnings of this step and the two before */
+  double *history; /* per mean the source at the beginnings of this step and the three before */
+  const int64_t *past; /* how many of them there are before the first step */
   int64_t n_means;
-  int64_t failed_loop, failed_call, failed_member; /* -1: none; neither: a recorded value is not finite */
+  double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
+  const Ramp *ramps;
+  int64_t failed_loop, failed_call, failed_member, failed_ramp; /* -1: none; none of them: a recorded value is not finite */
 } Run;
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
+typedef int (*Ramp2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
 typedef int (*Step2)(void *, double, double, int);
 typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);
 
@@ -233,21 +247,56 @@ static void add_energy(Run *run, int held) {
   }
 }
 
-/* Inputs from the mean over the step of the polynomial through the last values of their source. */
+/* Of the last two second differences the one nearer to 0, and 0 if their signs differ; newest first. */
+static double bend(double a, double b, double c, double d) {
+  const double last = a - 2.0 * b + c, before = b - 2.0 * c + d;
+  if (last > 0.0 && before > 0.0) return last < before ? last : before;
+  if (last < 0.0 && before < 0.0) return last > before ? last : before;
+  return 0.0;
+}
+
+/* Inputs by the polynomial through the last values of their source: its mean over the step, or
+   its value at the begin and its derivatives. */
 static void extrapolate(Run *run, int64_t first, int64_t last) {
+  const double inverse = 1.0 / run->step, half = 0.5 * inverse, square = inverse * inverse;
   for (int64_t i = first; i < last; i++) {
     const Mean *m = run->means + i;
-    const double *h = run->history + 3 * i, now = run->values[m->source];
-    const int64_t known = run->index + (m->ahead ? 1 : 0);
+    const double *p = run->history + 4 * i, now = run->values[m->source];
+    const int64_t known = run->index + *run->past + (m->ahead ? 1 : 0);
     const int64_t order = m->order < known ? m->order : known;
-    double mean;
-    if (m->ahead)
-      mean = order == 1 ? 0.5 * (now + h[0]) : (5.0 * now + 8.0 * h[0] - h[1]) / 12.0;
-    else
-      mean = order == 0 ? h[0] : order == 1 ? 1.5 * h[0] - 0.5 * h[1]
-             : (23.0 * h[0] - 16.0 * h[1] + 5.0 * h[2]) / 12.0;
-    run->values[m->target] = mean * m->gain + m->offset;
+    if (m->bonded || !m->moving) {
+      double mean;
+      if (m->ahead)
+        mean = order == 1 ? 0.5 * (now + p[0]) : 0.5 * (now + p[0]) - bend(now, p[0], p[1], p[2]) / 12.0;
+      else
+        mean = order == 0 ? p[0] : order == 1 ? 1.5 * p[0] - 0.5 * p[1]
+               : p[0] + 0.5 * (p[0] - p[1]) + 5.0 * bend(p[0], p[1], p[2], p[3]) / 12.0;
+      run->average[i] = mean * m->gain + m->offset;
+    }
+    if (!m->moving) {
+      run->values[m->target] = run->average[i];
+      continue;
+    }
+    double slope = 0.0, curve = 0.0;
+    if (order == 1) {
+      slope = (m->ahead ? now - p[0] : p[0] - p[1]) * inverse;
+    } else if (order == 2) {
+      const double second = m->ahead ? bend(now, p[0], p[1], p[2]) : bend(p[0], p[1], p[2], p[3]);
+      slope = (m->ahead ? 2.0 * (now - p[0]) - second : 2.0 * (p[0] - p[1]) + second) * half;
+      curve = second * square;
+    }
+    run->values[m->target] = p[0] * m->gain + m->offset;
+    run->slope[i] = slope * m->gain;
+    run->curve[i] = curve * m->gain;
   }
+}
+
+static const Ramp *ramp(const Ramp *r, const Ramp *end, int *status) {
+  for (; r < end; r++) {
+    *status = ((Ramp2)r->function)(r->component, r->references, r->n, r->orders, r->values);
+    if (*status > 1) return r;
+  }
+  return 0;
 }
 
 static const Member *substep(const Run *run, const Member *m, int64_t code, int *status) {
@@ -362,6 +411,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
   const Call *const calls = run->calls, *call = 0;
   const Member *const members = run->members, *member = 0;
+  const Ramp *ramped = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
     switch (in->operation) {
@@ -403,17 +453,24 @@ static int execute(Run *run, int64_t first, int64_t last) {
       break;
     case NOTE:
       for (int64_t i = 0; i < run->n_means; i++) {
-        double *const h = run->history + 3 * i;
+        double *const h = run->history + 4 * i;
+        h[3] = h[2];
         h[2] = h[1];
         h[1] = h[0];
         h[0] = run->values[run->means[i].source];
       }
       break;
     case HOLD:
-      for (int64_t i = 0; i < run->n_terms; i++) run->terms[i].held = run->values[run->terms[i].input];
+      for (int64_t i = 0; i < run->n_terms; i++) {
+        Term *const t = run->terms + i;
+        t->held = t->mean >= 0 ? run->average[t->mean] : run->values[t->input];
+      }
       break;
     case EXTRAPOLATE:
       extrapolate(run, in->first, in->last);
+      break;
+    case RAMP:
+      ramped = ramp(run->ramps + in->first, run->ramps + in->last, &status);
       break;
     case SUBSTEP:
       member = substep(run, members + in->first, in->last, &status);
@@ -422,6 +479,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
     if (status > 1) {
       run->failed_call = call ? call - calls : -1;
       run->failed_member = member ? member - members : -1;
+      run->failed_ramp = ramped ? ramped - run->ramps : -1;
       return status;
     }
   }
@@ -440,6 +498,6 @@ EXPORT int cosim_run(Run *run, int64_t last) {
 /* The layout that this library was compiled for, to be compared with the caller's. */
 EXPORT int64_t cosim_size(int what) {
   const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term),
-                          sizeof(Loop), sizeof(Mean)};
+                          sizeof(Loop), sizeof(Mean), sizeof(Ramp)};
   return (int64_t)sizes[what];
 }

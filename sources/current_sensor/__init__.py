@@ -23,7 +23,7 @@ COMPONENT = Component(
     source="digital twin paper, current sensor (first order, 2 kHz)",
     energy=False,
 )
-SOLVER = Solver("rodas3", step=5e-5)
+SOLVER = Solver("rodas3", step=1e-3)
 
 
 def low_pass(m: Model, current: SX) -> SX:

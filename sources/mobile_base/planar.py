@@ -60,7 +60,7 @@ from .mount import Mount, read_mount, write_planar_motion
 from .wheels import Drive, Places, add_wheels, read_caster_mass, read_places, write_wheels
 
 LEVEL = 1
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+SOLVER = Solver("rosw3_adaptive", 1e-3, 1e-5)
 SLOTS = {"wheel_contact": "stick_slip", "caster": "swivel"}
 PRELOAD = Quantity(
     "preload", "N", "load of a drive wheel that does not depend on the weight", minimum=0.0

@@ -17,7 +17,7 @@ from ..model import Model
 from .spatial_body import spatial_body
 
 LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+SOLVER = Solver("rosw3_adaptive", 1e-3, 1e-5)
 SLOTS = {"wheel_contact": "spatial", "caster": "swivel"}
 
 

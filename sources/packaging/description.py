@@ -165,6 +165,7 @@ def describe_fmi2(
             modelIdentifier=identifier,
             needsExecutionTool=None if native else True,
             canHandleVariableCommunicationStepSize=True,
+            canInterpolateInputs=True if native else None,
             canNotUseMemoryManagementFunctions=True,
             canGetAndSetFMUstate=True,
             canSerializeFMUstate=True,
@@ -199,7 +200,9 @@ def describe_fmi2(
             ET.SubElement(
                 variable,
                 "Enumeration",
-                _attributes(declaredType="SolverMethod", min=1, max=4, start=int(entry.start)),
+                _attributes(
+                    declaredType="SolverMethod", min=1, max=len(METHODS), start=int(entry.start)
+                ),
             )
             continue
         attributes = _value_attributes(entry)
@@ -286,7 +289,7 @@ def describe_fmi3(
         )
         if entry.name == "solver.method":
             attributes |= _attributes(
-                declaredType="SolverMethod", min=1, max=4, start=int(entry.start)
+                declaredType="SolverMethod", min=1, max=len(METHODS), start=int(entry.start)
             )
             ET.SubElement(variables, "Enumeration", attributes)
             continue

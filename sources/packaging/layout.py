@@ -13,6 +13,10 @@ METHODS = {
     "rodas3": (2, "linearly implicit with exact Jacobian, order 3, L-stable, fixed step"),
     "dopri5": (3, "explicit Dormand-Prince 5(4), error-controlled"),
     "rodas3_adaptive": (4, "linearly implicit, order 3(2), error-controlled"),
+    "rosw3_adaptive": (
+        5,
+        "linearly implicit with a Jacobian that is kept, order 3(2), error-controlled",
+    ),
 }
 """Internal solvers: value of `solver.method` and meaning."""
 
@@ -53,7 +57,7 @@ def solver_entries(model: Model) -> list[Entry]:
         "solver inside the FMU",
         start=METHODS[solver.method][0],
         minimum=1,
-        maximum=4,
+        maximum=len(METHODS),
     )
     step = Quantity(
         "step", "s", "largest internal step", start=solver.step, minimum=1e-9, maximum=1e3

@@ -145,6 +145,8 @@ def _fmax(a: float, b: float) -> float:
 
 
 SLACK = 1e-7  # part of its period by which a tick may be early
+KEEP = 20  # steps with one Jacobian
+GAMMA = 0.435866521508459  # of ROS34PW2
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
@@ -166,6 +168,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.next = [0.0] * NC
         self.stop = _math.inf
         self.h = 0.0
+        self.j = [0.0] * NJ
+        self.w = [0.0] * NLU
+        self.hw = 0.0
+        self.left = 0
         self.initialized = False
         self.stale = True
 
@@ -244,6 +250,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             "next": list(self.next),
             "stop": self.stop,
             "h": self.h,
+            "j": list(self.j),
+            "w": list(self.w),
+            "hw": self.hw,
+            "left": self.left,
             "initialized": self.initialized,
         }
 
@@ -251,6 +261,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.v, self.period = list(state["v"]), list(state["period"])
         self.tick, self.next = list(state["tick"]), list(state["next"])
         self.stop, self.h = state["stop"], state["h"]
+        self.j, self.w = list(state["j"]), list(state["w"])
+        self.hw, self.left = state["hw"], state["left"]
         self.initialized = state["initialized"]
         self.stale = True
 
@@ -343,7 +355,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                     )
                     v[self.IX : self.IXD] = x
             else:
-                self._adaptive(t1, method == 4)
+                self._adaptive(t1, int(method))
         v[0] = t1
         self.stale = True
         self._check(self.IX, NX)
@@ -444,12 +456,57 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         ]
         return y, e
 
-    def _adaptive(self, t1: float, implicit: bool) -> None:
+    def _rosw3(self, t: float, h: float, x: list[float]) -> tuple[list[float], list[float]]:
+        self._held = self._slices()
+        r = range(NX)
+        ih = 1.0 / h
+        if self.left == 0:
+            f_jacobian([t], x, *self._held, [0.0] * NX, self.j, [0.0] * NX)
+            self.left = KEEP
+            self.hw = 0.0
+        if not abs(h - self.hw) <= 1e-9 * h:
+            f_factor(self.j, ih / GAMMA, self.w)
+            self.hw = h
+        w = self.w
+        k1 = self._derivatives(t, x)
+        f_solve(w, k1)
+        y = [x[i] + 2.0 * k1[i] for i in r]
+        f = self._derivatives(t + 0.871733043016918 * h, y)
+        k2 = [f[i] - ih * (4.588560720558084 * k1[i]) for i in r]
+        f_solve(w, k2)
+        y = [x[i] + (1.4192173174557652 * k1[i] - 0.2592322116729698 * k2[i]) for i in r]
+        f = self._derivatives(t + 0.7315799577888524 * h, y)
+        k3 = [f[i] - ih * (4.184760482319161 * k1[i] - 0.285192017355496 * k2[i]) for i in r]
+        f_solve(w, k3)
+        y = [
+            x[i]
+            + (4.184760482319161 * k1[i] - 0.285192017355496 * k2[i] + 2.2942803602790423 * k3[i])
+            for i in r
+        ]
+        f = self._derivatives(t + h, y)
+        k4 = [
+            f[i]
+            - ih
+            * (6.36817920012836 * k1[i] + 6.795620944466837 * k2[i] - 2.870098604331055 * k3[i])
+            for i in r
+        ]
+        f_solve(w, k4)
+        e = [
+            0.27774994764797034 * k1[i]
+            - 1.4032398951759986 * k2[i]
+            + 1.7726301276675511 * k3[i]
+            + 0.5 * k4[i]
+            for i in r
+        ]
+        self.left -= 1
+        return [y[i] + k4[i] for i in r], e
+
+    def _adaptive(self, t1: float, code: int) -> None:
         v = self.v
         largest, tolerance = v[self.IS + 1], v[self.IS + 2]
         t, h = v[0], self.h if self.h > 0 else 0.1 * largest
-        exponent = -1.0 / 3.0 if implicit else -1.0 / 5.0
-        method = self._rodas3 if implicit else self._dopri5
+        exponent = -1.0 / 5.0 if code == 3 else -1.0 / 3.0
+        method = {3: self._dopri5, 4: self._rodas3, 5: self._rosw3}[code]
         while t < t1:
             if h > largest:
                 h = largest
@@ -467,6 +524,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             if error <= 1:
                 v[self.IX : self.IXD] = new
                 t = t1 if last else t + hs
+            elif code == 5 and self.left < KEEP - 1:
+                self.left = 0  # perhaps the Jacobian was too old: once more with a new one
+                continue
             factor = 0.9 * _math.pow(error + 1e-10, exponent) if _math.isfinite(error) else 0.1
             factor = min(max(factor, 0.1), 5.0)
             if not last or error > 1 or hs * factor > h:

@@ -25,7 +25,7 @@ from . import INTEGRAL, KD, KI, KP, U_MAX
 from .gearmotor import Servo, gear, read, winding
 
 LEVEL = 1
-SOLVER = Solver("rodas3", 1e-4)
+SOLVER = Solver("rodas3", 1e-3)
 T_F = Quantity(
     "T_f", "s", "filter time of the derivative", start=1 / (2 * math.pi * 400), minimum=1e-6
 )

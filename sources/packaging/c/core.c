@@ -23,7 +23,7 @@
 enum { IX = 1, IXD = IX + NX, IU = IXD + NX, IY = IU + NU, IP = IY + NY, IZ = IP + NP, IS = IZ + NZ };
 enum { NV = IS + 3 };
 enum { METHOD = IS, STEP = IS + 1, TOLERANCE = IS + 2 };
-enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4 };
+enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4, ROSW3_ADAPTIVE = 5 };
 enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, TERMINATED, FAILED };
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
@@ -34,8 +34,15 @@ typedef struct {
   double next[NC + 1];   /* its time */
   double stop;           /* where the importer says that the simulation ends */
   double h;              /* last accepted step of an error-controlled solver, 0: none yet */
+  double j[NJ + 1];      /* Jacobian that is kept, and the factors of its matrix for the step hw */
+  double w[NLU + 1];
+  double hw;
+  double slope[NU + 1];  /* first derivatives of the inputs at the present time */
+  double curve[NU + 1];  /* second derivatives */
   int32_t mode;
   int32_t stale;         /* outputs and derivatives must be evaluated again */
+  int32_t moving;        /* inputs have been given derivatives */
+  int32_t left;          /* for how many steps the Jacobian may still serve */
 } Memory;
 
 typedef struct {
@@ -89,10 +96,31 @@ static void evaluate_outputs(double *v) {
   f_outputs(arg, res, 0, 0, 0);
 }
 
-static void derivatives(const double *v, double t, const double *x, double *xdot) {
-  const double *arg[] = {&t, x, v + IZ, v + IU, v + IP};
+/* Inputs at time t: held, or u + u' dt + u'' dt^2/2 from the present time on. */
+static const double *inputs_at(const Memory *m, double t, double *u) {
+  if (!m->moving) return m->v + IU;
+  const double dt = t - m->v[0], half = 0.5 * dt * dt;
+  for (int i = 0; i < NU; i++) u[i] = m->v[IU + i] + dt * m->slope[i] + half * m->curve[i];
+  return u;
+}
+
+static void derivatives(const Memory *m, double t, const double *x, double *xdot) {
+  double u[NU + 1];
+  const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
   double *res[] = {xdot};
   f_derivatives(arg, res, 0, 0, 0);
+}
+
+/* Go to time t with the inputs, not with the states. */
+static void move_on(Memory *m, double t) {
+  if (m->moving) {
+    const double dt = t - m->v[0], half = 0.5 * dt * dt;
+    for (int i = 0; i < NU; i++) {
+      m->v[IU + i] = m->v[IU + i] + dt * m->slope[i] + half * m->curve[i];
+      m->slope[i] += dt * m->curve[i];
+    }
+  }
+  m->v[0] = t;
 }
 
 static void refresh(Instance *c) {
@@ -189,14 +217,32 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
   if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
   for (size_t i = 0; i < n; i++) {
     uint32_t k = vr[i];
-    if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input */
+    if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input, from now on held */
       v[k] = values[i];
+      c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
       c->m.stale = 1;
       continue;
     }
     if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
     int status = set_value(c, k, values[i]);
     if (status != OK) return status;
+  }
+  return OK;
+}
+
+/* Derivatives of inputs, which move with them until they are set again. */
+static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, const int order[], const double values[]) {
+  Memory *m = &c->m;
+  for (size_t i = 0; i < n; i++) {
+    const uint32_t k = vr[i];
+    if (k < IU || k >= IY) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, k);
+    if (order[i] < 1 || order[i] > 2)
+      return report(c, ERROR, "%s: derivative of order %d of input %s; must be 1 or 2", MODEL, order[i], NAMES[k]);
+    if (!isfinite(values[i]))
+      return report(c, ERROR, "%s: a derivative of input %s cannot be set to %g at time %.9g s: not finite", MODEL,
+                    NAMES[k], values[i], m->v[0]);
+    (order[i] == 1 ? m->slope : m->curve)[k - IU] = values[i];
+    m->moving = 1;
   }
   return OK;
 }
@@ -257,37 +303,44 @@ static double next_tick(const Instance *c, double end) {
 
 #if NX
 /* Classical Runge-Kutta, order 4. */
-static void rk4(const double *v, double t, double h, double *x) {
+static void rk4(const Memory *m, double t, double h, double *x) {
   double k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
-  derivatives(v, t, x, k1);
+  derivatives(m, t, x, k1);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k1[i];
-  derivatives(v, t + 0.5 * h, y, k2);
+  derivatives(m, t + 0.5 * h, y, k2);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k2[i];
-  derivatives(v, t + 0.5 * h, y, k3);
+  derivatives(m, t + 0.5 * h, y, k3);
   for (int i = 0; i < NX; i++) y[i] = x[i] + h * k3[i];
-  derivatives(v, t + h, y, k4);
+  derivatives(m, t + h, y, k4);
   for (int i = 0; i < NX; i++) x[i] = x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
 }
 
 /* Rodas3: linearly implicit, 4 stages, order 3(2), L-stable; Sandu et al., Atmos. Environ. 31 (1997).
    e receives the difference to the embedded solution of order 2. */
-static void rodas3(const double *v, double t, double h, double *x, double *e) {
-  double f[NX], ft[NX], j[NJ + 1], w[NLU + 1], k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
-  const double *arg[] = {&t, x, v + IZ, v + IU, v + IP};
+static void rodas3(const Memory *m, double t, double h, double *x, double *e) {
+  double f[NX], ft[NX], j[NJ + 1], w[NLU + 1], k1[NX], k2[NX], k3[NX], k4[NX], y[NX], u[NU + 1];
+  const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
   double *res[] = {f, j, ft};
   const double ih = 1.0 / h;
   f_jacobian(arg, res, 0, 0, 0);
+  if (m->moving) { /* what the inputs add to df/dt, by a difference along their derivatives */
+    const double dt = t - m->v[0];
+    for (int i = 0; i < NU; i++) u[i] += h * (m->slope[i] + dt * m->curve[i]);
+    double *moved[] = {y};
+    f_derivatives(arg, moved, 0, 0, 0);
+    for (int i = 0; i < NX; i++) ft[i] += (y[i] - f[i]) * ih;
+  }
   f_factor(j, 2.0 * ih, w);
   for (int i = 0; i < NX; i++) k1[i] = f[i] + 0.5 * h * ft[i];
   f_solve(w, k1);
   for (int i = 0; i < NX; i++) k2[i] = f[i] + 4.0 * ih * k1[i] + 1.5 * h * ft[i];
   f_solve(w, k2);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 2.0 * k1[i];
-  derivatives(v, t + h, y, f);
+  derivatives(m, t + h, y, f);
   for (int i = 0; i < NX; i++) k3[i] = f[i] + ih * (k1[i] - k2[i]);
   f_solve(w, k3);
   for (int i = 0; i < NX; i++) y[i] = y[i] + k3[i];
-  derivatives(v, t + h, y, f);
+  derivatives(m, t + h, y, f);
   for (int i = 0; i < NX; i++) k4[i] = f[i] + ih * (k1[i] - k2[i] - (8.0 / 3.0) * k3[i]);
   f_solve(w, k4);
   for (int i = 0; i < NX; i++) {
@@ -297,37 +350,81 @@ static void rodas3(const double *v, double t, double h, double *x, double *e) {
 }
 
 /* Dormand-Prince, order 5(4). */
-static void dopri5(const double *v, double t, double h, double *x, double *e) {
+static void dopri5(const Memory *m, double t, double h, double *x, double *e) {
   double k1[NX], k2[NX], k3[NX], k4[NX], k5[NX], k6[NX], k7[NX], y[NX];
-  derivatives(v, t, x, k1);
+  derivatives(m, t, x, k1);
   for (int i = 0; i < NX; i++) y[i] = x[i] + h * (1.0 / 5.0 * k1[i]);
-  derivatives(v, t + 1.0 / 5.0 * h, y, k2);
+  derivatives(m, t + 1.0 / 5.0 * h, y, k2);
   for (int i = 0; i < NX; i++) y[i] = x[i] + h * (3.0 / 40.0 * k1[i] + 9.0 / 40.0 * k2[i]);
-  derivatives(v, t + 3.0 / 10.0 * h, y, k3);
+  derivatives(m, t + 3.0 / 10.0 * h, y, k3);
   for (int i = 0; i < NX; i++)
     y[i] = x[i] + h * (44.0 / 45.0 * k1[i] - 56.0 / 15.0 * k2[i] + 32.0 / 9.0 * k3[i]);
-  derivatives(v, t + 4.0 / 5.0 * h, y, k4);
+  derivatives(m, t + 4.0 / 5.0 * h, y, k4);
   for (int i = 0; i < NX; i++)
     y[i] = x[i] + h * (19372.0 / 6561.0 * k1[i] - 25360.0 / 2187.0 * k2[i] +
                        64448.0 / 6561.0 * k3[i] - 212.0 / 729.0 * k4[i]);
-  derivatives(v, t + 8.0 / 9.0 * h, y, k5);
+  derivatives(m, t + 8.0 / 9.0 * h, y, k5);
   for (int i = 0; i < NX; i++)
     y[i] = x[i] + h * (9017.0 / 3168.0 * k1[i] - 355.0 / 33.0 * k2[i] + 46732.0 / 5247.0 * k3[i] +
                        49.0 / 176.0 * k4[i] - 5103.0 / 18656.0 * k5[i]);
-  derivatives(v, t + h, y, k6);
+  derivatives(m, t + h, y, k6);
   for (int i = 0; i < NX; i++)
     x[i] = x[i] + h * (35.0 / 384.0 * k1[i] + 500.0 / 1113.0 * k3[i] + 125.0 / 192.0 * k4[i] -
                        2187.0 / 6784.0 * k5[i] + 11.0 / 84.0 * k6[i]);
-  derivatives(v, t + h, x, k7);
+  derivatives(m, t + h, x, k7);
   for (int i = 0; i < NX; i++)
     e[i] = h * (71.0 / 57600.0 * k1[i] - 71.0 / 16695.0 * k3[i] + 71.0 / 1920.0 * k4[i] -
                 17253.0 / 339200.0 * k5[i] + 22.0 / 525.0 * k6[i] - 1.0 / 40.0 * k7[i]);
 }
 
+/* ROS34PW2: linearly implicit W-method, 4 stages, order 3(2) whatever the matrix, L-stable with the
+   true Jacobian; Rang and Angermann, BIT 45 (2005). The Jacobian is an old one, f is taken at the
+   stages' own times. e receives the difference to the embedded solution of order 2. */
+enum { KEEP = 20 }; /* steps with one Jacobian */
+#define GAMMA 0.435866521508459
+
+static void rosw3(Memory *m, double t, double h, double *x, double *e) {
+  double k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
+  const double ih = 1.0 / h;
+  if (m->left == 0) {
+    double u[NU + 1], ft[NX];
+    const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
+    double *res[] = {k1, m->j, ft};
+    f_jacobian(arg, res, 0, 0, 0);
+    m->left = KEEP;
+    m->hw = 0;
+  }
+  if (!(fabs(h - m->hw) <= 1e-9 * h)) {
+    f_factor(m->j, ih / GAMMA, m->w);
+    m->hw = h;
+  }
+  derivatives(m, t, x, k1);
+  f_solve(m->w, k1);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + 2.0 * k1[i];
+  derivatives(m, t + 0.871733043016918 * h, y, k2);
+  for (int i = 0; i < NX; i++) k2[i] = k2[i] - ih * (4.588560720558084 * k1[i]);
+  f_solve(m->w, k2);
+  for (int i = 0; i < NX; i++) y[i] = x[i] + (1.4192173174557652 * k1[i] - 0.2592322116729698 * k2[i]);
+  derivatives(m, t + 0.7315799577888524 * h, y, k3);
+  for (int i = 0; i < NX; i++) k3[i] = k3[i] - ih * (4.184760482319161 * k1[i] - 0.285192017355496 * k2[i]);
+  f_solve(m->w, k3);
+  for (int i = 0; i < NX; i++)
+    y[i] = x[i] + (4.184760482319161 * k1[i] - 0.285192017355496 * k2[i] + 2.2942803602790423 * k3[i]);
+  derivatives(m, t + h, y, k4);
+  for (int i = 0; i < NX; i++)
+    k4[i] = k4[i] - ih * (6.36817920012836 * k1[i] + 6.795620944466837 * k2[i] - 2.870098604331055 * k3[i]);
+  f_solve(m->w, k4);
+  for (int i = 0; i < NX; i++) {
+    x[i] = y[i] + k4[i];
+    e[i] = 0.27774994764797034 * k1[i] - 1.4032398951759986 * k2[i] + 1.7726301276675511 * k3[i] + 0.5 * k4[i];
+  }
+  m->left -= 1;
+}
+
 /* Error-controlled integration from the present time to t1; steps are at most solver.step long. */
 static int adaptive(Instance *c, double t1) {
   double *v = c->m.v, x[NX], e[NX], t = v[0];
-  const int implicit = v[METHOD] == RODAS3_ADAPTIVE;
+  const int implicit = v[METHOD] != DOPRI5, kept = v[METHOD] == ROSW3_ADAPTIVE;
   double h = c->m.h > 0 ? c->m.h : 0.1 * v[STEP];
   const double exponent = implicit ? -1.0 / 3.0 : -1.0 / 5.0;
   while (t < t1) {
@@ -335,8 +432,9 @@ static int adaptive(Instance *c, double t1) {
     const int last = t + h * (1 + 1e-9) >= t1;
     const double hs = last ? t1 - t : h;
     memcpy(x, v + IX, sizeof x);
-    if (implicit) rodas3(v, t, hs, x, e);
-    else dopri5(v, t, hs, x, e);
+    if (kept) rosw3(&c->m, t, hs, x, e);
+    else if (implicit) rodas3(&c->m, t, hs, x, e);
+    else dopri5(&c->m, t, hs, x, e);
     double error = 0;
     for (int i = 0; i < NX; i++) {
       if (OWNER[i] && v[OWNER[i]] == 0) continue; /* state of an effect that is absent */
@@ -347,6 +445,9 @@ static int adaptive(Instance *c, double t1) {
     if (error <= 1) {
       memcpy(v + IX, x, sizeof x);
       t = last ? t1 : t + hs;
+    } else if (kept && c->m.left < KEEP - 1) {
+      c->m.left = 0; /* perhaps the Jacobian was too old: once more with a new one */
+      continue;
     }
     double factor = isfinite(error) ? 0.9 * pow(error + 1e-10, exponent) : 0.1;
     if (factor > 5) factor = 5;
@@ -376,15 +477,15 @@ static int integrate(Instance *c, double t1) {
     double e[NX];
     for (int i = 0; i < n; i++) {
       const double t = t0 + i * h;
-      if (v[METHOD] == RK4) rk4(v, t, h, v + IX);
-      else rodas3(v, t, h, v + IX, e);
+      if (v[METHOD] == RK4) rk4(&c->m, t, h, v + IX);
+      else rodas3(&c->m, t, h, v + IX, e);
     }
   } else {
     const int status = adaptive(c, t1);
     if (status != OK) return status;
   }
 #endif
-  v[0] = t1;
+  move_on(&c->m, t1);
   c->m.stale = 1;
   const int status = check_finite(c, IX, NX);
   if (status != OK) v[0] = t0;

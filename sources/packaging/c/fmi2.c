@@ -238,10 +238,7 @@ EXPORT fmi2Status fmi2DoStep(Instance *c, double t, double h, fmi2Boolean no_rol
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(Instance *c, const uint32_t vr[], size_t n, const int order[],
                                               const double values[]) {
-  (void)vr;
-  (void)order;
-  (void)values;
-  return n ? report(c, ERROR, "%s: inputs are not interpolated", MODEL) : OK;
+  return set_input_derivatives(c, vr, n, order, values);
 }
 
 EXPORT fmi2Status fmi2GetRealOutputDerivatives(Instance *c, const uint32_t vr[], size_t n, const int order[],
