@@ -1,255 +1,278 @@
 """Error of the coupling against the same equations solved as one, and energy that it invents.
 
-    python -m benchmarks.coupling [SYSTEM ...] [--quick] [--steps SECONDS ...]
+    python -m benchmarks.coupling [CASE ...] [--quick] [--steps SECONDS ...]
 
-For each system: largest error of signals over algorithms and communication steps, the order
-measured from step to step, and the energy invented relative to the energy dissipated. The
-monolithic solution composes the variants' equations, outputs evaluated in the order of direct
-feedthrough, and solves them with SciPy at a relative tolerance of 1e-9.
+A case is a system (`motor_bench`, `ur5_bench`), or a run of a scenario at its own values
+(`mobile_manipulator/IY`). Its table has, over algorithms and communication steps, the largest error
+of positions, heading and currents, the order measured from step to step, the energy invented
+relative to the energy dissipated, and how many times faster than real time it ran (processor time
+of one core). The line with an arrow is the scenario's own algorithm and step.
+
+The reference is the monolithic solution: the variants' equations composed, outputs in the order of
+direct feedthrough, solved with SciPy's Radau at a relative tolerance of 1e-9. Runs of a scenario
+are long; there it is the system's own solution at 20 us, and the first line says how far that is
+from the monolithic one over the first half second.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
+from benchmarks.monolith import Monolith
+from cosim import scenario as scenarios
+from cosim.cli import default_provider
 from cosim.errors import CosimError
-from cosim.master import Master
-from cosim.provider import FolderProvider
+from cosim.master import Driver, Master
+from cosim.recording import Recording
+from cosim.session import Session
+from cosim.signals import Constant
 from cosim.system import System
 from cosim.system_file import read_system
-from sources.function import Functions, build_functions
-from sources.model import Model
+from cosim.variants import apply
 from sources.variant import build_model
 
+__all__ = ["Monolith"]
 ROOT = Path(__file__).resolve().parents[1]
-RASTER = 0.01
+RASTER = 2e-3
+"""Instants at which errors are taken [s]."""
+FINE = 2e-5
+"""Step of the system's own reference [s]."""
+CHECKED = 0.5
+"""Time over which that is compared with the monolithic solution [s]."""
 Vector = NDArray[np.float64]
 
 
-class Monolith:
-    """The equations of a system as one, for systems without sampled parts."""
+@dataclass(frozen=True)
+class Column:
+    """Signals whose largest error makes one column.
 
-    def __init__(self, system: System, inputs: dict[str, float]) -> None:
-        self.system = system
-        self.models: dict[str, Model] = {}
-        self.functions: dict[str, Functions] = {}
-        self.start: list[float] = []
-        self.scale: list[float] = []
-        states: dict[str, Any] = {}
-        for member in system.members.values():
-            model = build_model(member.description.name)
-            if model.of_role("discrete"):
-                raise ValueError(f"{member.name} ({member.description.name}) samples")
-            self.models[member.name], self.functions[member.name] = model, build_functions(model)
-            given = member.parameters
-            names = [v.name for v in model.of_role("state")]
-            states[member.name] = ca.SX.sym(member.name, len(names))
-            self.start += [float(given.get(v.name, v.start)) for v in model.of_role("state")]
-            self.scale += [float(v.quantity.nominal or 1.0) for v in model.of_role("state")]
-        self.t = ca.SX.sym("t")
-        self.known: dict[str, Any] = {}
-        self.states = states
-        wires = {c.target: c for c in system.connections}
-        waiting = {
-            f"{name}.{v.name}" for name, m in self.models.items() for v in m.of_role("output")
-        }
-        while waiting:
-            before = len(waiting)
-            for name, model in self.models.items():
-                u, missing = self._inputs(name, wires, inputs)
-                depends = self.functions[name].output_dependencies
-                ready = [
-                    (i, v.name)
-                    for i, v in enumerate(model.of_role("output"))
-                    if f"{name}.{v.name}" in waiting and not missing & set(depends[v.name])
-                ]
-                if ready:
-                    _, y = self._call(name, u)
-                    for i, output in ready:
-                        self.known[f"{name}.{output}"] = y[i]
-                        waiting.discard(f"{name}.{output}")
-            if len(waiting) == before:
-                raise ValueError(f"algebraic loop through {sorted(waiting)[:4]}")
-        rates = [self._call(name, self._inputs(name, wires, inputs)[0])[0] for name in self.models]
-        x = ca.vertcat(*states.values())
-        rate = ca.vertcat(*rates)
-        self.rate = ca.Function("rate", [self.t, x], [rate])
-        self.jacobian = ca.Function("jacobian", [self.t, x], [ca.jacobian(rate, x)])
-        self.x = x
+    Attributes:
+        title: with the unit that is shown.
+        signals: full names.
+        scale: from the signals' unit to the one that is shown.
+        allowed: error that coupling may add, one tenth of the sensor's noise, as shown.
+    """
 
-    def _inputs(
-        self, name: str, wires: dict[str, Any], inputs: dict[str, float]
-    ) -> tuple[list[Any], set[str]]:
-        values: list[Any] = []
-        missing = set()
-        given = self.system.members[name].parameters
-        for v in self.models[name].of_role("input"):
-            wire = wires.get(f"{name}.{v.name}")
-            if wire is None:
-                values.append(inputs.get(f"{name}.{v.name}", given.get(v.name, v.start)))
-            elif wire.source in self.known:
-                values.append(self.known[wire.source] * wire.gain + wire.offset)
-            else:
-                values.append(0.0)
-                missing.add(v.name)
-        return values, missing
-
-    def _call(self, name: str, u: list[Any]) -> tuple[Any, Any]:
-        given = self.system.members[name].parameters
-        p = [float(given.get(v.name, v.start)) for v in self.models[name].of_role("parameter")]
-        column = ca.vertcat(*u) if u else ca.SX(0, 1)
-        parameters = ca.DM(p) if p else ca.DM(0, 1)
-        rate, y = self.functions[name].outputs(
-            self.t, self.states[name], ca.DM(0, 1), column, parameters
-        )
-        return rate, y
-
-    def solve(self, times: Vector, signals: Sequence[str], rtol: float = 1e-9) -> Vector:
-        """Signals at these times."""
-        found = solve_ivp(
-            lambda t, x: np.asarray(self.rate(t, x)).ravel(),
-            (float(times[0]), float(times[-1])),
-            self.start,
-            method="Radau",
-            t_eval=times,
-            rtol=rtol,
-            atol=1e-3 * rtol * np.array(self.scale),
-            jac=lambda t, x: np.asarray(self.jacobian(t, x)),
-            max_step=RASTER,
-        )
-        if not found.success:
-            raise ValueError(found.message)
-        wanted = ca.vertcat(*[self.known[signal] for signal in signals])
-        outputs = ca.Function("y", [self.t, self.x], [wanted])
-        states = zip(times, found.y.T, strict=True)
-        return np.array([np.asarray(outputs(t, x)).ravel() for t, x in states])
+    title: str
+    signals: tuple[str, ...]
+    scale: float
+    allowed: float
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is run of a system; `swap` replaces sampled variants by those in continuous time."""
+    """What is run of a system.
 
+    Attributes:
+        system: without sampled parts that nothing depends on.
+        duration: [s].
+        columns: what is compared.
+        inputs: of open inputs.
+        usual: algorithm, options and step of the scenario.
+        steps: communication steps [s].
+        long: the reference is the system's own solution.
+    """
+
+    system: System
     duration: float
-    signals: dict[str, float]
-    inputs: dict[str, float] = field(default_factory=dict)
-    swap: dict[str, str] = field(default_factory=dict)
-    drop: tuple[str, ...] = ()
-    steps: tuple[float, ...] = (2e-3, 1e-3, 5e-4)
+    columns: tuple[Column, ...]
+    inputs: Mapping[str, Driver] = field(default_factory=dict)
+    usual: tuple[str, Mapping[str, Any], float] | None = None
+    steps: tuple[float, ...] = (2e-3, 1e-3, 5e-4, 2.5e-4)
+    long: bool = False
 
 
-CASES = {
-    "motor_bench": Case(
-        0.5,
-        {"load.w": 0.15, "motor.i": 0.06},
-        {"motor.w_ref": 40.0},
-        {"motor": "dc_motor.lab_bench/electrical"},
-        ("encoder",),
-        (2e-3, 1e-3, 5e-4, 1e-4),
-    ),
-    "ur5_bench": Case(2.0, {"arm.q[1]": 5e-4, "arm.q[2]": 5e-4, "drive.i[2]": 0.06}),
-    "mir250": Case(2.0, {"base.x": 3e-4, "base.phi": 5e-4, "motor_left.i": 0.06}),
-    "mobile_manipulator": Case(1.0, {"base.x": 3e-4, "base.phi": 5e-4, "arm.q[2]": 5e-4}),
-}
-"""Signals with the noise of their sensors, one tenth of which is what coupling may add."""
 ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("jacobi", {}),
     ("gauss_seidel", {}),
     ("jacobi", {"extrapolation": 1}),
     ("gauss_seidel", {"extrapolation": 1}),
+    ("gauss_seidel", {"extrapolation": 2}),
     ("iterated", {}),
+)
+SYSTEMS = ("motor_bench", "ur5_bench")
+RUNS = tuple(
+    [f"mir250/{run}" for run in ("IN1", "IN2", "CN1", "CN2")]
+    + [f"mobile_manipulator/{run}" for run in ("IN1", "IN2", "CN1", "CN2", "IY", "CY")]
 )
 
 
-def build(name: str, case: Case) -> System:
-    """The system of a case, without sampled parts that nothing depends on."""
+def bench(name: str) -> Case:
+    """A system of the library at its own values."""
     document = read_system(ROOT / "scenarios" / "systems" / f"{name}.toml")
-    system = System(name, FolderProvider(ROOT / "fmus"))
-    drivers = {wire.source.partition(".")[0] for wire in document.connections}
-    for instance, reference in document.instances.items():
-        ends = instance not in drivers and build_model(reference).of_role("discrete")
-        if instance not in case.drop and not ends:
-            system.add(instance, case.swap.get(instance, reference))
-    for key, value in document.parameters.items():
-        if key.partition(".")[0] in system.members:
-            system.set(key, value)
-    for wire in document.connections:
-        if all(end.partition(".")[0] in system.members for end in (wire.source, wire.target)):
-            system.connect(
-                wire.source, wire.target, factor=wire.factor, offset=wire.offset,
-                convert=wire.convert,
-            )  # fmt: skip
-    return system
+    if name == "motor_bench":  # the motor that is not sampled
+        document = replace(
+            document,
+            instances={**document.instances, "motor": "dc_motor.lab_bench/electrical"},
+        )
+        columns = (
+            Column("load [rad/s]", ("load.w",), 1.0, 0.015),
+            Column("current [mA]", ("motor.i",), 1e3, 6.0),
+        )
+        inputs: dict[str, Driver] = {"motor.w_ref": 40.0}
+    else:
+        columns = (
+            Column("joints [mrad]", tuple(f"arm.q[{i}]" for i in range(1, 7)), 1e3, 0.05),
+            Column("currents [mA]", tuple(f"drive.i[{i}]" for i in range(1, 7)), 1e3, 6.0),
+        )
+        inputs = {}
+    system = unsampled(document.build(default_provider()))
+    return Case(system, 0.5 if inputs else 2.0, columns, inputs)
+
+
+def of_scenario(name: str) -> Case:
+    """A run of a scenario as it is."""
+    file, run = scenarios.find(name, None)
+    item = file.scenario(run)
+    provider = default_provider()
+    instances = apply(item.system.instances, item.variants, provider, item.folder)
+    system = replace(item.system, instances=instances, parameters={}).build(provider)
+    for key, value in {**item.system.parameters, **item.parameters}.items():
+        system.set(key, value)
+    system = unsampled(system)
+    columns = [
+        Column("x, y [mm]", ("base.x", "base.y"), 1e3, 0.03),
+        Column("heading [mrad]", ("base.phi",), 1e3, 0.05),
+        Column("motors [mA]", ("motor_left.i", "motor_right.i"), 1e3, 6.0),
+    ]
+    if "drive" in system.members:
+        tool = tuple(f"arm.tool_position[{i}]" for i in range(1, 4))
+        columns.append(Column("tool [mm]", tool, 1e3, 0.03))
+        arm = tuple(f"drive.i[{i}]" for i in range(1, 7))
+        columns.append(Column("arm [mA]", arm, 1e3, 6.0))
+    usual = (item.algorithm, item.options, item.step)
+    return Case(system, item.duration, tuple(columns), item.inputs, usual, long=True)
+
+
+def unsampled(system: System) -> System:
+    """The system without sampled parts that nothing depends on (sensors with a rate)."""
+    drivers = {wire.source.partition(".")[0] for wire in system.connections}
+    kept = [
+        member
+        for name, member in system.members.items()
+        if name in drivers or not build_model(member.description.name).of_role("discrete")
+    ]
+    found = System(system.name, system.provider)
+    for member in kept:
+        found.add(member.name, member.reference, member.parameters)
+    for wire in system.connections:
+        if wire.target.partition(".")[0] in found.members:
+            # factors of unit conversions are in the gain already
+            found.connect(
+                wire.source, wire.target, factor=wire.gain, offset=wire.offset, convert=False
+            )
+    return found
+
+
+def constants(inputs: Mapping[str, Driver]) -> dict[str, float]:
+    """Inputs as numbers, for the monolithic solution."""
+    found = {}
+    for name, driver in inputs.items():
+        value = driver.value if isinstance(driver, Constant) else driver
+        if not isinstance(value, int | float):
+            raise ValueError(f"{name} is not constant")
+        found[name] = float(value)
+    return found
+
+
+def reference(case: Case, signals: list[str]) -> tuple[Vector, str]:
+    """Signals on the raster, and how they were found."""
+    begin = time.process_time()
+    times = RASTER * np.arange(round(case.duration / RASTER) + 1, dtype=np.float64)
+    if not case.long:
+        exact = Monolith(case.system, constants(case.inputs)).solve(times, signals)
+        return exact, f"the monolithic solution ({time.process_time() - begin:.0f} s)"
+    fine = run(case, "gauss_seidel", {"extrapolation": 2}, FINE, signals)[0].values
+    count = round(CHECKED / RASTER) + 1
+    text = "its own solution at 20 us"
+    try:
+        exact = Monolith(case.system, constants(case.inputs)).solve(times[:count], signals)
+    except ValueError as error:
+        return fine, f"{text}; no monolithic one: {error}"
+    apart = errors(case, signals, fine[:count], exact)
+    told = ", ".join(f"{e:.1e} {c.title}" for e, c in zip(apart, case.columns, strict=True))
+    return fine, f"{text}, which is {told} from the monolithic one over {CHECKED:g} s"
+
+
+def errors(case: Case, signals: list[str], values: Vector, exact: Vector) -> Vector:
+    """Largest error per column."""
+    apart = np.max(np.abs(values - exact), axis=0)
+    return np.array(
+        [c.scale * max(apart[signals.index(name)] for name in c.signals) for c in case.columns]
+    )
+
+
+def run(
+    case: Case, algorithm: str, options: Mapping[str, Any], step: float, signals: list[str]
+) -> tuple[Recording, float]:
+    """Recording on the raster, and processor time without set-up [s]."""
+    master = Master(case.system, algorithm, step, options=options)
+    every = round(RASTER / step)
+    recording = master.run(case.duration, inputs=case.inputs, record=signals, every=every)
+    with Session(master, case.duration, inputs=case.inputs, record=signals, every=every) as session:
+        session.run()
+        begin = time.process_time()
+        session.run()
+        return recording, time.process_time() - begin
 
 
 def table(name: str, case: Case, quick: bool = False) -> None:
-    """Print the table of a system."""
-    system = build(name, case)
-    signals = list(case.signals)
-    times = RASTER * np.arange(round(case.duration / RASTER) + 1, dtype=np.float64)
-    begin = time.perf_counter()
-    try:
-        exact = Monolith(system, case.inputs).solve(times, signals)
-        how = "monolithic solution"
-    except ValueError as error:
-        fine = Master(system, "jacobi", 2e-5, options={"extrapolation": 1})
-        exact = fine.run(
-            case.duration, inputs=case.inputs, record=signals, every=round(RASTER / 2e-5)
-        ).values
-        how = f"own solution at 20 µs, since there is no monolithic one: {error}"
-    print(f"\n{name}, {case.duration:g} s, against the {how} ({time.perf_counter() - begin:.1f} s)")
-    head = "".join(f"{signal:>16s}" for signal in signals)
-    print(f"{'algorithm':<26s}{'step':>8s}{head}{'order':>7s}{'energy':>10s}{'run s':>8s}")
-    losses = [f"{n}.P_loss" for n, m in system.members.items()
+    """Print the table of a case."""
+    signals = [signal for column in case.columns for signal in column.signals]
+    exact, how = reference(case, signals)
+    print(f"\n{name}, {case.duration:g} s, against {how}")
+    head = "".join(f"{column.title:>16s}" for column in case.columns)
+    print(f"  {'algorithm':<28s}{'step':>8s}{head}{'order':>7s}{'energy':>10s}{'x real':>8s}")
+    losses = [f"{n}.P_loss" for n, m in case.system.members.items()
               if "P_loss" in m.description.variables]  # fmt: skip
-    for algorithm, options in ALGORITHMS[: 3 if quick else None]:
-        label = algorithm + "".join(f" {k} {v}" for k, v in options.items())
+    for algorithm, options in ALGORITHMS:
+        if quick and algorithm == "iterated":
+            continue
         last: tuple[float, Vector] | None = None
-        for h in case.steps:
-            begin = time.perf_counter()
+        for step in case.steps:
+            label = algorithm + "".join(f" {k} {v}" for k, v in options.items())
+            own = case.usual == (algorithm, options, step)
+            label = ("> " if own else "  ") + f"{label:<28s}{step * 1e3:>6g}ms"
             try:
-                run = Master(system, algorithm, h, options=options).run(
-                    case.duration, inputs=case.inputs, record=[*signals, *losses],
-                    every=round(RASTER / h),
-                )  # fmt: skip
+                found, cost = run(case, algorithm, options, step, [*signals, *losses])
             except CosimError as error:
-                print(f"{label:<26s}{h * 1e3:>6g}ms  {str(error).splitlines()[0][:90]}")
+                print(f"{label}  {str(error).splitlines()[0][:90]}")
+                last = None
                 continue
-            cost = time.perf_counter() - begin
-            errors = np.max(np.abs(run.values[:, : len(signals)] - exact), axis=0)
-            lost = float(np.sum(np.trapezoid(run.values[:, len(signals) :], run.time, axis=0)))
-            energy = sum(run.bond_energy.values()) / lost if lost else np.nan
+            apart = errors(case, signals, found.values[:, : len(signals)], exact)
+            lost = float(np.sum(np.trapezoid(found.values[:, len(signals) :], found.time, axis=0)))
+            energy = sum(found.bond_energy.values()) / lost if lost else np.nan
             order = "-"
             if last is not None:
-                slope = np.log(last[1] / errors) / np.log(last[0] / h)
-                order = f"{float(np.mean(slope)):.2f}"
+                slope = np.log(last[1] / apart) / np.log(last[0] / step)
+                order = f"{float(np.mean(slope)):.1f}"
             columns = "".join(
-                f"{e:>15.2e}{'*' if e < 0.1 * case.signals[s] else ' '}"
-                for e, s in zip(errors, signals, strict=True)
+                f"{e:>15.2e}{'*' if e < column.allowed else ' '}"
+                for e, column in zip(apart, case.columns, strict=True)
             )
-            print(f"{label:<26s}{h * 1e3:>6g}ms{columns}{order:>7s}{energy:>10.1e}{cost:>8.2f}")
-            last = (h, errors)
+            speed = case.duration / cost
+            print(f"{label}{columns}{order:>7s}{energy:>10.1e}{speed:>8.0f}", flush=True)
+            last = (step, apart)
     print("* below one tenth of the sensor's noise")
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("systems", nargs="*", choices=[*CASES, []])
-    parser.add_argument("--quick", action="store_true", help="fewer algorithms")
+    parser.add_argument("cases", nargs="*", help=f"of {', '.join((*SYSTEMS, *RUNS))}")
+    parser.add_argument("--quick", action="store_true", help="without iterated coupling")
     parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
     arguments = parser.parse_args()
-    for name in arguments.systems or CASES:
-        case = CASES[name]
+    for name in arguments.cases or (*SYSTEMS, *RUNS):
+        case = bench(name) if name in SYSTEMS else of_scenario(name)
         if arguments.steps:
             case = replace(case, steps=tuple(arguments.steps))
         table(name, case, arguments.quick)

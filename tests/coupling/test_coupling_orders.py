@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.monolith import Monolith
 from cosim.errors import InputError, StepError, UnknownNameError, ValueRangeError
 from cosim.master import Master
 from cosim.recording import Recording
@@ -41,11 +42,11 @@ def run(provider, algorithm: str, h: float, executor: str = "auto", **options) -
 
 @pytest.fixture(scope="module")
 def reference() -> np.ndarray:
-    """End values for ever smaller steps, by Richardson extrapolation of a second-order method."""
+    """The same equations solved as one, every 5 ms."""
     from tests.coupling.conftest import Built
 
-    coarse, fine = (run(Built(), "iterated", h, tolerance=1e-12) for h in (2e-4, 1e-4))
-    return fine.values[-1] + (fine.values[-1] - coarse.values[-1]) / 3.0
+    times = 5e-3 * np.arange(21)
+    return Monolith(drive(Built()), INPUTS).solve(times, SIGNALS, rtol=1e-11)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +54,7 @@ def reference() -> np.ndarray:
     [
         ("jacobi", {}, 1.0),
         ("jacobi", {"extrapolation": 1}, 2.0),
-        ("jacobi", {"extrapolation": 2}, 2.0),  # the mean over a step is of second order itself
+        ("jacobi", {"extrapolation": 2}, 2.0),
         ("gauss_seidel", {}, 1.0),
         ("gauss_seidel", {"extrapolation": 1}, 2.0),
         ("gauss_seidel", {"extrapolation": 2}, 2.0),
@@ -62,11 +63,13 @@ def reference() -> np.ndarray:
 )
 def test_order_of_the_motor_bench(provider, reference, algorithm, options, order) -> None:
     steps = np.array([1e-3, 5e-4, 2.5e-4])
-    errors = [
-        np.abs(run(provider, algorithm, h, **options).values[-1] - reference)[0] for h in steps
-    ]
+    errors = []
+    for h in steps:
+        found = run(provider, algorithm, h, **options).values[:: round(5e-3 / h)]
+        errors.append(np.max(np.abs(found - reference), axis=0)[0])
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert slope == pytest.approx(order, abs=0.35)  # 1 ms is not small against the current loop
+    # 1 ms is not small against the current loop; parabolas do better than their order asks for
+    assert order - 0.35 < slope < order + (1.5 if options.get("extrapolation") == 2 else 0.35)
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.coupling import Monolith
+from benchmarks.monolith import Monolith
 from cosim.master import Master
 from tests.coupling.test_coupling_orders import INPUTS, SIGNALS, drive
 
