@@ -35,7 +35,7 @@ class Monolith:
             if model.of_role("discrete"):
                 raise ValueError(f"{member.name} ({member.description.name}) samples")
             self.models[member.name], self.functions[member.name] = model, build_functions(model)
-            given = member.parameters
+            given = scalars(member.parameters)
             names = [v.name for v in model.of_role("state")]
             states[member.name] = ca.SX.sym(member.name, len(names))
             self.start += [float(given.get(v.name, v.start)) for v in model.of_role("state")]
@@ -76,7 +76,7 @@ class Monolith:
     ) -> tuple[list[Any], set[str]]:
         values: list[Any] = []
         missing = set()
-        given = self.system.members[name].parameters
+        given = scalars(self.system.members[name].parameters)
         for v in self.models[name].of_role("input"):
             wire = wires.get(f"{name}.{v.name}")
             if wire is None:
@@ -89,7 +89,7 @@ class Monolith:
         return values, missing
 
     def _call(self, name: str, u: list[Any]) -> tuple[Any, Any]:
-        given = self.system.members[name].parameters
+        given = scalars(self.system.members[name].parameters)
         p = [float(given.get(v.name, v.start)) for v in self.models[name].of_role("parameter")]
         column = ca.vertcat(*u) if u else ca.SX(0, 1)
         parameters = ca.DM(p) if p else ca.DM(0, 1)
@@ -117,3 +117,14 @@ class Monolith:
         outputs = ca.Function("y", [self.t, self.x], [wanted])
         states = zip(times, found.y.T, strict=True)
         return np.array([np.asarray(outputs(t, x)).ravel() for t, x in states])
+
+
+def scalars(values: Mapping[str, Any]) -> dict[str, float]:
+    """Values by scalar name: those of a vector `q` belong to `q[1]`, `q[2]`, ..."""
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        if isinstance(value, list | tuple):
+            found |= {f"{name}[{i}]": float(item) for i, item in enumerate(value, start=1)}
+        else:
+            found[name] = float(value)
+    return found

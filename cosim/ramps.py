@@ -83,8 +83,5 @@ def bend(a: float, b: float, c: float, d: float) -> float:
     and the straight line takes its place.
     """
     last, before = a - 2.0 * b + c, b - 2.0 * c + d
-    if last > 0.0 and before > 0.0:
-        return last if last < before else before
-    if last < 0.0 and before < 0.0:
-        return last if last > before else before
-    return 0.0
+    nearer = last if abs(last) < abs(before) else before
+    return nearer if last * before > 0.0 else 0.0

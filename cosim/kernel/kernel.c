@@ -250,9 +250,8 @@ static void add_energy(Run *run, int held) {
 /* Of the last two second differences the one nearer to 0, and 0 if their signs differ; newest first. */
 static double bend(double a, double b, double c, double d) {
   const double last = a - 2.0 * b + c, before = b - 2.0 * c + d;
-  if (last > 0.0 && before > 0.0) return last < before ? last : before;
-  if (last < 0.0 && before < 0.0) return last > before ? last : before;
-  return 0.0;
+  const double nearer = fabs(last) < fabs(before) ? last : before; /* no branches: signs are random */
+  return last * before > 0.0 ? nearer : 0.0;
 }
 
 /* Inputs by the polynomial through the last values of their source: its mean over the step, or

@@ -1,0 +1,118 @@
+"""How much faster than real time a scenario runs, and where the time goes.
+
+    python -m benchmarks.speed [RUN] [--duration SECONDS] [--repeats N]
+
+Set-up is left out. One core: least processor time of several runs. Two at once: two prepared runs
+in two threads against one after the other, wall time, best of several. Shares: from half way into
+the run on, each FMU alone is given the same inputs with the same slopes again and again (set, step,
+get); what is left is the kernel's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from benchmarks.coupling import of_scenario
+from cosim import kernel
+from cosim.execution import Execution
+from cosim.master import Master
+from cosim.plan import Op, operations
+from cosim.session import Session
+
+RECORD = ["base.x"]
+
+
+def prepared(name: str, duration: float) -> tuple[Master, dict[str, Any]]:
+    """The master of a run and how its sessions are made."""
+    case = of_scenario(name)
+    if case.usual is None:
+        raise ValueError(f"{name} is no run of a scenario")
+    algorithm, options, step = case.usual
+    settings = {"duration": duration, "inputs": case.inputs, "record": RECORD, "every": 5}
+    return Master(case.system, algorithm, step, options=options), settings
+
+
+def least(function: Callable[[], object], repeats: int, clock: Callable[[], float]) -> float:
+    """Least time of several calls [s]."""
+    best = float("inf")
+    for _ in range(repeats):
+        begin = clock()
+        function()
+        best = min(best, clock() - begin)
+    return best
+
+
+def at_once(sessions: list[Session]) -> None:
+    """Run the sessions in threads."""
+    threads = [threading.Thread(target=session.run) for session in sessions]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def shares(master: Master, settings: dict[str, Any], repeats: int) -> dict[str, float]:
+    """Processor time per communication step of each FMU [s]."""
+    found = {}
+    with Session(master, **settings) as session:
+        run: Execution = session._run
+        run.restart()
+        run.initialize()
+        half = session.count // 2
+        advance = run.executor()
+        advance(half)
+        steps = min(500, (session.count - half) // repeats)
+        for index, name in enumerate(run.layout.instances):
+            ramps = [
+                (a, b) for op, a, b in run.plan.step.tolist()
+                if op == Op.RAMP and run.plan.means[a].instance == index
+            ]  # fmt: skip
+            own = [(Op.SET, index, 0), *((Op.RAMP, a, b) for a, b in ramps)]
+            rows = [*own, (Op.STEP, index, 0), (Op.GET, index, 0)]
+            plan = replace(run.plan, step=operations(rows))
+            alone = kernel.Kernel(
+                plan, run.instances, run.outputs, run.inputs, run.values, run.times, master.step,
+                run.external, run.rows, run.bond_energy, run.every, run.newtons, run.history,
+                run.past, run.ramps, run.bond_mean,
+            )  # fmt: skip
+            alone.run.index = half
+            times = []
+            for _ in range(repeats):
+                begin = time.process_time()
+                alone.advance(int(alone.run.index) + steps)
+                times.append(time.process_time() - begin)
+            found[name] = min(times) / steps
+    return found
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("run", nargs="?", default="mobile_manipulator/IY")
+    parser.add_argument("--duration", type=float, default=30.0, help="simulated time [s]")
+    parser.add_argument("--repeats", type=int, default=5)
+    arguments = parser.parse_args()
+    master, settings = prepared(arguments.run, arguments.duration)
+    duration, steps = arguments.duration, round(arguments.duration / master.step)
+    with Session(master, **settings) as first, Session(master, **settings) as second:
+        alone = least(first.run, arguments.repeats, time.process_time)
+        both = [first, second]
+        single = least(first.run, arguments.repeats, time.perf_counter)
+        double = least(lambda: at_once(both), arguments.repeats, time.perf_counter)
+    options = "".join(f" {key} {value}" for key, value in master.options.items())
+    print(f"{arguments.run}, {duration:g} s, {master.algorithm}{options}, {master.step * 1e3:g} ms")
+    print(f"one core: {duration / alone:.0f} x real time ({alone / steps * 1e6:.1f} us per step)")
+    print(f"two at once in threads: {2 * single / double:.2f} x as fast as one after the other")
+    costs = shares(master, settings, 3)
+    costs["kernel"] = max(alone / steps - sum(costs.values()), 0.0)
+    for name, cost in sorted(costs.items(), key=lambda item: -item[1]):
+        print(f"  {name:<16s}{cost * 1e6:>8.2f} us{cost * steps / alone:>8.1%}")
+
+
+if __name__ == "__main__":
+    main()
