@@ -233,7 +233,7 @@ def table(name: str, case: Case, quick: bool = False) -> None:
     losses = [f"{n}.P_loss" for n, m in case.system.members.items()
               if "P_loss" in m.description.variables]  # fmt: skip
     for algorithm, options in ALGORITHMS:
-        if quick and algorithm == "iterated":
+        if algorithm == "iterated" and (quick or case.long):  # runs in Python: minutes
             continue
         last: tuple[float, Vector] | None = None
         for step in case.steps:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
@@ -91,11 +92,25 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def build_faulty(folder: Path) -> Path:
-    """Build it for this machine. It claims states and derivatives, and refuses both."""
+def build_faulty(folder: Path, **claims: str) -> Path:
+    """Build it for this machine. It claims states and derivatives, and refuses both.
+
+    Args:
+        folder: where it goes.
+        claims: other capabilities, or other values of them.
+    """
     binary = compile_c({"faulty.c": CODE}, "faulty.c", "faulty", host_platform())
     path = folder / "faulty.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", XML)
+        archive.writestr("modelDescription.xml", claiming(claims))
         archive.writestr("binaries/linux64/faulty.so", binary)
     return path
+
+
+def claiming(claims: dict[str, str]) -> str:
+    """The model description with these capabilities of the co-simulation interface."""
+    root = ET.fromstring(XML)
+    interface = root.find("CoSimulation")
+    assert interface is not None
+    interface.attrib.update(claims)
+    return ET.tostring(root, encoding="unicode")

@@ -84,7 +84,7 @@ def test_error_falls_with_the_order(name: str, method: str, order: int) -> None:
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
-@pytest.mark.parametrize("method", ["dopri5", "rodas3_adaptive"])
+@pytest.mark.parametrize("method", ["dopri5", "rodas3_adaptive", "rosw3_adaptive"])
 def test_error_follows_the_tolerance(name: str, method: str) -> None:
     tolerances = 10.0 ** -np.arange(5, 11)
     settings = {"solver.method": METHODS[method][0], "solver.step": CASES[name][1]}
