@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..coupling import interpolates, means, ramps
+from ..coupling import means, ramps
 from ..loops import consistent, find_loops, reached
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 from ..system import System
@@ -36,10 +36,9 @@ def compile_plan(
     extrapolated, spans = means(system, layout, extrapolation, system.order())
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
-    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too;
-    # where all inputs move, outputs are those of the inputs at the end already
-    moving = bool(extrapolated) and all(interpolates(system, name) for name in system.members)
-    after = consistent(system, layout, loops, only_loops=True) if moving else fresh
+    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too.
+    # Inputs that moved there would nearly do; but a chain of feedthrough (gearboxes) extrapolates
+    # a signal twice then, and the speed loop of a slipping wheel becomes unstable
     again = extrapolation == 0 or reached(system, layout)
     step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
     if extrapolated:
@@ -51,13 +50,13 @@ def compile_plan(
         if spans[index][0] < spans[index][1]:
             step.append((Op.EXTRAPOLATE, *spans[index]))
         step += [set_, *ramps(extrapolated, spans, index), (Op.STEP, index), (Op.GET, index)]
-    step += [(Op.HOLD,), *after, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
+    step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "gauss_seidel",
         layout,
         initial_sweep(system, layout),
         operations(step),
-        final_operations(fresh if again else after),
+        final_operations(fresh),
         tuple(loop for _, loop in loops),
         operations(consistent(system, layout, loops, only_loops=False)),
         tuple(extrapolated),

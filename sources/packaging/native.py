@@ -93,6 +93,7 @@ def model_source(model: Model, functions: Functions, entries: list[Entry], ident
         "NC": len(functions.updates),
         "NJ": len(functions.jacobian_pattern),
         "NLU": elimination.size,
+        "TIMED": int(any(functions.outputs.jac_sparsity(k, 0).nnz() for k in (0, 1))),
     }
     infinity = float("inf")
 

@@ -132,6 +132,14 @@ def test_wrong_derivatives_are_refused(name: str, order: int, value: float, text
         assert any(text in message for message in slave.messages)
 
 
+def test_derivatives_come_after_initialization_began() -> None:
+    with Slave(fmu(NAME), initialize=False) as slave:
+        slave.fmu.setupExperiment(startTime=0.0)
+        with pytest.raises(Exception, match="fmi2SetRealInputDerivatives"):
+            move(slave)
+        assert "setting derivatives of inputs is not allowed" in slave.messages[0]
+
+
 def test_native_fmus_say_so_and_interpreted_ones_do_not() -> None:
     for kind, says in (("native", True), ("python", False)):
         with Slave(fmu("inertia/disc", kind)) as slave:

@@ -111,6 +111,12 @@ static void derivatives(const Memory *m, double t, const double *x, double *xdot
   f_derivatives(arg, res, 0, 0, 0);
 }
 
+/* Derivatives at the begin of a solver's step: those that were fetched there, if nothing has changed. */
+static void first_derivatives(const Memory *m, double t, const double *x, double *xdot) {
+  if (!m->stale && t == m->v[0]) memcpy(xdot, m->v + IXD, NX * sizeof *xdot);
+  else derivatives(m, t, x, xdot);
+}
+
 /* Go to time t with the inputs, not with the states. */
 static void move_on(Memory *m, double t) {
   if (m->moving) {
@@ -218,9 +224,9 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
   for (size_t i = 0; i < n; i++) {
     uint32_t k = vr[i];
     if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input, from now on held */
+      if (v[k] != values[i]) c->m.stale = 1;
       v[k] = values[i];
       c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
-      c->m.stale = 1;
       continue;
     }
     if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
@@ -233,6 +239,8 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
 /* Derivatives of inputs, which move with them until they are set again. */
 static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, const int order[], const double values[]) {
   Memory *m = &c->m;
+  const unsigned modes = IN(INITIALIZING) | IN(STEPPING);
+  if (n && only_in(c, modes, "setting derivatives of inputs") != OK) return ERROR;
   for (size_t i = 0; i < n; i++) {
     const uint32_t k = vr[i];
     if (k < IU || k >= IY) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, k);
@@ -305,7 +313,7 @@ static double next_tick(const Instance *c, double end) {
 /* Classical Runge-Kutta, order 4. */
 static void rk4(const Memory *m, double t, double h, double *x) {
   double k1[NX], k2[NX], k3[NX], k4[NX], y[NX];
-  derivatives(m, t, x, k1);
+  first_derivatives(m, t, x, k1);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k1[i];
   derivatives(m, t + 0.5 * h, y, k2);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 0.5 * h * k2[i];
@@ -352,7 +360,7 @@ static void rodas3(const Memory *m, double t, double h, double *x, double *e) {
 /* Dormand-Prince, order 5(4). */
 static void dopri5(const Memory *m, double t, double h, double *x, double *e) {
   double k1[NX], k2[NX], k3[NX], k4[NX], k5[NX], k6[NX], k7[NX], y[NX];
-  derivatives(m, t, x, k1);
+  first_derivatives(m, t, x, k1);
   for (int i = 0; i < NX; i++) y[i] = x[i] + h * (1.0 / 5.0 * k1[i]);
   derivatives(m, t + 1.0 / 5.0 * h, y, k2);
   for (int i = 0; i < NX; i++) y[i] = x[i] + h * (3.0 / 40.0 * k1[i] + 9.0 / 40.0 * k2[i]);
@@ -398,7 +406,7 @@ static void rosw3(Memory *m, double t, double h, double *x, double *e) {
     f_factor(m->j, ih / GAMMA, m->w);
     m->hw = h;
   }
-  derivatives(m, t, x, k1);
+  first_derivatives(m, t, x, k1);
   f_solve(m->w, k1);
   for (int i = 0; i < NX; i++) y[i] = x[i] + 2.0 * k1[i];
   derivatives(m, t + 0.871733043016918 * h, y, k2);
@@ -506,6 +514,7 @@ static int do_step(Instance *c, double t, double h) {
   if (t1 > c->m.stop + 1e-9 * (1 + fabs(c->m.stop)))
     return report(c, ERROR, "%s: doStep from %.9g s to %.9g s goes past the stop time %.9g s", MODEL, t, t1,
                   c->m.stop);
+  if (TIMED && v[0] != t) c->m.stale = 1; /* by a rounding */
   v[0] = t;
   double next;
   do {
