@@ -2,7 +2,7 @@
 
     python -m benchmarks.coupling [CASE ...] [--quick] [--steps SECONDS ...]
 
-A case is a system (`motor_bench`, `ur5_bench`), or a run of a scenario at its own values
+A case is `motor_bench` (its system with a motor in continuous time) or a run of a scenario as it is
 (`mobile_manipulator/IY`). Its table has, over algorithms and communication steps, the largest error
 of positions, heading and currents, the order measured from step to step, the energy invented
 relative to the energy dissipated, and how many times faster than real time it ran (processor time
@@ -97,34 +97,24 @@ ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("gauss_seidel", {"extrapolation": 2}),
     ("iterated", {}),
 )
-SYSTEMS = ("motor_bench", "ur5_bench")
 RUNS = tuple(
-    [f"mir250/{run}" for run in ("IN1", "IN2", "CN1", "CN2")]
+    ["ur5_bench/UR5e"]
+    + [f"mir250/{run}" for run in ("IN1", "IN2", "CN1", "CN2")]
     + [f"mobile_manipulator/{run}" for run in ("IN1", "IN2", "CN1", "CN2", "IY", "CY")]
 )
 
 
-def bench(name: str) -> Case:
-    """A system of the library at its own values."""
-    document = read_system(ROOT / "scenarios" / "systems" / f"{name}.toml")
-    if name == "motor_bench":  # the motor that is not sampled
-        document = replace(
-            document,
-            instances={**document.instances, "motor": "dc_motor.lab_bench/electrical"},
-        )
-        columns = (
-            Column("load [rad/s]", ("load.w",), 1.0, 0.015),
-            Column("current [mA]", ("motor.i",), 1e3, 6.0),
-        )
-        inputs: dict[str, Driver] = {"motor.w_ref": 40.0}
-    else:
-        columns = (
-            Column("joints [mrad]", tuple(f"arm.q[{i}]" for i in range(1, 7)), 1e3, 0.05),
-            Column("currents [mA]", tuple(f"drive.i[{i}]" for i in range(1, 7)), 1e3, 6.0),
-        )
-        inputs = {}
+def motor_bench() -> Case:
+    """The motor bench with the motor that is not sampled, at its own values."""
+    document = read_system(ROOT / "scenarios" / "systems" / "motor_bench.toml")
+    motor = {"motor": "dc_motor.lab_bench/electrical"}
+    document = replace(document, instances={**document.instances, **motor})
+    columns = (
+        Column("load [rad/s]", ("load.w",), 1.0, 0.015),
+        Column("current [mA]", ("motor.i",), 1e3, 6.0),
+    )
     system = unsampled(document.build(default_provider()))
-    return Case(system, 0.5 if inputs else 2.0, columns, inputs)
+    return Case(system, 0.5, columns, {"motor.w_ref": 40.0})
 
 
 def of_scenario(name: str) -> Case:
@@ -137,11 +127,13 @@ def of_scenario(name: str) -> Case:
     for key, value in {**item.system.parameters, **item.parameters}.items():
         system.set(key, value)
     system = unsampled(system)
-    columns = [
-        Column("x, y [mm]", ("base.x", "base.y"), 1e3, 0.03),
-        Column("heading [mrad]", ("base.phi",), 1e3, 0.05),
-        Column("motors [mA]", ("motor_left.i", "motor_right.i"), 1e3, 6.0),
-    ]
+    columns = []
+    if "base" in system.members:
+        columns = [
+            Column("x, y [mm]", ("base.x", "base.y"), 1e3, 0.03),
+            Column("heading [mrad]", ("base.phi",), 1e3, 0.05),
+            Column("motors [mA]", ("motor_left.i", "motor_right.i"), 1e3, 6.0),
+        ]
     if "drive" in system.members:
         tool = tuple(f"arm.tool_position[{i}]" for i in range(1, 4))
         columns.append(Column("tool [mm]", tool, 1e3, 0.03))
@@ -266,12 +258,12 @@ def table(name: str, case: Case, quick: bool = False) -> None:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cases", nargs="*", help=f"of {', '.join((*SYSTEMS, *RUNS))}")
+    parser.add_argument("cases", nargs="*", help=f"of motor_bench, {', '.join(RUNS)}")
     parser.add_argument("--quick", action="store_true", help="without iterated coupling")
     parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
     arguments = parser.parse_args()
-    for name in arguments.cases or (*SYSTEMS, *RUNS):
-        case = bench(name) if name in SYSTEMS else of_scenario(name)
+    for name in arguments.cases or ("motor_bench", *RUNS):
+        case = motor_bench() if name == "motor_bench" else of_scenario(name)
         if arguments.steps:
             case = replace(case, steps=tuple(arguments.steps))
         table(name, case, arguments.quick)

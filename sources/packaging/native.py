@@ -200,7 +200,8 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
         "-fno-slp-vectorize",  # a quarter less compiling, the same speed
     ]
     if "macos" in target.target:
-        flags.append(f"-Wl,-install_name,@rpath/{identifier}.dylib")
+        # -x: names that are not exported stay out
+        flags += ["-Wl,-x", f"-Wl,-install_name,@rpath/{identifier}.dylib"]
     elif "windows" not in target.target:
         flags.append(f"-Wl,-soname,{identifier}.so")
     content = [f"{name}\0{files[name]}" for name in sorted(files)]
