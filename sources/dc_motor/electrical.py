@@ -50,7 +50,7 @@ from .machine import machine, sensors
 LEVEL = 1
 # Current loops of some 1000 rad/s; effects on the winding (brushes) can be much faster than that.
 # The limits make kinks; a fixed step would miss them, or be short all the time.
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+SOLVER = Solver("rodas3_adaptive", 1e-3, 3e-5)
 BAND = 0.02
 
 
