@@ -28,6 +28,7 @@ docs: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.fmu_step
 	$(BIN)/python -m benchmarks.masters
+	$(BIN)/python -m benchmarks.speed
 
 wheel: $(STAMP)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
