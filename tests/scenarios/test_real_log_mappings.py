@@ -13,7 +13,7 @@ from cosim.calibrate import read_problem
 from cosim.files import read_toml
 
 MAPPINGS = ("emps/dataset.toml", "emps/open_loop.toml", "bam_servo/dataset.toml",
-            "kmutt_dcmotor/dataset.toml", "ur10e/dataset.toml")  # fmt: skip
+            "kmutt_dcmotor/dataset.toml", "ur10e/dataset.toml", "ur10e/friction.toml")  # fmt: skip
 
 
 def write_logs(folder: Path, mapping: Path) -> None:
