@@ -14,6 +14,7 @@ from rich.table import Table
 
 from .calibrate.fit import Estimate, channel_rms, fit
 from .calibrate.mapping import read_problem
+from .calibrate.nuisance import settled
 from .calibrate.sensitivity import Correlation, correlation_index, local, tornado
 from .calibrate.validate import Finding, check_data, check_model
 from .errors import InputError
@@ -113,18 +114,12 @@ def calibration_table(
 
 
 def validation_rms(estimate: Estimate) -> dict[str, float]:
-    """Residuals over sigma on the runs that were not fitted, their nuisance values fitted."""
+    """Residuals over sigma on the runs that were not fitted, their own values fitted."""
     problem = estimate.problem
-    held = {
-        p.name: value
-        for p, value in zip(problem.parameters, estimate.theta.tolist(), strict=True)
-        if not p.run
-    }
     names = [run.name for run in problem.runs if run.purpose == "validation"]
-    rest = problem.only(names).hold(held)
-    if not rest.parameters:
-        return channel_rms(rest, rest.residuals(rest.nominal, names))
-    return channel_rms(rest, fit(rest, purpose=names, polish=False).residuals)
+    return channel_rms(
+        problem, problem.residuals(settled(problem, estimate.theta, names), names)
+    )
 
 
 def _scaled(value: float | None, sigma: float) -> float | None:

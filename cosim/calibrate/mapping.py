@@ -40,7 +40,7 @@ _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings
 GAP = 3.0
 """Intervals of a clock longer than this many usual ones are gaps."""
 _COLUMN = {"source", "time", "late", "scale", "offset", "unit", "lowpass", "derivative"}
-_INPUT = {"column", "columns", "gain", "unit", "interpolation"}
+_INPUT = {"column", "columns", "gain", "unit", "interpolation", "quantum"}
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 _ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
 
@@ -442,7 +442,11 @@ class _Mapping:
                 for i, column in enumerate(names, 1)}  # fmt: skip
 
     def _input(self, log: Log, column: str, entry: Mapping[str, Any], lead: float) -> Table:
-        values = log[column] * float(entry.get("gain", 1.0))
+        values = log[column]
+        if "quantum" in entry:  # a count with a little noise on top: the count is exact
+            quantum = float(entry["quantum"])
+            values = np.rint(values / quantum) * quantum
+        values = values * float(entry.get("gain", 1.0))
         times = snapped(log.time + lead, float(self.table["step"]))
         how = str(entry.get("interpolation", "hold"))
         if how == "slope":  # of the interval that begins

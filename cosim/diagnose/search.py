@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.fit import Estimate, fit
-from ..calibrate.problem import Problem
+from ..calibrate.nuisance import settled, slopes
+from ..calibrate.problem import Problem, Sensitivity
 from ..errors import CosimError
 from .candidates import Candidate, candidates, new_parameters
 from .linear import Absorber, Layout, Score, holm, score
@@ -166,6 +167,7 @@ class Search:
         self.known = candidates(problem) if only is None else only
         self.evaluations = 0
         self.rounds: list[Round] = []
+        self.own: dict[str, Sensitivity] | None = None
         self._take(problem)
 
     def _take(self, problem: Problem) -> None:
@@ -198,6 +200,11 @@ class Search:
     def judged(self, estimate: Estimate) -> Fitted:
         """A fit with its model values."""
         problem = estimate.problem
+        names = [run.name for run in self.checking.runs if run.purpose != "identification"]
+        if self.own is None:
+            self.own = slopes(problem, estimate.theta, names)
+        theta = settled(problem, estimate.theta, names, self.own)
+        estimate = replace(estimate, theta=theta)
         self.evaluations += estimate.evaluations
         return Fitted(
             (),

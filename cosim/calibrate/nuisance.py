@@ -1,0 +1,108 @@
+"""Values that concern one run only, fitted with everything else held.
+
+A start pose is known to a millimetre and a few milliradians; a run that was not used for fitting
+must have it estimated before its residual says anything about the model.
+
+    min  sum over the run's samples of ((measured - model) / sigma)^2 + ((p - nominal) / prior)^2
+
+by Gauss-Newton steps with one Jacobian per run: these values move the model almost linearly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import Problem, Sensitivity
+
+Vector = NDArray[np.float64]
+STEP = 5e-3
+"""Step of the differences over the span."""
+STEPS = 4
+ENOUGH = 0.1
+"""Fall of the cost [nats] below which a run is settled: far below anything that is decided."""
+
+
+def concerned(problem: Problem, runs: Iterable[str]) -> list[int]:
+    """Indices of the parameters that belong to one of these runs alone."""
+    names = set(runs)
+    return [i for i, p in enumerate(problem.parameters) if p.run in names]
+
+
+def slopes(problem: Problem, theta: Vector, runs: Iterable[str]) -> dict[str, Sensitivity]:
+    """Derivatives with respect to the runs' own parameters, by run."""
+    names = list(runs)
+    columns = concerned(problem, names)
+    found = problem.jacobian(theta, names, columns=columns, central=False, relative=STEP)
+    return {item.run: item for item in found}
+
+
+def settled(
+    problem: Problem,
+    theta: Vector,
+    runs: Iterable[str],
+    known: dict[str, Sensitivity] | None = None,
+) -> Vector:
+    """Parameters with the runs' own values fitted to each of them.
+
+    Args:
+        problem: system and data.
+        theta: all values; those of other runs and common ones stay.
+        runs: names.
+        known: derivatives from `slopes`, taken here if not given. They need not be of this theta.
+    """
+    names = list(runs)
+    columns = concerned(problem, names)
+    theta = theta.copy()
+    if not columns:
+        return theta
+    if known is None:
+        known = slopes(problem, theta, names)
+    own = {name: [i for i in columns if problem.parameters[i].run == name] for name in names}
+    costs: dict[str, float] = {}
+    best, open_runs = theta.copy(), [name for name in names if own[name]]
+    for _ in range(STEPS):
+        going: list[str] = []
+        for name, residual in problem.residuals(theta, open_runs):
+            cost = _cost(problem, theta, residual, own[name])
+            fallen = costs.get(name, np.inf) - cost
+            if fallen > 0.0:
+                costs[name], best[own[name]] = cost, theta[own[name]]
+            if fallen > ENOUGH:
+                going.append(name)
+                theta[own[name]] += _step(problem, theta, residual, known[name], own[name])
+        theta = np.clip(theta, problem.lower, problem.upper)
+        open_runs = going
+        if not going:
+            break
+    return best
+
+
+def _cost(problem: Problem, theta: Vector, residual: Vector, own: list[int]) -> float:
+    total = 0.5 * float(np.nansum(residual**2))
+    for i in own:
+        p = problem.parameters[i]
+        if p.prior:
+            total += 0.5 * float((theta[i] - p.nominal) / p.prior) ** 2
+    return total
+
+
+def _step(
+    problem: Problem, theta: Vector, residual: Vector, item: Sensitivity, own: list[int]
+) -> Vector:
+    place = [item.columns.tolist().index(i) for i in own]
+    scale = problem.scale[own]
+    good = np.isfinite(residual) & np.isfinite(item.values[:, :, place]).all(axis=2)
+    slope = item.values[:, :, place][good] * scale
+    matrix = slope.T @ slope + 1e-9 * np.eye(len(own))
+    gradient = slope.T @ residual[good]
+    for row, i in enumerate(own):
+        p: Any = problem.parameters[i]
+        if p.prior:
+            ratio = scale[row] / p.prior
+            matrix[row, row] += ratio**2
+            gradient[row] -= ratio * float(theta[i] - p.nominal) / p.prior
+    return np.asarray(np.linalg.solve(matrix, gradient) * scale)
