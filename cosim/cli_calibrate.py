@@ -117,9 +117,7 @@ def validation_rms(estimate: Estimate) -> dict[str, float]:
     """Residuals over sigma on the runs that were not fitted, their own values fitted."""
     problem = estimate.problem
     names = [run.name for run in problem.runs if run.purpose == "validation"]
-    return channel_rms(
-        problem, problem.residuals(settled(problem, estimate.theta, names), names)
-    )
+    return channel_rms(problem, problem.residuals(settled(problem, estimate.theta, names), names))
 
 
 def _scaled(value: float | None, sigma: float) -> float | None:

@@ -137,6 +137,7 @@ class Effect:
         source: book or paper.
         unit: unit of what it adds, where the kind leaves it open: the effect fits only balances
             with this unit ("" fits any).
+        general: effect with the same law for any unit, which need not be tried where this one fits.
     """
 
     name: str
@@ -146,6 +147,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     source: str = ""
     unit: str = ""
+    general: str = ""
 
     def __post_init__(self) -> None:
         for kind in self.kinds:

@@ -34,6 +34,8 @@ DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 KNOWN = 0.25
 """A combination is identifiable if its standard deviation is below this fraction of the span."""
+SETTLED = 0.2
+"""Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
 PURPOSE = "identification"
 
 
@@ -220,6 +222,59 @@ def _drawn(problem: Problem) -> NDArray[np.bool_]:
     return np.array([p.role == "declared" and not p.prior for p in problem.parameters])
 
 
+class Known:
+    """Derivatives of another fit, to be used again for a model with some parameters more or less.
+
+    Args:
+        estimate: that fit.
+    """
+
+    def __init__(self, estimate: Estimate) -> None:
+        names = estimate.problem.names
+        self.runs = {item.run: item for item in estimate.jacobian}
+        self.place = {
+            name: {names[i]: k for k, i in enumerate(item.columns.tolist())}
+            for name, item in self.runs.items()
+        }
+
+    def extended(
+        self, problem: Problem, theta: Vector, purpose: str | Iterable[str]
+    ) -> list[Sensitivity]:
+        """Derivatives for all parameters of a problem, the unknown ones taken at theta."""
+        runs = problem.chosen(purpose)
+        names = problem.names
+        new = [
+            i
+            for i, name in enumerate(names)
+            if any(
+                i in problem.columns(run.name) and name not in self.place.get(run.name, {})
+                for run in runs
+            )
+        ]
+        fresh = {
+            item.run: item
+            for item in problem.jacobian(
+                theta, [r.name for r in runs], columns=new, central=False, relative=STEPS[1]
+            )
+        } if new else {}  # fmt: skip
+        found = []
+        for run in runs:
+            columns = problem.columns(run.name)
+            values = np.empty((*run.data.shape, columns.size))
+            rough = np.zeros_like(values)
+            for k, i in enumerate(columns.tolist()):
+                if names[i] in self.place.get(run.name, {}):
+                    old, at = self.runs[run.name], self.place[run.name][names[i]]
+                    values[:, :, k] = old.values[:, :, at]
+                    rough[:, :, k] = old.roughness[:, :, at]
+                else:
+                    item = fresh[run.name]
+                    at = item.columns.tolist().index(i)
+                    values[:, :, k] = item.values[:, :, at]
+            found.append(Sensitivity(run.name, columns, values, rough))
+        return found
+
+
 class _Fit:
     def __init__(
         self,
@@ -330,6 +385,29 @@ class _Fit:
             if first - self.cost <= tolerance * max(first, 1.0):
                 return
 
+    def follow(self, known: Known, limit: int) -> None:
+        """Gauss-Newton with a Jacobian from close by; only what it lacks is differentiated.
+
+        Parameters that were there before hardly change what they do when one is added, so a step
+        costs one simulation and one for each new parameter.
+        """
+        damping = 1e-9
+        for _ in range(limit):
+            self.iterations += 1
+            self.jacobian = known.extended(self.problem, self.theta, self.purpose)
+            weight = self.weight if math.isfinite(self.cap) else None
+            normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+            before = self.cost
+            for _ in range(4):
+                if self.attempt(self.step(normal, damping)):
+                    damping = max(damping * 0.1, 1e-12)
+                    break
+                damping = max(damping, 1e-7) * 30.0
+            else:
+                return
+            if before - self.cost <= max(SETTLED, 1e-4 * before):
+                return
+
     def gradient(self) -> Vector:
         """J^T r with the last Jacobian and the present residuals."""
         weight = self.weight if math.isfinite(self.cap) else None
@@ -365,6 +443,7 @@ def fit(
     limit: int = 25,
     polish: bool = True,
     robust: bool = True,
+    known: Known | None = None,
 ) -> Estimate:
     """Estimate the parameters of a problem.
 
@@ -375,9 +454,14 @@ def fit(
         limit: iterations at each size of difference steps.
         polish: end with a search without derivatives.
         robust: begin with large residuals counted linearly; off when `theta` is close.
+        known: derivatives of a fit with nearly the same parameters, which stand for those at
+            `theta`; a quick fit, whose intervals are as good as they are.
     """
     begun = problem.evaluations
     run = _Fit(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
+    if known is not None:
+        run.follow(known, limit)
+        return _estimate(run)
     if robust and _uneven(run):
         run = _Fit(problem, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])

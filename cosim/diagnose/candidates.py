@@ -57,13 +57,47 @@ def candidates(problem: Problem) -> list[Candidate]:
     if not isinstance(provider, Catalogue):
         return []
     found = []
+    twins = _twins(problem)
     for instance, variant in problem.instances.items():
         kind = component(variant)
         if not kind:
             continue  # a file: nothing can be added to it
         for effect, port, text in provider.candidates(variant):
-            found.append(Candidate(instance, kind, effect, port, text))
+            if (instance, port) not in twins:
+                found.append(Candidate(instance, kind, effect, port, text))
     return found
+
+
+def _twins(problem: Problem) -> set[tuple[str, str]]:
+    """Balances that stand for the same shaft as one on the other end of a power bond.
+
+    What acts on a shaft is left to the end that gives the motion: there it enters the equation of
+    motion itself, and not a tick later through the exchange.
+    """
+    system = problem.system()
+    kinds = {
+        (name, balance["name"]): balance["kind"]
+        for name, member in system.members.items()
+        for balance in member.description.extra.get("balances", ())
+    }
+    twins = set()
+    for bond in system.bonds():
+        giver, _, port = bond.first.partition(".")
+        taker, _, other = bond.second.partition(".")
+        kind = kinds.get((giver, port))
+        if kind is not None and kinds.get((taker, other)) == kind:
+            twins |= {
+                (giver, name)
+                for (instance, name), its in kinds.items()
+                if instance == giver and its == kind and _of(name, port)
+            }
+    return twins
+
+
+def _of(balance: str, port: str) -> bool:
+    """Whether it is the port's balance, or that of one of its shafts (`joint_3` of `joint`)."""
+    stem, _, number = balance.rpartition("_")
+    return balance == port or (stem == port and number.isdigit())
 
 
 def new_parameters(before: Problem, after: Problem) -> tuple[list[Parameter], list[Parameter]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.fit import Estimate, fit
+from ..calibrate.fit import Estimate, Known, fit
 from ..calibrate.nuisance import settled, slopes
 from ..calibrate.problem import Problem, Sensitivity
 from ..errors import CosimError
@@ -27,7 +27,7 @@ GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks."""
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
-REFITS = 5
+REFITS = 8
 REFINED = 3
 ROUNDS = 3
 CHECK = "validation"
@@ -192,10 +192,20 @@ class Search:
         estimate = fit(self.declared, first.theta, limit=6, robust=False, polish=True)
         return self.judged(estimate)
 
-    def fitted(self, problem: Problem, theta: Vector | None, *, near: bool) -> Fitted:
-        """Fit a model, from a point close by or from far away."""
-        estimate = fit(problem, theta, limit=6 if near else 10, robust=not near, polish=not near)
-        return self.judged(estimate)
+    def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
+        """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
+        known = None if close is None else Known(close)
+        return self.judged(
+            fit(problem, theta, limit=6, robust=False, polish=known is None, known=known)
+        )
+
+    def sharpened(self, quick: Fitted, base: Fitted) -> Fitted:
+        """A quickly fitted model fitted again with derivatives of its own."""
+        result = self.fitted(quick.problem, quick.estimate.theta)
+        result.effects, result.signature = quick.effects, quick.signature
+        result.p_value = quick.p_value
+        result.gate = compare(self.check_data, base.check, result.check, self.checking)
+        return result
 
     def judged(self, estimate: Estimate) -> Fitted:
         """A fit with its model values."""
@@ -227,12 +237,7 @@ class Search:
             self.fit_data - base.fit, self.absorber(base),
         )  # fmt: skip
         present = {item.label for item in base.effects}
-        signatures = []
-        for item in self.known:
-            if item.label not in present:
-                found = bench.signature(item)
-                if found is not None:
-                    signatures.append(found)
+        signatures = bench.signatures([c for c in self.known if c.label not in present])
         self.evaluations += bench.evaluations
         signatures = merge(signatures)
         corrected = holm([s.score.p_value for s in signatures])
@@ -273,7 +278,7 @@ class Search:
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self._cost(problem, theta) for theta in starts]
-            result = self.fitted(problem, starts[int(np.argmin(costs))], near=True)
+            result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
         except CosimError as error:
             self.say(f"{item.candidate.label} could not be refitted: {error}")
             return None
@@ -308,6 +313,8 @@ class Search:
                 current.winner = fitted
                 break
         if current.winner is not None:
+            place = current.fitted.index(current.winner)
+            current.winner = current.fitted[place] = self.sharpened(current.winner, base)
             current.rivals = [
                 f for f in current.fitted if f is not current.winner and f.gate is not None
                 and f.gate.passed and not self.apart(f, current.winner)
@@ -331,7 +338,7 @@ class Search:
         for name, value in fitted.estimate.values.items():
             theta[problem.index(name)] = value
         try:
-            result = self.fitted(problem, theta, near=True)
+            result = self.fitted(problem, theta, fitted.estimate)
         except CosimError:
             return fitted
         result.effects, result.signature = fitted.effects, item
@@ -356,7 +363,7 @@ class Search:
             if p.name.startswith(prefix)
         }
         keep = [i for i, p in enumerate(problem.parameters) if p.name not in held]
-        result = self.fitted(problem.hold(held), fitted.estimate.theta[keep], near=True)
+        result = self.fitted(problem.hold(held), fitted.estimate.theta[keep], fitted.estimate)
         result.effects = tuple(e for e in fitted.effects if e != effect)
         result.signature = fitted.signature
         return result

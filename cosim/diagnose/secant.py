@@ -6,7 +6,8 @@ strength is tried, what the residual asks for is estimated, and the simulation i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,12 @@ from .candidates import Candidate, new_parameters
 from .linear import ABSORBED, Absorber, Layout, Score, score
 
 Vector = NDArray[np.float64]
+Tick = Callable[[], None]
 VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
-WORTH = 10.0
-"""Gain [nats] below which a third trial is not worth its simulations: after correction for the
-number of candidates it would not be significant."""
+EVIDENT, SHARE = 3.0, 0.02
+"""A candidate whose first simulation gains less than 3 nats (noise does, in one of a hundred),
+or less than 1/50 of what the best one gains, is not simulated again."""
 TRIALS, NEAR = 3, 0.3
 """Trials at most; a strength this close to one that was tried is not tried again."""
 GREATEST = 1e3
@@ -94,8 +96,31 @@ class Bench:
         self.evaluations += len(self.layout.runs)
         return model_values(problem, theta, self.layout)
 
-    def signature(self, candidate: Candidate) -> Signature | None:
-        """Signature at the strength that the residual asks for; None if it cannot be simulated."""
+    def signatures(
+        self, candidates: Sequence[Candidate], tick: Tick = lambda: None
+    ) -> list[Signature]:
+        """Signatures at the strengths that the residual asks for.
+
+        Every candidate is simulated once. Only what then explains something is worth another
+        simulation at the strength that the residual asks for.
+
+        Args:
+            candidates: which; those that cannot be simulated are left out.
+            tick: called after each.
+        """
+        first = []
+        for candidate in candidates:
+            found = self._begun(candidate)
+            tick()
+            if found is not None:
+                first.append(found)
+        best = max((t.promise for t in first), default=0.0)
+        for trials in first:
+            while trials.open and trials.promise > max(EVIDENT, SHARE * best):
+                self._more(trials)
+        return [t.best for t in first if t.best is not None]
+
+    def _begun(self, candidate: Candidate) -> _Trials | None:
         try:
             problem = candidate.added_to(self.problem)
             problem.system()
@@ -104,52 +129,78 @@ class Bench:
         strengths, _ = new_parameters(self.problem, problem)
         if len(strengths) != 1:
             return None
-        strength = strengths[0]
-        best: Signature | None = None
-        value = strength.span
-        tried: list[float] = []
-        for _ in range(TRIALS):
-            value = float(np.clip(value, strength.minimum, strength.maximum))
-            if value == 0.0 or any(abs(value / old - 1.0) < NEAR for old in tried):
-                break
-            tried.append(value)
-            try:
-                change = self.at(problem, strength, value) - self.model
-            except CosimError:
-                value *= 0.1  # too strong for the system to run
-                continue
-            found = self._measure(candidate, problem, strength, value, change)
-            if best is None or _mismatch(found) < _mismatch(best):
-                best = found
-            small = len(tried) > 1 and found.score.gain < WORTH
-            if small or (found.unseen and (found.score.size > VISIBLE or not np.any(change))):
-                break
-            factor = found.score.amplitude
-            if factor <= 0.0 and strength.minimum >= 0.0:
-                factor = 0.1  # it cannot be negative: see whether a small one wants to be positive
-            size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
-            value *= float(np.sign(factor) or 1.0) * min(size, GREATEST)
-        problem.close()
-        return best
+        trials = _Trials(candidate, problem, strengths[0], strengths[0].span)
+        while trials.best is None and trials.open:
+            self._more(trials)
+        if trials.best is not None and trials.open and not np.any(trials.best.change):
+            trials.value = 10.0 * trials.tried[-1]  # a limit that does not bind yet
+            self._more(trials)
+        return trials
 
-    def _measure(
-        self,
-        candidate: Candidate,
-        problem: Problem,
-        strength: Parameter,
-        value: float,
-        change: Vector,
-    ) -> Signature:
+    def _more(self, trials: _Trials) -> None:
+        """One more simulation."""
+        strength, tried = trials.strength, trials.tried
+        value = float(np.clip(trials.value, strength.minimum, strength.maximum))
+        if value == 0.0 or any(abs(value / old - 1.0) < NEAR for old in tried):
+            trials.open = False
+            return
+        tried.append(value)
+        trials.open = len(tried) < TRIALS
+        try:
+            change = self.at(trials.problem, strength, value) - self.model
+        except CosimError:
+            trials.value = value * 0.1  # too strong for the system to run
+            return
+        finally:
+            trials.problem.close()
+        found, trials.promise = self._measure(trials, value, change)
+        if trials.best is None or _mismatch(found) < _mismatch(trials.best):
+            trials.best = found
+        if found.unseen and found.score.size > VISIBLE:
+            trials.open = False
+        factor = found.score.amplitude
+        if factor <= 0.0 and strength.minimum >= 0.0:
+            factor = 0.1  # it cannot be negative: see whether a small one wants to be positive
+        size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
+        trials.value = value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
+
+    def _measure(self, trials: _Trials, value: float, change: Vector) -> tuple[Signature, float]:
+        """The signature, and the gain that it would have if its strength could be negative."""
         rest = self.absorber.rest(change)
         total = float(change @ change)
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
         result = score(rest, self.residual, self.layout, self.theta.size)
-        if result.amplitude < 0.0 and strength.minimum >= 0.0:
+        promise = result.gain
+        if result.amplitude < 0.0 and trials.strength.minimum >= 0.0:
             result = replace(result, amplitude=0.0, gain=0.0, z=0.0, p_value=1.0)
-        return Signature(
-            candidate, problem, strength, value, change.astype(np.float32),
+        found = Signature(
+            trials.candidate, trials.problem, trials.strength, value, change.astype(np.float32),
             rest.astype(np.float32), result, absorbed,
         )  # fmt: skip
+        return found, promise
+
+
+@dataclass
+class _Trials:
+    """Simulations of one candidate so far.
+
+    Attributes:
+        candidate, problem, strength: see `Signature`.
+        value: strength to try next.
+        tried: strengths that were tried.
+        best: signature at the strength nearest to the one that the residual asks for.
+        promise: gain [nats] of the last one, whatever its sign.
+        open: whether another may be tried.
+    """
+
+    candidate: Candidate
+    problem: Problem
+    strength: Parameter
+    value: float
+    tried: list[float] = field(default_factory=list)
+    best: Signature | None = None
+    promise: float = 0.0
+    open: bool = True
 
 
 def _mismatch(item: Signature) -> float:

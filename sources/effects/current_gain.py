@@ -22,6 +22,7 @@ EFFECT = Effect(
     GAIN,
     source="Bolton 2021",
     unit="A",
+    general="gain",
 )
 
 

@@ -22,6 +22,7 @@ EFFECT = Effect(
     OFFSET,
     source="Bolton 2021",
     unit="A",
+    general="bias",
 )
 
 

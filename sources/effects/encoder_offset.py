@@ -25,6 +25,7 @@ EFFECT = Effect(
     OFFSET,
     source="textbook",
     unit="rad",
+    general="bias",
 )
 
 

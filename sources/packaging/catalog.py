@@ -49,7 +49,8 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
     """(effect, balance, its sentence) for every effect that could be added to a variant.
 
     Balances that share parameters are named by their group and, where it has several members, one
-    by one. Random effects (with a seed) are left out: their values say nothing about a log.
+    by one. Random effects (with a seed) are left out: their values say nothing about a log; so are
+    effects of which a more special one has the same law there.
     """
     parsed = parse_name(name)
     model = build_model(parsed)
@@ -60,11 +61,16 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
     found = []
     for group, members in groups.items():
         places = [group, *members] if len(members) > 1 else [group]
-        for effect, module in effects().items():
-            if f"{effect}@{group}" in present or hasattr(module, "seed_quantity"):
-                continue
-            if not misfit(module.EFFECT, model.balances[members[0]]):
-                found += [(effect, place, module.EFFECT.text) for place in places]
+        fitting = {
+            effect: module.EFFECT
+            for effect, module in effects().items()
+            if not hasattr(module, "seed_quantity")
+            and not misfit(module.EFFECT, model.balances[members[0]])
+        }
+        special = {item.general for item in fitting.values()}
+        for effect, item in fitting.items():
+            if f"{effect}@{group}" not in present and effect not in special:
+                found += [(effect, place, item.text) for place in places]
     return found
 
 
