@@ -137,6 +137,7 @@ class Effect:
         source: book or paper.
         unit: unit of what it adds, where the kind leaves it open: the effect fits only balances
             with this unit ("" fits any).
+        probe: whether it stands for no law of physics and is no explanation.
         general: effect with the same law for any unit, which need not be tried where this one fits.
     """
 
@@ -148,6 +149,7 @@ class Effect:
     source: str = ""
     unit: str = ""
     general: str = ""
+    probe: bool = False
 
     def __post_init__(self) -> None:
         for kind in self.kinds:

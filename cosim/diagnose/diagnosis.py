@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
-from ..calibrate.validate import check_data, check_model
+from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
 from .experiment import propose
 from .linear import Layout
+from .localise import Place, localise
 from .power import power
 from .search import ROUNDS, Fitted, Round, Search, step_error
 from .structure import Structure, structures
@@ -38,6 +39,7 @@ class Diagnosis:
         search: all rounds.
         before, after: calibrated models without and with the effects.
         rivals: sets of effects that explain the data equally well.
+        located: where an unknown input would have to enter the declared system, the best first.
         places: other places where the same effect would do the same, by label.
         residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
         structure: (`before`/`after`, purpose) -> tests.
@@ -53,6 +55,7 @@ class Diagnosis:
     before: Fitted | None = None
     after: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
+    located: list[Place] = field(default_factory=list)
     places: dict[str, list[str]] = field(default_factory=dict)
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
     structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
@@ -94,6 +97,7 @@ class Diagnosis:
                 {"effects": [c.label for c in f.effects], "score": self._score(f)}
                 for f in self.rivals
             ],
+            "localisation": [place.to_dict() for place in self.located],
             "power": self.power,
             "proposed_experiment": self.experiment,
             "channels": {},
@@ -208,6 +212,21 @@ def diagnose(
         result.wall = time.perf_counter() - begun
         return result
     search = Search(problem, say)
+    search.prepare()
+    try:
+        return _searched(search, findings, out, say, begun)
+    finally:
+        search.close()
+
+
+def _searched(
+    search: Search,
+    findings: list[Finding],
+    out: Path | None,
+    say: Callable[[str], None],
+    begun: float,
+) -> Diagnosis:
+    problem = search.raw
     base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
     result.warnings = [str(f) for f in findings]
@@ -217,6 +236,12 @@ def diagnose(
         stage = search.round(current)
         if number == 0:
             result.power = power(stage)
+            if stage.winner is not None or any(
+                s.structured for p in PURPOSES for s in _tests(search, base, p)
+            ):
+                say("where does it enter?")
+                ranked = [s.candidate for s in stage.signatures]
+                result.located = localise(search, base, ranked, say)
         if stage.winner is None:
             break
         say(f"added: {stage.winner.effects[-1].label}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..calibrate.fit import Estimate, Known, fit
 from ..calibrate.nuisance import settled, slopes
 from ..calibrate.problem import Problem, Sensitivity
 from ..errors import CosimError
+from ..provider import locate
+from ..variants import apply
 from .candidates import Candidate, candidates, new_parameters
 from .linear import Absorber, Layout, Score, holm, score
 from .secant import Bench, Signature, merge, model_values
@@ -168,6 +171,7 @@ class Search:
         self.evaluations = 0
         self.rounds: list[Round] = []
         self.own: dict[str, Sensitivity] | None = None
+        self._builder = ThreadPoolExecutor(1)
         self._take(problem)
 
     def _take(self, problem: Problem) -> None:
@@ -180,6 +184,17 @@ class Search:
 
     def _data(self, layout: Layout) -> Vector:
         return layout.vector([run.data / self.declared.sigma for run in layout.runs])
+
+    def prepare(self) -> None:
+        """Have the candidates' FMUs built in the background, while the calibration runs."""
+        provider = self.declared.provider
+        for item in self.known:
+            variant = apply(self.declared.instances, item.change, provider)[item.instance]
+            self._builder.submit(locate, variant, provider)
+
+    def close(self) -> None:
+        """Stop building."""
+        self._builder.shutdown(wait=True, cancel_futures=True)
 
     def calibrated(self) -> Fitted:
         """Fit the declared system, errors of the communication step removed from then on."""

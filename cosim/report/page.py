@@ -13,6 +13,10 @@ from .chart import COLOURS, Line, lines
 
 if TYPE_CHECKING:
     from ..diagnose import Diagnosis
+    from ..diagnose.localise import Curve
+
+PLACES, CURVES = 8, 2
+"""Places that are listed, and those whose curves are drawn."""
 
 HEADLINES = {
     "effect_found": "Something is missing in the model, and it has a name",
@@ -35,7 +39,7 @@ th{background:#f9fafb}td.text{text-align:left;white-space:normal}
 .over{color:#c2410c;font-weight:600}
 .good{color:#15803d}.grid{display:grid;grid-template-columns:1fr 1fr;gap:.5em}
 svg{width:100%;height:auto;font:11px system-ui,sans-serif;fill:#374151}svg .title{font-weight:600}
-small,.note{color:#6b7280}@media(max-width:800px){.grid{grid-template-columns:1fr}}
+small,.note{color:#6b7280}.wide{overflow-x:auto}@media(max-width:800px){.grid{grid-template-columns:1fr}}
 """
 
 
@@ -62,6 +66,7 @@ def page(result: Diagnosis) -> str:
         _parameters(table["parameters"]),
         _measured(result),
         _residuals(result),
+        _located(result),
         _candidates(result),
         _next(result, table),
         _power(table["power"]),
@@ -75,7 +80,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     if not body:
         return ""
     titles = "".join(f"<th>{escape(h)}</th>" for h in head)
-    return f"<table><tr>{titles}</tr>{body}</table>"
+    return f"<div class='wide'><table><tr>{titles}</tr>{body}</table></div>"
 
 
 def _td(text: str, kind: str = "") -> str:
@@ -227,6 +232,43 @@ def _residuals(result: Diagnosis) -> str:
         "the unused run that the declared model describes worst; grey: twice the noise.</p>"
         f"<div class='grid'>{''.join(parts)}</div>"
     )
+
+
+def _located(result: Diagnosis) -> str:
+    if not result.located:
+        return ""
+    rows = []
+    for place in result.located[:PLACES]:
+        best = place.curves[0]
+        rows.append(
+            [_td(place.label), _td(_number(place.evidence)), _td(_against(best)),
+             _td(f"{100 * best.explained:.1f} %")]
+        )  # fmt: skip
+    charts = []
+    for place in result.located[:CURVES]:
+        for curve in place.curves[:2]:
+            edge = 2 * curve.deviation
+            charts.append(
+                lines(
+                    [Line("u", curve.at, curve.value),
+                     Line("± 2 σ", curve.at, curve.value - edge, COLOURS[0]),
+                     Line("", curve.at, curve.value + edge, COLOURS[0])],
+                    title=f"{place.label} against {_against(curve)}",
+                    x_label=curve.driver, y_label=f"u [{place.unit or 'its unit'}]",
+                )
+            )  # fmt: skip
+    return (
+        "<h2>Where the disturbance enters</h2><p>An unknown input at each place, with a free curve "
+        "against time or against a signal there and no law assumed: how much more likely that "
+        "makes the residual (log evidence), and how much of what exceeds the noise it takes away. "
+        "Places that explain the same amount cannot be told apart by this alone.</p>"
+        + _table(["place", "evidence [nats]", "best against", "explained"], rows)
+        + f"<div class='grid'>{''.join(charts)}</div>"
+    )
+
+
+def _against(curve: Curve) -> str:
+    return f"{curve.driver} ({curve.run})" if curve.run else curve.driver
 
 
 def _candidates(result: Diagnosis) -> str:

@@ -86,7 +86,8 @@ def component_json(variant: Variant) -> bytes:
             for port, port_name in model.ports
         ],
         "balances": [
-            {"name": balance.name, "kind": balance.kind} for balance in model.balances.values()
+            {"name": balance.name, "kind": balance.kind, "unit": balance.unit}
+            for balance in model.balances.values()
         ],
         "slots": model.slots,
         "strengths": [

@@ -64,7 +64,7 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
         fitting = {
             effect: module.EFFECT
             for effect, module in effects().items()
-            if not hasattr(module, "seed_quantity")
+            if not (hasattr(module, "seed_quantity") or module.EFFECT.probe)
             and not misfit(module.EFFECT, model.balances[members[0]])
         }
         special = {item.general for item in fitting.values()}

@@ -1,0 +1,80 @@
+"""Unknown effort or error at a balance, as a curve against what may drive it.
+
+    u = g sum_k c_k B_k(s),   s = w_time t + sum_i w_i x_i
+
+with hat functions B_k on equally spaced knots from `s_first` to `s_last`, constant beyond them, and
+x_i the scalar signals of the balance (speed, angle, load, ...). A probe to find out where and on
+what a missing effect acts; it says nothing about why.
+
+Not modelled: memory (hysteresis), curves over two drivers at once.
+
+Source: interpolation by hat functions (linear finite elements).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+
+from ..effect import KINDS, Effect
+from ..effect_model import EffectModel
+from ..quantity import Quantity
+
+KNOTS = 9
+GAIN = Quantity("g", "1", "factor on the curve, 0 = absent", start=1.0, strength=True)
+CURVE = Quantity("c", "1", "value at each knot", start=0.01, size=KNOTS)
+FIRST = Quantity("s_first", "1", "driver at the first knot", start=0.0)
+LAST = Quantity("s_last", "1", "driver at the last knot", start=1.0)
+SHARE = Quantity("share", "1", "part of it that each element of the balance gets", start=1.0)
+DRIVER = Quantity("s", "1", "what drives the curve")
+VALUE = Quantity("u", "1", "the unknown effort or error")
+SIDE = ("longitudinal", "side", "radius", "resistance", "emf_constant", "stiffness", "mass")
+"""Signals that hardly vary or mean a configuration."""
+
+EFFECT = Effect(
+    "unknown_input",
+    "Curve of an unknown effort against its driver.",
+    tuple(KINDS),
+    GAIN,
+    source="hat functions",
+    probe=True,
+)
+
+
+def drivers(e: EffectModel) -> list[str]:
+    """Signals of the balance that may drive the curve."""
+    kind = KINDS[e.kind]
+    names = [*kind.signals, *kind.optional]
+    return [n for n in names if n not in SIDE and e.offers(n) and e.signal(n).numel() == 1]
+
+
+def law(e: EffectModel) -> None:
+    """Add the curve's value."""
+    gain, curve = e.parameter(GAIN), e.parameter(CURVE)
+    first, last = e.parameter(FIRST), e.parameter(LAST)
+    driver = e.parameter(_named("time", 1.0)) * e.t
+    for name in drivers(e):
+        driver += e.parameter(_named(name, 0.0)) * e.signal(name)
+    place = (KNOTS - 1) * (driver - first) / (last - first)
+    place = ca.fmin(ca.fmax(place, 0.0), KNOTS - 1.0)
+    value = ca.SX(0)
+    for k in range(KNOTS):
+        value += curve[k] * ca.fmax(1 - ca.fabs(place - k), 0)
+    value *= gain
+    e.output(DRIVER, driver)
+    e.output(VALUE, value)
+    size = 6 if e.kind == "body" else e.size
+    if size > 1:
+        value = value * e.parameter(replace(SHARE, size=size))
+    e.add(value)
+    flow = KINDS[e.kind].flow
+    if flow:
+        e.supply(value * e.signal(flow))
+    elif e.kind == "body":
+        e.supply(ca.dot(value[:3], e.signal("velocity")) + ca.dot(value[3:], e.signal("rate")))
+    e.loss(0)
+
+
+def _named(signal: str, start: float) -> Quantity:
+    return Quantity(f"w_{signal}", "1", f"weight of {signal} in what drives the curve", start=start)
