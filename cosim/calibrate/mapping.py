@@ -33,7 +33,7 @@ Vector = NDArray[np.float64]
 KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
-    "only", "run", "columns", "time",
+    "only", "run", "columns", "time", "ticks", "search_step",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
@@ -315,6 +315,8 @@ class _Mapping:
             algorithm=str(table.get("algorithm", "jacobi")),
             period=float(table["period"]) if "period" in table else None,
             workers=workers,
+            ticks=bool(table.get("ticks", False)),
+            search_step=float(table["search_step"]) if "search_step" in table else None,
         )
 
     def _column(self, channel: Channel) -> str:

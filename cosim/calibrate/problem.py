@@ -189,6 +189,8 @@ class Problem:
         period: time between recorded points [s]; the sample interval if not given.
         instances: name -> variant, the system's own if not given.
         workers: threads.
+        ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
+        search_step: coarser step at which thousands of simulations may be made, `step` if not given.
     """
 
     def __init__(
@@ -206,7 +208,10 @@ class Problem:
         period: float | None = None,
         instances: Mapping[str, str] | None = None,
         workers: int | None = None,
+        ticks: bool = False,
+        search_step: float | None = None,
     ) -> None:
+        self.ticks, self.search_step = ticks, search_step or step
         self.name, self.file, self.provider = name, file, provider
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
@@ -512,6 +517,7 @@ class Problem:
             "parameters": self.parameters, "channels": self.channels, "runs": self.runs,
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
+            "ticks": self.ticks, "search_step": self.search_step,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)

@@ -336,11 +336,13 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
 
 def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     """Residuals against the data as measured, the step's error removed at these parameters."""
-    problem = fitted.problem.with_data({run.name: run.data for run in result.problem.runs})
+    step = result.problem.step
+    data = {run.name: run.data for run in result.problem.runs}
+    problem = fitted.problem.with_data(data)._with(step=step)
     theta = fitted.estimate.theta
-    errors = step_error(problem, theta)
+    errors = step_error(problem, theta, step)
     for name, residual in problem.residuals(theta, None):
-        result.residuals[which, name] = residual - errors[name] / problem.sigma
+        result.residuals[which, name] = residual + errors[name] / problem.sigma
     problem.close()
 
 

@@ -126,31 +126,43 @@ class Round:
     rivals: list[Fitted] = field(default_factory=list)
 
 
-def step_error(problem: Problem, theta: Vector) -> dict[str, Vector]:
-    """How far the exchange at communication points is from a continuous one, by run.
+def step_error(problem: Problem, theta: Vector, step: float) -> dict[str, Vector]:
+    """What the exchange at communication points adds to the model values, by run.
 
-    The exchange is of first order in the step: twice the change that halving it makes
+    Where the rig exchanges in ticks of the problem's step, that is the difference to this step.
+    Otherwise the exchange is of first order: twice the change that halving the step makes
     (Richardson). In the units of the channels.
+
+    Args:
+        problem: its step is the rig's, or fine enough for two of them to tell the order.
+        theta: where.
+        step: at which the model values are taken.
     """
-    half = problem._with(step=problem.step / 2.0)
+    if problem.ticks and step == problem.step:
+        return {run.name: np.zeros(run.data.shape) for run in problem.runs}
+    factor, fine = (1.0, problem.step) if problem.ticks else (2.0, step / 2.0)
+    first, second = problem._with(step=step), problem._with(step=fine)
     try:
-        coarse, fine = problem.residuals(theta, None), half.residuals(theta, None)
+        coarse, exact = first.residuals(theta, None), second.residuals(theta, None)
     finally:
-        half.close()
+        first.close()
+        second.close()
     return {
-        name: 2.0 * (first - second) * problem.sigma
-        for (name, first), (_, second) in zip(coarse, fine, strict=True)
+        name: factor * (b - a) * problem.sigma
+        for (name, a), (_, b) in zip(coarse, exact, strict=True)
     }
 
 
 def corrected(problem: Problem, theta: Vector) -> Problem:
-    """The problem with what the communication step adds to the model taken from the data instead.
+    """The problem at its search step, with what that adds to the model taken from the data instead.
 
     It varies little with the parameters, so thousands of cheap simulations can be compared with
     the data as if they were exact (deferred correction).
     """
-    errors = step_error(problem, theta)
-    return problem.with_data({run.name: run.data - errors[run.name] for run in problem.runs})
+    step = problem.search_step
+    errors = step_error(problem, theta, step)
+    data = {run.name: run.data + errors[run.name] for run in problem.runs}
+    return problem.with_data(data)._with(step=step)
 
 
 class Search:
@@ -198,7 +210,9 @@ class Search:
 
     def calibrated(self) -> Fitted:
         """Fit the declared system, errors of the communication step removed from then on."""
-        first = fit(self.raw, None, limit=6, robust=True, polish=False)
+        coarse = self.raw._with(step=self.raw.search_step)
+        first = fit(coarse, None, limit=6, robust=True, polish=False)
+        coarse.close()
         self.evaluations += first.evaluations
         self.say(
             f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
