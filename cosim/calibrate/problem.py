@@ -190,7 +190,7 @@ class Problem:
         instances: name -> variant, the system's own if not given.
         workers: threads.
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
-        search_step: coarser step at which thousands of simulations may be made, `step` if not given.
+        search_step: coarser step at which thousands of simulations may be made [step].
     """
 
     def __init__(
