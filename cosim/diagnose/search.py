@@ -18,7 +18,7 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, candidates, new_parameters
 from .linear import Absorber, Layout, Score, holm, score
-from .secant import Bench, Signature, merge, model_values
+from .secant import FLOOR, Bench, Signature, merge, model_values
 
 Vector = NDArray[np.float64]
 LEVEL = 0.01
@@ -290,7 +290,11 @@ class Search:
         value = item.value * (item.score.amplitude or 1.0)
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
         span = abs(value) or item.strength.span
-        moved = [replace(p, span=span) if p.name == item.strength.name else p
+        least = item.strength.minimum
+        if least >= 0.0:
+            least = FLOOR * item.strength.span
+            value = max(value, least)
+        moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
         if not secondary and others:
@@ -299,11 +303,11 @@ class Search:
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         starts = []
-        for factor in (1.0, 0.0):
+        for factor, part in ((1.0, 1.0), (0.0, 1.0), (0.0, 0.1)):
             theta = problem.nominal
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift
-            theta[problem.index(item.strength.name)] = value
+            theta[problem.index(item.strength.name)] = part * value
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self._cost(problem, theta) for theta in starts]

@@ -26,6 +26,9 @@ EVIDENT, SHARE = 3.0, 0.02
 or less than 1/50 of what the best one gains, is not simulated again."""
 TRIALS, NEAR = 3, 0.3
 """Trials at most; a strength this close to one that was tried is not tried again."""
+FLOOR = 1e-3
+"""A one-sided strength below this share of a typical one is as good as absent; sampling and lags
+that short would only cost time."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -141,7 +144,8 @@ class Bench:
         """One more simulation."""
         strength, tried = trials.strength, trials.tried
         value = float(np.clip(trials.value, strength.minimum, strength.maximum))
-        if value == 0.0 or any(abs(value / old - 1.0) < NEAR for old in tried):
+        least = FLOOR * strength.span if strength.minimum >= 0.0 else 0.0
+        if abs(value) <= least or any(abs(value / old - 1.0) < NEAR for old in tried):
             trials.open = False
             return
         tried.append(value)

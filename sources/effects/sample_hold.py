@@ -17,6 +17,8 @@ from ..laws.history import NEVER
 from ..laws.signal_effect import in_unit, sized
 from ..quantity import Quantity
 
+SHORTEST = 1e-5
+"""Sample periods below 10 us act like this one: nothing here changes faster [s]."""
 T_S = Quantity(
     "t_s",
     "s",
@@ -43,7 +45,7 @@ def law(e: EffectModel) -> None:
     t_s = e.parameter(T_S)
     value = e.signal("value")
     held, started = e.discrete(in_unit(e, sized(e, HELD))), e.discrete(STARTED)
-    clock = e.clock("sample", ca.if_else(t_s > 0, t_s, NEVER))
+    clock = e.clock("sample", ca.if_else(t_s > 0, ca.fmax(t_s, SHORTEST), NEVER))
     e.update(clock, held, value)
     e.update(clock, started, ca.SX(1.0))
     e.add(ca.if_else(t_s > 0, started * (held - value), 0.0))
