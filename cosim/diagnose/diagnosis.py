@@ -235,7 +235,7 @@ def _searched(
         say(f"round {number + 1}: {len(search.known)} candidates")
         stage = search.round(current)
         if number == 0:
-            result.power = power(stage)
+            result.power = power(stage, search.fitting)
             if stage.winner is not None or any(
                 s.structured for p in PURPOSES for s in _tests(search, base, p)
             ):

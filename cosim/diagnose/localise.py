@@ -27,6 +27,7 @@ from ..errors import CosimError
 from .candidates import Candidate, Catalogue
 from .linear import Absorber, Layout
 from .search import Fitted, Search
+from .secant import model_values
 
 Vector = NDArray[np.float64]
 PROBE = "unknown_input"
@@ -204,7 +205,8 @@ class _Bench:
             zip(search.fitting.names, search.fitting.by_run(search.fit_data - base.fit),
                 strict=True)
         )  # fmt: skip
-        model = dict(zip(search.fitting.names, search.fitting.by_run(base.fit), strict=True))
+        coarse = model_values(base.problem, base.estimate.theta, search.fitting)
+        model = dict(zip(search.fitting.names, search.fitting.by_run(coarse), strict=True))
         slopes = {item.run: item for item in base.estimate.jacobian}
         for names, layout in self.layouts.items():
             matrix = layout.matrix([slopes[n] for n in names], base.problem.scale)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from scipy.stats import norm
 
-from .search import LEVEL, Round
+from .linear import Layout
+from .search import LEVEL, MATERIAL, Round, largest
 
 POWER = 0.9
 """Probability with which an effect of the given strength is found."""
 
 
-def power(current: Round) -> dict[str, dict[str, Any]]:
+def power(current: Round, layout: Layout) -> dict[str, dict[str, Any]]:
     """Label -> smallest detectable strength, or why the effect cannot be seen."""
     tests = max(len(current.signatures), 1)
     needed = float(norm.isf(LEVEL / tests / 2) + norm.isf(1 - POWER))
@@ -32,6 +34,9 @@ def power(current: Round) -> dict[str, dict[str, Any]]:
             # the norm of what calibration leaves grows with the strength around the secant's value
             size = item.score.size / max(item.score.spread, 1.0)
             smallest = abs(item.value) * needed / size if size > 0 else math.inf
+            share = largest(item.rest.astype(np.float64), layout)
+            if share > 0.0:
+                smallest = max(smallest, abs(item.value) * MATERIAL / share)
             entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None
             if abs(math.log10(max(smallest / abs(item.value), 1e-12))) > 1.5:
                 entry["extrapolated_from"] = abs(item.value)
