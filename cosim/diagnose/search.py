@@ -313,7 +313,8 @@ class Search:
             if not s.unseen
             and current.corrected[s.candidate.label] < LEVEL
             and s.score.gain > GATE
-            and largest(s.score.amplitude * s.rest, self.fitting) > 0.7 * MATERIAL
+            and largest(s.score.amplitude * s.rest.astype(np.float64), self.fitting)
+            > 0.7 * MATERIAL
         ]
         return good[:REFITS]
 
