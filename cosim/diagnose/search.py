@@ -29,9 +29,9 @@ mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probab
 GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks."""
 MATERIAL = 0.15
-"""Least RMS over noise that an effect must add to a channel of a run. It raises the residual by 1 %:
-sheets do not give the noise more exactly, nor do solvers agree better, so a smaller difference has
-no name however many samples make it significant."""
+"""Least RMS over noise that an effect must add to a channel of a run. It raises the residual by
+1 %: sheets do not give the noise more exactly, nor do solvers agree better, so a smaller difference
+has no name however many samples make it significant."""
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
 REFITS = 8
@@ -326,7 +326,7 @@ class Search:
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
         span = abs(value) or item.strength.span
         least = item.strength.minimum
-        if least >= 0.0:
+        if item.strength.unit == "s":
             least = FLOOR * item.strength.span
             value = max(value, least)
         moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p

@@ -27,8 +27,8 @@ or less than 1/50 of what the best one gains, is not simulated again."""
 TRIALS, NEAR = 3, 0.3
 """Trials at most; a strength this close to one that was tried is not tried again."""
 FLOOR = 1e-3
-"""A one-sided strength below this share of a typical one is as good as absent; sampling and lags
-that short would only cost time."""
+"""A time below this share of a typical one is as good as none: sampling or lagging that fast would
+only cost time."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -58,6 +58,11 @@ class Signature:
     score: Score
     absorbed: float
     same: tuple[str, ...] = ()
+
+    @property
+    def asked(self) -> Vector:
+        """What calibration cannot absorb, at the strength that the residual asks for."""
+        return np.asarray(self.score.amplitude * self.rest, dtype=np.float64)
 
     @property
     def unseen(self) -> bool:
@@ -144,7 +149,7 @@ class Bench:
         """One more simulation."""
         strength, tried = trials.strength, trials.tried
         value = float(np.clip(trials.value, strength.minimum, strength.maximum))
-        least = FLOOR * strength.span if strength.minimum >= 0.0 else 0.0
+        least = FLOOR * strength.span if strength.unit == "s" else 0.0
         if abs(value) <= least or any(abs(value / old - 1.0) < NEAR for old in tried):
             trials.open = False
             return
