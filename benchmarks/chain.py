@@ -355,6 +355,9 @@ def libcosim(path: Path, _: str) -> Callable[[int], Answer]:
 
 def ecos(path: Path, _: str) -> Callable[[int], Answer]:
     """Ecos through its Python binding, values read as often as the others record."""
+    library = Path(sys.prefix) / "lib" / "libtbb.so.12"  # of the package tbb
+    if library.is_file():
+        ct.CDLL(str(library), ct.RTLD_GLOBAL)
     from ecospy import EcosLib, EcosSimulation
 
     EcosLib.set_log_level("warn")

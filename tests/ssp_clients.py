@@ -16,11 +16,18 @@ import numpy as np
 PARAMETER_SET = "parameters"
 
 
+def environment() -> dict[str, str]:
+    """Of the process."""
+    from tests.outside import environment  # not found where this file is the process
+
+    return environment()
+
+
 def run(client: str, path: Path, step: float, count: int, names: list[str]) -> np.ndarray:
     """One row per step, one column per name."""
     done = subprocess.run(
         [sys.executable, __file__, client, str(path), repr(step), str(count), *names],
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=120, env=environment(),
     )  # fmt: skip
     if done.returncode:
         raise RuntimeError(f"{client}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from tests.fmus import Slave, fmu
+from tests.outside import environment
 
 FOREIGN = Path(__file__).parent / "foreign.py"
 KNOWN_LIMIT = ("Enumeration variable type not supported", "is of unsupported type, skipping")
@@ -143,15 +143,6 @@ def jacobi(
     return {name: np.array(values) for name, values in rows.items()}
 
 
-def require(client: str) -> None:
-    """Skip where a client cannot be loaded, with the reason that it gives."""
-    command = [sys.executable, "-c", f"import {client}"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    if result.returncode:
-        reason = (result.stderr.strip().splitlines() or ["no message"])[-1]
-        pytest.skip(f"import {client} fails with code {result.returncode}: {reason}")
-
-
 def run_foreign(
     client: str, chain: Chain, *, fmi: int = 2, kinds: Mapping[str, str] | None = None
 ) -> dict[str, np.ndarray]:
@@ -171,6 +162,7 @@ def run_foreign(
         text=True,
         timeout=120,
         check=False,
+        env=environment(),
     )
     said, _, answer = result.stdout.rpartition("\n@")
     text = said + result.stderr

@@ -1,14 +1,15 @@
 """ecos runs chains of our FMUs, FMI 2 and FMI 3, with our results.
 
-It needs the system library libtbb.so.12 (Debian: `apt install libtbb12`); without it these tests
-skip with the loader's message.
+It needs libtbb.so.12, which the package tbb brings; without it these tests skip with the loader's
+message.
 """
 
 from __future__ import annotations
 
 import pytest
 
-from tests.clients.chains import CHAINS, assert_agree, jacobi, require, run_foreign
+from tests.clients.chains import CHAINS, assert_agree, jacobi, run_foreign
+from tests.outside import require
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

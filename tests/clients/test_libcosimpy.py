@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from tests.clients.chains import CHAINS, assert_agree, jacobi, require, run_foreign
+from tests.clients.chains import CHAINS, assert_agree, jacobi, run_foreign
+from tests.outside import require
 
 
 @pytest.mark.parametrize("name", CHAINS)

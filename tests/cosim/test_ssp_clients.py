@@ -9,6 +9,7 @@ import pytest
 
 from cosim import Master, read_system, ssp
 from tests.cosim.test_ssp_write import Versioned, bench
+from tests.outside import require
 from tests.ssp_clients import run
 
 SYSTEMS = Path(__file__).parents[2] / "scenarios" / "systems"
@@ -34,7 +35,7 @@ def difference(path: Path, client: str, names: list[str], count: int = COUNT) ->
     [("libcosim", 2, STATES + FEEDTHROUGH), ("ecos", 2, STATES), ("ecos", 3, STATES)],
 )
 def test_motor_bench(tmp_path: Path, client: str, fmi: int, names: list[str]) -> None:
-    pytest.importorskip({"libcosim": "libcosimpy", "ecos": "ecospy"}[client])
+    require({"libcosim": "libcosimpy", "ecos": "ecospy"}[client])
     path = ssp.write(bench(fmi), tmp_path / "bench.ssp", experiment=ssp.Experiment(0.0, 1.0, STEP))
     # libcosim adds up whole nanoseconds and divides, so its times differ in the last bits;
     # nothing else is different, and the system is stable
@@ -44,7 +45,7 @@ def test_motor_bench(tmp_path: Path, client: str, fmi: int, names: list[str]) ->
 @pytest.mark.parametrize(("client", "fmi"), [("libcosim", 2), ("ecos", 2), ("ecos", 3)])
 def test_mobile_manipulator(tmp_path: Path, client: str, fmi: int) -> None:
     """Sixteen FMUs: base and arm that feel each other, drives, sensors."""
-    pytest.importorskip({"libcosim": "libcosimpy", "ecos": "ecospy"}[client])
+    require({"libcosim": "libcosimpy", "ecos": "ecospy"}[client])
     system = read_system(SYSTEMS / "mobile_manipulator.toml").build(Versioned(fmi))
     path = ssp.write(
         system, tmp_path / "mobile.ssp", experiment=ssp.Experiment(0.0, 1.0, STEP),
