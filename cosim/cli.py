@@ -133,6 +133,11 @@ class Builder:
         with _bad_names():
             return list(_sources("packaging.catalog").candidates(variant))
 
+    def refinements(self, variant: str) -> list[tuple[str, str, dict[str, float], str]]:
+        """(fidelity, parameter, held values, one line) of which a variant is the limit."""
+        with _bad_names():
+            return list(_sources("packaging.catalog").refinements(variant))
+
 
 class Installed:
     """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
@@ -153,6 +158,10 @@ class Installed:
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""
         return Builder().candidates(variant)
+
+    def refinements(self, variant: str) -> list[tuple[str, str, dict[str, float], str]]:
+        """(fidelity, parameter, held values, one line) of which a variant is the limit."""
+        return Builder().refinements(variant)
 
 
 def default_provider() -> Provider:

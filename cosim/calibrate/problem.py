@@ -33,6 +33,9 @@ from ..variants import apply
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]
+LIMIT = 1e-2
+"""A compliance this many times smaller than a typical one is as good as none; a stiffer spring
+would only ask for a finer exchange."""
 STEP = 1e-3
 """Step of differences over the span of a parameter."""
 COINCIDENT = 1e-3
@@ -54,6 +57,7 @@ class Parameter:
             but the bounds is.
         strength: whether 0 makes an effect absent exactly.
         span: size of a typical change; the distance of the bounds if not given.
+        inverse: the targets get factor / value: a compliance that sets a stiffness.
     """
 
     name: str
@@ -68,6 +72,13 @@ class Parameter:
     strength: bool = False
     span: float = 0.0
     text: str = ""
+    inverse: bool = False
+
+    def set(self, value: float) -> dict[str, float]:
+        """Full variable name -> value."""
+        if self.inverse:
+            value = 1.0 / max(value, self.minimum)
+        return {name: factor * value for name, factor in self.targets}
 
     @property
     def scale(self) -> float:
@@ -156,6 +167,23 @@ class Run:
     starts: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     lead: float = 0.0
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A fidelity of which another one is a limit.
+
+    Attributes:
+        fidelity: its name.
+        parameter: the one that is infinite in the limit.
+        held: parameters and their values without which the limit is another one.
+        text: one line.
+    """
+
+    fidelity: str
+    parameter: str
+    held: Mapping[str, float]
+    text: str = ""
 
 
 class Sensitivity(NamedTuple):
@@ -339,7 +367,7 @@ class Problem:
         found = {name: value for name, value in run.starts.items() if self._has(name)}
         for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
             if parameter.run in ("", run.name):
-                found.update({name: factor * value for name, factor in parameter.targets})
+                found.update(parameter.set(value))
         return found
 
     def simulate(self, theta: Vector, run: Run | str) -> Vector:
@@ -527,7 +555,7 @@ class Problem:
         constants, runs = dict(self.constants), {run.name: run for run in self.runs}
         for name, value in values.items():
             parameter = self.parameters[self.index(name)]
-            items = {target: factor * value for target, factor in parameter.targets}
+            items = parameter.set(value)
             if parameter.run:
                 run = runs[parameter.run]
                 runs[run.name] = replace(run, starts={**run.starts, **items})
@@ -598,6 +626,54 @@ class Problem:
                     )
                 )  # fmt: skip
         return changed._with(parameters=[*self.parameters, *added])
+
+    def with_fidelity(self, instance: str, step: Refinement) -> Problem:
+        """The problem with one component in a fidelity that holds the present one as a limit.
+
+        Args:
+            instance: of the system.
+            step: the fidelity, and the parameter whose inverse vanishes in the limit.
+
+        Raises:
+            VariantError, UnknownNameError: it does not fit.
+        """
+        changed = self._with(
+            instances=apply(self.instances, {instance: step.fidelity}, self.provider)
+        )
+        variables = changed.system().members[instance].description.variables
+        before = self.system().members[instance].description.variables
+        constants = {f"{instance}.{n}": v for n, v in step.held.items()}
+        prefix = f"{instance}.{step.fidelity}."
+        stiff = variables[step.parameter]
+        span = 1.0 / float((stiff.start or (1.0,))[0] or 1.0)
+        added = [
+            Parameter(
+                f"{prefix}1/{step.parameter}", f"1/({stiff.symbol})", LIMIT * span, LIMIT * span,
+                span / LIMIT, ((f"{instance}.{step.parameter}", 1.0),), "effect",
+                strength=True, span=span, text=f"inverse of: {stiff.text}", inverse=True,
+            )
+        ]  # fmt: skip
+        for name, variable in variables.items():
+            if (
+                variable.causality == "parameter"
+                and variable.type == "Float64"
+                and variable.size == 1
+                and name not in {*before, *step.held, step.parameter}
+                and not name.startswith("solver.")
+            ):
+                start = float((variable.start or (0.0,))[0] or 0.0)
+                width = abs(start) or variable.nominal or 1.0
+                low = -100.0 * width if variable.minimum is None else variable.minimum
+                high = 100.0 * width if variable.maximum is None else variable.maximum
+                added.append(
+                    Parameter(
+                        prefix + name, variable.symbol, start, low, high,
+                        ((f"{instance}.{name}", 1.0),), "effect", span=width, text=variable.text,
+                    )
+                )  # fmt: skip
+        return changed._with(
+            parameters=[*self.parameters, *added], constants={**self.constants, **constants}
+        )
 
     def close(self) -> None:
         """Free the sessions; the problem can still be used."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from ..calibrate.problem import Parameter, Problem
+from ..calibrate.problem import Parameter, Problem, Refinement
 from ..variants import component
 
 
@@ -16,6 +16,10 @@ class Catalogue(Protocol):
 
     def candidates(self, variant: str) -> Sequence[tuple[str, str, str]]:
         """(effect, balance, one line about it) for all that could be added to the variant."""
+        ...
+
+    def refinements(self, variant: str) -> Sequence[tuple[str, str, Mapping[str, float], str]]:
+        """(fidelity, parameter, held values, one line) of which the variant is a limit."""
         ...
 
 
@@ -28,6 +32,7 @@ class Candidate:
         component: of the instance.
         effect, port: of the catalogue.
         text: one line about the effect.
+        refinement: the fidelity that it stands for, None for an effect.
     """
 
     instance: str
@@ -35,19 +40,34 @@ class Candidate:
     effect: str
     port: str
     text: str = ""
+    refinement: Refinement | None = None
 
     @property
     def label(self) -> str:
         """As shown and reported."""
-        return f"{self.effect} at {self.instance}.{self.port}"
+        return f"{self.effect} at {self.place}"
+
+    @property
+    def place(self) -> str:
+        """Instance and balance."""
+        return f"{self.instance}.{self.port}" if self.port else self.instance
+
+    @property
+    def prefix(self) -> str:
+        """Of the names of its parameters."""
+        return f"{self.place}.{self.effect}."
 
     @property
     def change(self) -> dict[str, str]:
         """As of `cosim run --set`."""
+        if self.refinement is not None:
+            return {self.instance: self.refinement.fidelity}
         return {self.instance: f"+{self.effect}@{self.port}"}
 
     def added_to(self, problem: Problem) -> Problem:
         """The problem on the system with this effect, which is absent at the nominal values."""
+        if self.refinement is not None:
+            return problem.with_fidelity(self.instance, self.refinement)
         return problem.with_effects(self.change)
 
 
@@ -65,6 +85,9 @@ def candidates(problem: Problem) -> list[Candidate]:
         for effect, port, text in provider.candidates(variant):
             if (instance, port) not in twins:
                 found.append(Candidate(instance, kind, effect, port, text))
+        for fidelity, parameter, held, text in provider.refinements(variant):
+            step = Refinement(fidelity, parameter, held, text)
+            found.append(Candidate(instance, kind, fidelity, "", text, step))
     return found
 
 

@@ -150,7 +150,7 @@ class Diagnosis:
         estimate = self.after.estimate
         stages = {r.winner.effects[-1]: r for r in self.search.rounds if r.winner is not None}
         for item in self.after.effects:
-            prefix = f"{item.instance}.{item.port}.{item.effect}."
+            prefix = item.prefix
             values = {
                 p.name.removeprefix(prefix): {
                     "value": float(estimate.theta[i]),
@@ -299,10 +299,8 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
             for rival in stage.rivals:
                 other = rival.effects[-1]
                 if other.effect == added.effect:
-                    result.places.setdefault(added.label, []).append(
-                        f"{other.instance}.{other.port}"
-                    )
-                else:
+                    result.places.setdefault(added.label, []).append(other.place)
+                elif other not in after.effects:
                     different.append(rival)
             if stage.winner.signature is not None:
                 for label in stage.winner.signature.same:

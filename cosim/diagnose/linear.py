@@ -158,7 +158,8 @@ def score(direction: Vector, residual: Vector, layout: Layout, freedom: int) -> 
     rest = residual - amplitude * direction
     sums = layout.sums(direction * rest)
     active = max(int(np.count_nonzero(layout.sums(direction**2) > 1e-6 * square)), 2)
-    degrees = max(layout.blocks - freedom, 1)
+    # parameters of single runs take little from the blocks of the others
+    degrees = max(layout.blocks - freedom, layout.blocks // 4, 1)
     robust = float(sums @ sums) * layout.blocks / degrees
     spread = float(np.sqrt(max(robust / square, 1.0)))
     z = amplitude * np.sqrt(square) / spread

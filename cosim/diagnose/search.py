@@ -197,6 +197,7 @@ class Search:
     ) -> None:
         self.say = say
         self.declared = self.raw = problem
+        self.whole = only is None
         self.known = candidates(problem) if only is None else only
         self.evaluations = 0
         self.rounds: list[Round] = []
@@ -291,6 +292,8 @@ class Search:
 
     def scored(self, base: Fitted) -> Round:
         """Score all candidates against a model's residual."""
+        if base.effects and self.whole:  # what was added may have balances of its own
+            self.known = candidates(base.problem)
         model = model_values(base.problem, base.estimate.theta, self.fitting)
         bench = Bench(
             base.problem, base.estimate.theta, self.fitting, model,
@@ -422,10 +425,10 @@ class Search:
 
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""
-        prefix = f"{effect.instance}.{effect.port}.{effect.effect}."
+        prefix = effect.prefix
         problem = fitted.problem
         held = {
-            p.name: 0.0 if p.strength else value
+            p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
             for p, value in zip(problem.parameters, fitted.estimate.theta.tolist(), strict=True)
             if p.name.startswith(prefix)
         }

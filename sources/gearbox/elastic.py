@@ -45,6 +45,9 @@ TWIST = Quantity(
 )
 ROTOR_SPEED = Quantity("rotor_speed", "rad/s", "state: speed of the rotor", nominal=100.0)
 SMALLEST_ROTOR = 1e-9
+STIFF = K
+LIMITS = {"ratio": {"signed": 0.0}, "lossy": {"signed": 1.0}}
+"""Fidelities that an infinite stiffness gives, and what has to be set for that."""
 
 
 def equations(m: Model) -> None:

@@ -74,6 +74,22 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
     return found
 
 
+def refinements(name: str) -> list[tuple[str, str, dict[str, float], str]]:
+    """(fidelity, its parameter, held values, sentence) of which a variant is the limit.
+
+    A fidelity's module says so by `LIMITS`: fidelity -> values without which the limit is another,
+    and `STIFF`: the quantity that is infinite there.
+    """
+    parsed = parse_name(name)
+    found = []
+    for fidelity, module in fidelities(parsed.component).items():
+        limits = getattr(module, "LIMITS", {})
+        if parsed.fidelity in limits and not parsed.effects:
+            text = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
+            found.append((fidelity, module.STIFF.name, dict(limits[parsed.fidelity]), text))
+    return found
+
+
 def describe(name: str) -> dict[str, Any]:
     """What a variant offers, in the form of `cosim fmus list --json`."""
     parsed = parse_name(name)
