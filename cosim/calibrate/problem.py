@@ -182,7 +182,7 @@ class Refinement:
 
     fidelity: str
     parameter: str
-    held: Mapping[str, float]
+    held: tuple[tuple[str, float], ...]
     text: str = ""
 
 
@@ -642,7 +642,7 @@ class Problem:
         )
         variables = changed.system().members[instance].description.variables
         before = self.system().members[instance].description.variables
-        constants = {f"{instance}.{n}": v for n, v in step.held.items()}
+        constants = {f"{instance}.{n}": v for n, v in step.held}
         prefix = f"{instance}.{step.fidelity}."
         stiff = variables[step.parameter]
         span = 1.0 / float((stiff.start or (1.0,))[0] or 1.0)
@@ -658,7 +658,7 @@ class Problem:
                 variable.causality == "parameter"
                 and variable.type == "Float64"
                 and variable.size == 1
-                and name not in {*before, *step.held, step.parameter}
+                and name not in {*before, *dict(step.held), step.parameter}
                 and not name.startswith("solver.")
             ):
                 start = float((variable.start or (0.0,))[0] or 0.0)

@@ -86,7 +86,7 @@ def candidates(problem: Problem) -> list[Candidate]:
             if (instance, port) not in twins:
                 found.append(Candidate(instance, kind, effect, port, text))
         for fidelity, parameter, held, text in provider.refinements(variant):
-            step = Refinement(fidelity, parameter, held, text)
+            step = Refinement(fidelity, parameter, tuple(held.items()), text)
             found.append(Candidate(instance, kind, fidelity, "", text, step))
     return found
 

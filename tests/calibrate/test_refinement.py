@@ -7,7 +7,7 @@ import numpy as np
 from cosim.calibrate.problem import Problem, Refinement
 from cosim.diagnose.candidates import candidates
 
-ELASTIC = Refinement("elastic", "k", {"signed": 0.0})
+ELASTIC = Refinement("elastic", "k", (("signed", 0.0),))
 
 
 def residual_size(problem: Problem, theta: np.ndarray, data: np.ndarray) -> float:

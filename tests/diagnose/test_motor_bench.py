@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +13,9 @@ import pytest
 from benchmarks.motor_plant import Bench, draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import Candidate, candidates
+from cosim.diagnose.diagnosis import _searched
 from cosim.diagnose.search import Round, Search
+from cosim.report.page import page
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 SIZE = 0.15
@@ -53,6 +57,26 @@ def test_the_clean_twin_stays_quiet(sets: dict[str, Path]) -> None:
     search, found = searched(sets["clean"])
     assert found.winner is None
     assert np.sqrt(np.mean((search.check_data - found.base.check) ** 2)) < 1.1
+
+
+def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
+    problem = read_problem(sets["supply_sag"], workers=2)
+    chosen = [
+        c for c in candidates(problem) if c.effect in {"battery_sag", "brush_drop", "elastic"}
+    ]
+    search = Search(problem, only=chosen)
+    result = _searched(search, [], tmp_path, lambda text: None, time.perf_counter())
+    search.close()
+    table = result.to_dict()
+    assert table["verdict"] == "effect_found"
+    assert [e["effect"] for e in table["effects"]] == ["battery_sag"]
+    assert table["localisation"][0]["component"] == "motor"
+    json.dumps(table, allow_nan=False)
+    text = page(result)
+    for part in ("battery_sag at motor.winding", "Where the disturbance enters", "motor.winding"):
+        assert part in text
+    (left,) = result.files
+    assert "battery_sag" in left.name and left.is_file()
 
 
 def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, Path]) -> None:
