@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import sys
+import threading
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -12,6 +15,9 @@ from .execution import Execution
 from .isolation import CALLS, INDEX, INSTANCE, OPERATION, ROW, Order, Outcome, shared
 from .plan import Op
 from .signals import Constant
+
+WATCH = 0.2
+"""Time between two looks whether the ordering process is still there [s]."""
 
 
 class _Told(Execution):
@@ -53,8 +59,20 @@ def execute(order: Order) -> Outcome:
     return Outcome("ok", bond_energy=recording.bond_energy, steps=run.steps())
 
 
+def orphaned() -> None:
+    """End this process when the one that ordered it is gone; nobody else would end a hanging FMU.
+
+    An FMU's call holds no interpreter lock, so this thread runs beside it.
+    """
+    parent = os.getppid()
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
+
+
 def main(path: Path) -> None:
     """Read the order, run it, write the outcome."""
+    threading.Thread(target=orphaned, daemon=True).start()
     order: Order = pickle.loads(path.read_bytes())
     outcome = execute(order)
     part = order.folder / "outcome.part"

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from cosim.cli import app
 from cosim.errors import CosimError, InputError, StudyError
+from tests.outside import hear_interrupts
 from tests.study.conftest import BASE
 from tests.study.test_results import failing, figures
 
@@ -121,7 +122,7 @@ def test_interrupted_isolated_runs_are_no_failures(
     file.write_text('scenario = "scenario.toml"\n[param.bad]\nmode = 6\nfail_at = 0.35\n')
     process = subprocess.Popen(
         [sys.executable, "-m", "cosim", "study", str(file), "--out", str(out), "--isolate"],
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=hear_interrupts,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     try:
@@ -137,6 +138,28 @@ def test_interrupted_isolated_runs_are_no_failures(
     assert process.returncode == 130 and "interrupted: 0 of 1 runs are done" in said
     assert not Path(f"/proc/{child}").exists()
     assert not list(out.glob("runs/*"))
+
+
+@pytest.mark.skipif(
+    not Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").exists(),
+    reason="finds processes by Linux's /proc",
+)
+def test_a_hanging_fmu_does_not_outlive_a_killed_study(tmp_path: Path, faulty: Path) -> None:
+    file, out = faulty / "hang.toml", tmp_path / "out"
+    file.write_text('scenario = "scenario.toml"\n[param.bad]\nmode = 6\nfail_at = 0.35\n')
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim", "study", str(file), "--out", str(out), "--isolate"],
+        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    try:
+        wait_for(lambda: isolated(process.pid))
+        [child] = isolated(process.pid)
+        wait_for(lambda: "faulty.so" in Path(f"/proc/{child}/maps").read_text())
+    finally:
+        process.kill()
+        process.wait()
+    wait_for(lambda: not Path(f"/proc/{child}").exists())
+    assert not Path(f"/proc/{child}").exists()
 
 
 def test_wrong_usage(tmp_path: Path) -> None:

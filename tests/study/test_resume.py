@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from cosim.study import read_study, run_study, study_from
+from tests.outside import hear_interrupts
 
 ROOT = Path(__file__).resolve().parents[2]
 LOADS = {"param": {"load.J": [0.07, 0.08, 0.09]}}
@@ -44,8 +45,9 @@ def stopped(file: Path, out: Path, least: int, number: int) -> tuple[int, str]:
     command = [sys.executable, "-m", "cosim", "study", str(file), "--out", str(out)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
-        [*command, "--workers", "1"], stderr=subprocess.PIPE, text=True, env=environment
-    )
+        [*command, "--workers", "1"], stderr=subprocess.PIPE, text=True, env=environment,
+        preexec_fn=hear_interrupts,
+    )  # fmt: skip
     end = time.monotonic() + 60.0
     while len(files(out)) < least and process.poll() is None and time.monotonic() < end:
         time.sleep(0.005)
