@@ -29,13 +29,16 @@ LAST = Quantity("s_last", "1", "driver at the last knot", start=1.0)
 SHARE = Quantity("share", "1", "part of it that each element of the balance gets", start=1.0)
 DRIVER = Quantity("s", "1", "what drives the curve")
 VALUE = Quantity("u", "1", "the unknown effort or error")
+STATIC = ("position", "gravity")
+"""Kinds of balances that a component takes as constant in time: a mass centre that moves would have
+to be accelerated, which no equation accounts for."""
 SIDE = ("longitudinal", "side", "radius", "resistance", "emf_constant", "stiffness", "mass")
 """Signals that hardly vary or mean a configuration."""
 
 EFFECT = Effect(
     "unknown_input",
     "Curve of an unknown effort against its driver.",
-    tuple(KINDS),
+    tuple(kind for kind in KINDS if kind not in STATIC),
     GAIN,
     source="hat functions",
     probe=True,
