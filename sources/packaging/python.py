@@ -6,7 +6,7 @@ code operation by operation, so both agree bit for bit wherever the C library's 
 
 from __future__ import annotations
 
-import importlib.util
+import importlib.metadata
 import inspect
 import re
 from pathlib import Path
@@ -180,10 +180,12 @@ def binaries(identifier: str) -> dict[str, bytes]:
     Raises:
         FileNotFoundError: pythonfmu is not installed or has no binaries.
     """
-    found = importlib.util.find_spec("pythonfmu")
-    folder = (
-        Path(found.origin).parent / "resources" / "binaries" if found and found.origin else None
-    )
+    try:
+        # not find_spec: FMUs that ran in this process have put packages of that name on the path
+        package = importlib.metadata.distribution("pythonfmu").locate_file("pythonfmu")
+    except importlib.metadata.PackageNotFoundError:
+        package = None
+    folder = None if package is None else Path(str(package)) / "resources" / "binaries"
     if folder is None or not folder.is_dir():
         raise FileNotFoundError("the package pythonfmu has no binaries; reinstall it")
     return {
