@@ -30,7 +30,8 @@ from scipy.signal import butter, filtfilt
 
 from cosim.calibrate.fit import Estimate, fit
 from cosim.calibrate.mapping import read_problem
-from cosim.calibrate.problem import Problem, Run
+from cosim.calibrate.parts import Run
+from cosim.calibrate.problem import Problem
 from cosim.files import flatten, read_toml
 from sources.function import Oracle
 from sources.variant import build_model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -49,7 +50,7 @@ def diagnose_command(
 
 
 def _print(result: Diagnosis) -> None:
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.effects():
         values = ", ".join(

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
-from .problem import Problem, Sensitivity
+from .parts import Sensitivity
+from .problem import Problem
 
 Vector = NDArray[np.float64]
 BLOCK = 1.0

@@ -27,7 +27,8 @@ from ..measurement import Run as DataRun
 from ..provider import Provider
 from ..signals import Table
 from ..system_file import SystemFile, read_system
-from .problem import COINCIDENT, Channel, Parameter, Problem, Run, check_parameters
+from .parts import COINCIDENT, Channel, Parameter, Run, check_parameters
+from .problem import Problem
 
 Vector = NDArray[np.float64]
 KEYS = {

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import Problem, Sensitivity
+from .parts import Sensitivity
+from .problem import Problem
 
 Vector = NDArray[np.float64]
 STEP = 5e-3

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import CosimError
 from .fit import Estimate, Normal
-from .problem import Problem, Run
+from .parts import Run
+from .problem import Problem
 
 Vector = NDArray[np.float64]
 SHORT = 50

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from ..calibrate.problem import Parameter, Problem, Refinement
+from ..calibrate.parts import Parameter, Refinement
+from ..calibrate.problem import Problem
 from ..variants import component
 
 

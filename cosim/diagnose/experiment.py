@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.problem import Problem, Run
+from ..calibrate.parts import Run
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from ..signals import Table
 from .linear import Layout

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..calibrate.fit import BLOCK
-from ..calibrate.problem import Problem, Run, Sensitivity
+from ..calibrate.parts import Run, Sensitivity
+from ..calibrate.problem import Problem
 
 Vector = NDArray[np.float64]
 BLOCKS = 40

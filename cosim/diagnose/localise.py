@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.problem import Channel, Parameter, Problem, Run
+from ..calibrate.parts import Channel, Parameter, Run
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, Catalogue
 from .linear import Absorber, Layout

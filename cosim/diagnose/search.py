@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..calibrate.fit import Estimate, Known, fit
 from ..calibrate.nuisance import settled, slopes
-from ..calibrate.problem import Problem, Sensitivity
+from ..calibrate.parts import Sensitivity
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply

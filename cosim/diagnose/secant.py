@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.problem import Parameter, Problem
+from ..calibrate.parts import Parameter
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .linear import ABSORBED, Absorber, Layout, Score, score

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.nuisance import settled
-from cosim.calibrate.problem import Parameter, Problem
+from cosim.calibrate.parts import Parameter
+from cosim.calibrate.problem import Problem
 
 SHIFT = 0.02
 

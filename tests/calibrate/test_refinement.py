@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cosim.calibrate.problem import Problem, Refinement
+from cosim.calibrate.parts import Refinement
+from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 
 ELASTIC = Refinement("elastic", "k", (("signed", 0.0),))

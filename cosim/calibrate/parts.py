@@ -1,0 +1,223 @@
+"""What a calibration problem consists of: parameters, channels, runs, derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description import Variable
+from ..errors import ValueRangeError
+from ..signals import Signal
+
+Vector = NDArray[np.float64]
+Role = Literal["declared", "nuisance", "effect"]
+COINCIDENT = 1e-3
+"""Fraction of a sample interval within which sample times and recorded times are the same (logs
+keep times rounded, often to 32 bits)."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An uncertain value.
+
+    Attributes:
+        name, unit, text: for people.
+        nominal, minimum, maximum: start value and bounds.
+        targets: (full variable name, factor) that it sets.
+        role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
+        run: name of the only run that it concerns, "" for all.
+        prior: standard deviation around the nominal value that is known beforehand, None if nothing
+            but the bounds is.
+        strength: whether 0 makes an effect absent exactly.
+        span: size of a typical change; the distance of the bounds if not given.
+        inverse: the targets get factor / value: a compliance that sets a stiffness.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    minimum: float
+    maximum: float
+    targets: tuple[tuple[str, float], ...]
+    role: Role = "declared"
+    run: str = ""
+    prior: float | None = None
+    strength: bool = False
+    span: float = 0.0
+    text: str = ""
+    inverse: bool = False
+
+    def set(self, value: float) -> dict[str, float]:
+        """Full variable name -> value."""
+        if self.inverse:
+            value = 1.0 / max(value, self.minimum)
+        return {name: factor * value for name, factor in self.targets}
+
+    @property
+    def scale(self) -> float:
+        """Size of a typical change."""
+        return self.span or self.maximum - self.minimum
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A measured quantity and what it is in the model.
+
+    Attributes:
+        name: of the column.
+        unit: of the column.
+        sigma: standard deviation of its noise, rounding included.
+        signal: full variable name.
+        gain, offset: column = gain * signal + offset.
+        transform: `sample`; `mean` or `difference` over the `window` before the sample.
+        window: [s].
+        shift: the column's value at t is the signal's at t + shift [s], where the exchange delays
+            the signal.
+    """
+
+    name: str
+    unit: str
+    sigma: float
+    signal: str
+    gain: float = 1.0
+    offset: float = 0.0
+    transform: str = "sample"
+    window: float = 0.0
+    shift: float = 0.0
+
+    def of(self, times: Vector, recorded: Vector, values: Vector) -> Vector:
+        """What the channel would read at `times`."""
+        times = times + self.shift
+        if self.transform == "sample":
+            result = _at(times, recorded, values)
+        elif self.transform == "difference":
+            before = _at(times - self.window, recorded, values)
+            result = (_at(times, recorded, values) - before) / self.window
+        else:
+            steps = np.diff(recorded) * 0.5 * (values[1:] + values[:-1])
+            integral = np.concatenate([[0.0], np.cumsum(steps)])
+            first = np.maximum(times - self.window, recorded[0])
+            width = np.maximum(times - first, 1e-12)
+            mean = np.interp(times, recorded, integral) - np.interp(first, recorded, integral)
+            result = np.where(times > first, mean / width, values[0])
+        return np.asarray(self.gain * result + self.offset, dtype=np.float64)
+
+
+def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
+    if times.shape == recorded.shape:
+        interval = recorded[1] - recorded[0] if recorded.size > 1 else 1.0
+        if np.max(np.abs(times - recorded)) <= COINCIDENT * interval:
+            return values
+    if recorded.size > 1:
+        interval = recorded[1] - recorded[0]
+        index = np.clip(np.rint((times - recorded[0]) / interval).astype(np.intp), 0, None)
+        index = np.minimum(index, recorded.size - 1)
+        if np.max(np.abs(times - recorded[index])) <= COINCIDENT * interval:
+            return np.asarray(values[index], dtype=np.float64)
+    return np.asarray(np.interp(times, recorded, values), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A measured run.
+
+    Attributes:
+        name: of the run.
+        purpose: `identification` or `validation`.
+        times: sample times [s].
+        data: one row per sample, one column per channel of the problem; gaps are NaN.
+        inputs: what drives the system's open inputs.
+        starts: full variable name -> start value that is known for this run.
+        values: entries of the run in its description.
+        lead: the simulation begins this much before the first sample [s].
+    """
+
+    name: str
+    purpose: str
+    times: Vector
+    data: Vector
+    inputs: Mapping[str, Signal]
+    starts: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    lead: float = 0.0
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A fidelity of which another one is a limit.
+
+    Attributes:
+        fidelity: its name.
+        parameter: the one that is infinite in the limit.
+        held: parameters and their values without which the limit is another one.
+        text: one line.
+    """
+
+    fidelity: str
+    parameter: str
+    held: tuple[tuple[str, float], ...]
+    text: str = ""
+
+
+class Sensitivity(NamedTuple):
+    """Derivatives of a run's model values over sigma.
+
+    Attributes:
+        run: its name.
+        columns: indices of the parameters that concern it.
+        values: (samples, channels, columns); NaN where nothing was measured.
+        roughness: half the difference between the derivatives on both sides, where both were
+            taken, else zeros; large where the model jumps.
+    """
+
+    run: str
+    columns: NDArray[np.intp]
+    values: Vector
+    roughness: Vector
+
+
+def free_parameter(variable: Variable, name: str, target: str, *, strength: bool) -> Parameter:
+    """A parameter that a variant has brought, at its FMU's value; a strength begins at 0.
+
+    Args:
+        variable: of the FMU.
+        name: of the parameter.
+        target: full variable name.
+        strength: whether 0 is exact absence.
+    """
+    start = float(variable.start[0] or 0.0) if variable.start else 0.0
+    span = abs(start) or variable.nominal or 1.0
+    low = -100.0 * span if variable.minimum is None else variable.minimum
+    high = 100.0 * span if variable.maximum is None else variable.maximum
+    return Parameter(
+        name, variable.symbol, 0.0 if strength else start, low, high, ((target, 1.0),), "effect",
+        strength=strength, span=span, text=variable.text,
+    )  # fmt: skip
+
+
+def adjustable(variable: Variable) -> bool:
+    """Whether a variable is a scalar parameter of the model, and not of its solver."""
+    return (
+        variable.causality == "parameter"
+        and variable.type == "Float64"
+        and variable.size == 1
+        and not variable.name.startswith("solver.")
+    )
+
+
+def check_parameters(parameters: Iterable[Parameter]) -> None:
+    """Refuse bounds that are empty or do not hold the nominal value.
+
+    Raises:
+        ValueRangeError: with the parameter.
+    """
+    for p in parameters:
+        if not p.minimum <= p.nominal <= p.maximum or not p.minimum < p.maximum:
+            raise ValueRangeError(
+                f"parameter {p.name}: nominal {p.nominal:g} is not within {p.minimum:g} to "
+                f"{p.maximum:g} {p.unit}"
+            )
