@@ -57,7 +57,7 @@ def _print(result: Diagnosis) -> None:
             f"{name} = {v['value']:.4g} [{v['ci95'][0]:.4g}, {v['ci95'][1]:.4g}] {v['unit']}"
             for name, v in effect["parameters"].items()
         )
-        console.print(f"  {effect['effect']} at {effect['component']}.{effect['port']}: {values}")
+        console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip

@@ -167,6 +167,7 @@ class Diagnosis:
                     "effect": item.effect,
                     "component": item.instance,
                     "port": item.port,
+                    "place": item.place,
                     "text": item.text,
                     "parameters": values,
                     "p_value": winner.p_value if winner else None,

@@ -105,8 +105,7 @@ def _effects(effects: list[dict[str, Any]]) -> str:
             for name, v in item["parameters"].items()
         ]  # fmt: skip
         parts.append(
-            f"<h3>{escape(item['effect'])} at "
-            f"{escape(item['component'])}.{escape(item['port'])}</h3>"
+            f"<h3>{escape(item['effect'])} at {escape(item['place'])}</h3>"
             f"<p>{escape(item['text'])} "
             + (f"It explains {100 * share:.1f} % of what the residual held beyond noise; " if share
                is not None else "")
