@@ -1,10 +1,13 @@
 """Two virtual wheels whose shifts follow from the track speeds, mirrored for right turns.
 
     e_outer = (1 - k) (a + b |w2 - w3| + c w_inner) + k e_outer_locked
-    e_inner = (1 - k) e_inner_turning + k e_inner_locked,    k = exp(-(w_inner/w_lock)^2)
+    e_inner = (1 - k) (e_inner_turning - h (b |w2 - w3| + c w_inner)) + k e_inner_locked
+    k = exp(-(w_inner/w_lock)^2)
 
 The outer track is the one whose wheel turns faster; `w_inner` is the absolute speed of the other
-one and `k` tells a locked inner track from a turning one. Which is which is blended over `w_even`:
+one and `k` tells a locked inner track from a turning one. With b = c the outer shift grows with the
+speed of the outer wheel; with h = 1 the inner shift gives what the outer one takes, so that the sum
+stays the same. Which is which is blended over `w_even`:
 
     s = tanh((|w2| - |w3|)/w_even),  e2 = (e_outer + e_inner)/2 + s (e_outer - e_inner)/2,  e3: -s
 
@@ -16,7 +19,7 @@ fit to left turns with a forward inner track; right turns, turns on the spot and
 extrapolated by symmetry.
 
 Source: crawler paper, Table 2: least squares over SET2 to SET5 for `a` and `b`, mean of SET1 for
-the locked track (`sources/tools/crawler_identification.py` computes both).
+the locked track (`sources/tools/crawler_identification.py` computes both); h: docs/crawler_slip.md.
 """
 
 from __future__ import annotations
@@ -49,6 +52,13 @@ SLIP_C = Quantity(
     nominal=1e-3,
 )
 E_INNER = Quantity("e_inner", "m", "shift of the inner virtual wheel", nominal=0.01)
+EXCHANGE = Quantity(
+    "exchange",
+    "1",
+    "share of the outer shift's growth that the inner shift loses, h",
+    minimum=-1.0,
+    maximum=2.0,
+)
 E_OUTER_LOCKED = Quantity(
     "e_outer_locked",
     "m",
@@ -86,7 +96,7 @@ def equations(m: Model) -> None:
     speeds = track_speeds(m)
     r, track, x_v = m.parameter(R), m.parameter(B), m.parameter(X_V)
     slip_a, slip_b, slip_c = m.parameter(SLIP_A), m.parameter(SLIP_B), m.parameter(SLIP_C)
-    e_inner = m.parameter(E_INNER)
+    e_inner, exchange = m.parameter(E_INNER), m.parameter(EXCHANGE)
     outer_locked, inner_locked = m.parameter(E_OUTER_LOCKED), m.parameter(E_INNER_LOCKED)
     w_lock, w_even = m.parameter(W_LOCK), m.parameter(W_EVEN)
 
@@ -96,9 +106,10 @@ def equations(m: Model) -> None:
     side = ca.tanh((right - left) / w_even)
     w_inner = (right + left) / 2 - side * (right - left) / 2
     locked = ca.exp(-((w_inner / w_lock) ** 2))
-    turning = ca.fmax(slip_a + slip_b * difference + slip_c * w_inner, E_MINIMUM)
+    growth = slip_b * difference + slip_c * w_inner
+    turning = ca.fmax(slip_a + growth, E_MINIMUM)
     outer = (1 - locked) * turning + locked * outer_locked
-    inner = (1 - locked) * ca.fmax(e_inner, E_MINIMUM) + locked * inner_locked
+    inner = (1 - locked) * ca.fmax(e_inner - exchange * growth, E_MINIMUM) + locked * inner_locked
     e2 = (outer + inner) / 2 + side * (outer - inner) / 2
     e3 = (outer + inner) / 2 - side * (outer - inner) / 2
 
