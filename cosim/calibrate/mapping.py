@@ -27,14 +27,14 @@ from ..measurement import Run as DataRun
 from ..provider import Provider
 from ..signals import Table
 from ..system_file import SystemFile, read_system
-from .parts import COINCIDENT, Channel, Parameter, Run, check_parameters
+from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
 from .problem import Problem
 
 Vector = NDArray[np.float64]
 KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
-    "only", "run", "columns", "time", "ticks", "search_step",
+    "only", "run", "columns", "time", "ticks", "search_step", "search",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
@@ -317,8 +317,21 @@ class _Mapping:
             period=float(table["period"]) if "period" in table else None,
             workers=workers,
             ticks=bool(table.get("ticks", False)),
-            search_step=float(table["search_step"]) if "search_step" in table else None,
+            search=self.search(),
         )
+
+    def search(self) -> Coarse | None:
+        """How the system is run in a search; None for no other way than always."""
+        step, table = self.table.get("search_step"), self.table.get("search", {})
+        if set(table) - {"options", "parameters"}:
+            raise ScenarioError(f"{self.path}: [search] has options and parameters, no other keys")
+        if table and (step is None or step == self.table["step"] or not self.table.get("ticks")):
+            raise ScenarioError(
+                f"{self.path}: [search] needs a search_step other than step = "
+                f"{self.table['step']} and ticks = true: its error is measured against these ticks"
+            )
+        parameters = {name: float(v) for name, v in flatten(table.get("parameters", {})).items()}
+        return None if step is None else Coarse(float(step), table.get("options", {}), parameters)
 
     def _column(self, channel: Channel) -> str:
         return self.columns[channel.name]

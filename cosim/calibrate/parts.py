@@ -21,6 +21,21 @@ keep times rounded, often to 32 bits)."""
 
 
 @dataclass(frozen=True)
+class Coarse:
+    """How a system is run where thousands of simulations count more than the last digit.
+
+    Attributes:
+        step: communication step [s].
+        options: of the master's algorithm.
+        parameters: full variable name -> value, e.g. longer internal steps and sample periods.
+    """
+
+    step: float
+    options: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Parameter:
     """An uncertain value.
 

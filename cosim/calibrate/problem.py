@@ -32,6 +32,7 @@ from ..variants import apply
 from .parts import (
     COINCIDENT,
     Channel,
+    Coarse,
     Parameter,
     Refinement,
     Run,
@@ -63,7 +64,7 @@ class Problem:
         instances: name -> variant, the system's own if not given.
         workers: threads.
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
-        search_step: coarser step at which thousands of simulations may be made [step].
+        search: coarser way for thousands of simulations; it holds where `step` is its step.
     """
 
     def __init__(
@@ -82,9 +83,10 @@ class Problem:
         instances: Mapping[str, str] | None = None,
         workers: int | None = None,
         ticks: bool = False,
-        search_step: float | None = None,
+        search: Coarse | None = None,
     ) -> None:
-        self.ticks, self.search_step = ticks, search_step or step
+        self.ticks, self.search = ticks, search or Coarse(step)
+        self.search_step = self.search.step
         self.name, self.file, self.provider = name, file, provider
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
@@ -170,7 +172,8 @@ class Problem:
         if self._system is None:
             file = replace(self.file, instances=self.instances, parameters={})
             system = file.build(self.provider)
-            for name, value in {**self.file.parameters, **self.constants}.items():
+            coarse = self.search.parameters if self.step == self.search.step else {}
+            for name, value in {**self.file.parameters, **self.constants, **coarse}.items():
                 if name.partition(".")[0] in self.instances:
                     try:
                         system.set(name, value)
@@ -190,7 +193,8 @@ class Problem:
     def session(self, run: Run) -> Session:
         """A new prepared run."""
         system = self.system()
-        master = Master(system, self.algorithm, self.step)
+        options = self.search.options if self.step == self.search.step else {}
+        master = Master(system, self.algorithm, self.step, options=options)
         interval = self.period or float(np.median(np.diff(run.times)))
         every = max(round(interval / self.step), 1)
         size = every * self.step
@@ -390,7 +394,7 @@ class Problem:
             "parameters": self.parameters, "channels": self.channels, "runs": self.runs,
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
-            "ticks": self.ticks, "search_step": self.search_step,
+            "ticks": self.ticks, "search": self.search,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)
