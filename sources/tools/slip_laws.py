@@ -101,7 +101,7 @@ def _solved(terms: tuple[str, ...], turns: Turns, values: Vector) -> Callable[[T
 
 
 class OuterSkid:
-    """The outer track skids by i = a/(b + rho), so e2 = B i/(1 - rho - i); the inner one does not."""
+    """The outer track alone skids, by i = a/(b + rho), so e2 = B i/(1 - rho - i)."""
 
     size = 2
 
