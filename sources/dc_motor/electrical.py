@@ -72,9 +72,9 @@ def equations(m: Model) -> None:
     def loop(error: SX, integral: SX, filtered: SX, gains: tuple[SX, SX, SX, SX], limit: SX) -> SX:
         kp, ki, kd, t_f = gains
         rate = (error - filtered) / t_f
-        wanted = kp * error + integral + kd * rate
-        excess = (ca.fabs(wanted) / limit - 1) / BAND
-        m.derivative(integral, ki * error * ca.fmax(0, ca.fmin(1 - excess, 1)))
+        wanted = kp * error + integral + kd / t_f * (error - filtered)
+        rest = 1 / BAND + 1 - 1 / BAND / limit * ca.fabs(wanted)
+        m.derivative(integral, ki * error * ca.fmax(0, ca.fmin(rest, 1)))
         m.derivative(filtered, rate)
         return ca.fmax(-limit, ca.fmin(wanted, limit))
 

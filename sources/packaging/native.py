@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -52,6 +53,10 @@ PLATFORMS: dict[str, Platform] = {
     "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
 }
 
+CHOICES = {"fmin": "x < y ? x : y", "fmax": "x > y ? x : y"}
+"""What stands for two functions of C: one instruction, whose result for zeros of different sign is
+the same on every processor, and which hides a NaN in the first place only."""
+
 
 class CompilerError(RuntimeError):
     """The C compiler failed; the text carries what it said."""
@@ -70,7 +75,12 @@ def _casadi_code(functions: Functions) -> str:
         used += [functions.periods, *functions.updates]
     for function in used:
         generator.add(function)
-    return str(generator.dump())
+    code = str(generator.dump())
+    for name, choice in CHOICES.items():
+        code = code.replace(f"return {name}(x, y);", f"return {choice};")
+    # all arguments and results are given
+    code = re.sub(r"arg\[(\d+)\]\? arg\[\1\]\[(\d+)\] : 0", r"arg[\1][\2]", code)
+    return re.sub(r"if \(res\[\d+\]!=0\) ", "", code)
 
 
 def model_source(model: Model, functions: Functions, entries: list[Entry], identifier: str) -> str:

@@ -1,4 +1,4 @@
-"""Run time of the python FMUs: what c/core.c does, on lists. Its text is copied into every slave.
+"""Run time of the python FMUs: what the C files do, on lists. Its text is copied into every slave.
 
 Above the line stand the names that a generated slave defines before it.
 """
@@ -133,20 +133,17 @@ def _sign(a: float) -> float:
 
 
 def _fmin(a: float, b: float) -> float:
-    if a != a:
-        return b
-    return a if a <= b or b != b else b
+    return a if a < b else b
 
 
 def _fmax(a: float, b: float) -> float:
-    if a != a:
-        return b
-    return a if a >= b or b != b else b
+    return a if a > b else b
 
 
 SLACK = 1e-7  # part of its period by which a tick may be early
 KEEP = 20  # steps with one Jacobian
 GAMMA = 0.435866521508459  # of ROS34PW2
+GROW, SHRINK, SAFETY = 5.0, 0.1, 0.9  # of error-controlled steps
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
@@ -287,7 +284,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         while True:
             self._run_ticks()
             following = self._next_tick(end)
-            self._integrate(following)
+            whole = following == end and v[0] == current_time
+            self._integrate(following, step_size if whole else following - v[0])
             self._check(self.IZ, NZ)
             if following == end:
                 return True
@@ -337,15 +335,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- solvers ----------------------------------------------------------------------------------
 
-    def _integrate(self, t1: float) -> None:
+    def _integrate(self, t1: float, length: float) -> None:
         v = self.v
         if NX:
             method, step = v[self.IS], v[self.IS + 1]
             if method <= 2:
                 t0 = v[0]
-                count = _math.ceil((t1 - t0) / step * (1 - 1e-9))
-                n = 1 if count < 1 else int(count)
-                h = (t1 - t0) / n
+                n = _math.ceil(length / step * (1 - 1e-9)) if length > step else 1
+                h = length / n
                 for i in range(n):
                     x = v[self.IX : self.IXD]
                     x = (
@@ -355,7 +352,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                     )
                     v[self.IX : self.IXD] = x
             else:
-                self._adaptive(t1, int(method))
+                self._adaptive(t1, length, int(method))
         v[0] = t1
         self.stale = True
         self._check(self.IX, NX)
@@ -381,6 +378,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         f_jacobian([t], x, *self._held, f, j, ft)
         ih = 1.0 / h
         f_factor(j, 2.0 * ih, w)
+        self.left = 0
         k1 = [f[i] + 0.5 * h * ft[i] for i in r]
         f_solve(w, k1)
         k2 = [f[i] + 4.0 * ih * k1[i] + 1.5 * h * ft[i] for i in r]
@@ -501,34 +499,45 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.left -= 1
         return [y[i] + k4[i] for i in r], e
 
-    def _adaptive(self, t1: float, code: int) -> None:
+    def _adaptive(self, t1: float, length: float, code: int) -> None:
         v = self.v
         largest, tolerance = v[self.IS + 1], v[self.IS + 2]
         t, h = v[0], self.h if self.h > 0 else 0.1 * largest
-        exponent = -1.0 / 5.0 if code == 3 else -1.0 / 3.0
+        order = 5 if code == 3 else 3
+        exponent = -1.0 / order
+        quiet = steady = 1.0
+        for _ in range(order):
+            quiet, steady = quiet * (SAFETY / GROW), steady * SAFETY
         method = {3: self._dopri5, 4: self._rodas3, 5: self._rosw3}[code]
         while t < t1:
             if h > largest:
                 h = largest
             last = t + h * (1 + 1e-9) >= t1
-            hs = t1 - t if last else h
+            hs = h if not last else length if t == v[0] else t1 - t
             x = v[self.IX : self.IXD]
             new, e = method(t, hs, x)
-            error = 0.0
+            error = quiet
             for i in range(NX):
                 if OWNER[i] and v[OWNER[i]] == 0.0:
                     continue
-                ratio = abs(e[i]) / (tolerance * (NOMINAL[i] + abs(x[i])))
-                if not ratio <= error:
-                    error = ratio
+                scale = tolerance * (NOMINAL[i] + abs(x[i]))
+                if not abs(e[i]) <= error * scale:
+                    error = abs(e[i]) / scale
+                if error != error:
+                    break
             if error <= 1:
                 v[self.IX : self.IXD] = new
                 t = t1 if last else t + hs
+                if error <= steady and h >= largest:
+                    continue  # it cannot grow
             elif code == 5 and self.left < KEEP - 1:
                 self.left = 0  # perhaps the Jacobian was too old: once more with a new one
                 continue
-            factor = 0.9 * _math.pow(error + 1e-10, exponent) if _math.isfinite(error) else 0.1
-            factor = min(max(factor, 0.1), 5.0)
+            if error <= quiet:
+                factor = GROW
+            else:
+                factor = SAFETY * _math.pow(error, exponent) if _math.isfinite(error) else SHRINK
+            factor = min(max(factor, SHRINK), GROW)
             if not last or error > 1 or hs * factor > h:
                 h = hs * factor
             if h < 1e-12 * (1 + abs(t)):

@@ -3,6 +3,10 @@
 
 #include "core.c"
 
+#include "solvers.c"
+
+#include "steps.c"
+
 #include "fmi2.c"
 
 #include "fmi3.c"
