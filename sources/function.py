@@ -14,6 +14,9 @@ from scipy.integrate import solve_ivp
 from .model import Clock, Model, Variable
 
 Vector = NDArray[np.float64]
+QUICK, LARGE = 8, 200
+"""Instructions of an output that is computed without the others, and of a function that is worth
+it."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,9 @@ class Functions:
 
     Attributes:
         outputs: `-> (xdot, y)`.
+        quick: `->` the outputs that take next to nothing to compute, states above all; without
+            the derivatives, on which energies and forces hang.
+        quick_outputs: their indices.
         derivatives: `-> xdot`.
         jacobian: `-> (xdot, d xdot/dx as nonzeros, d xdot/dt)`.
         jacobian_pattern: (row, column) of the nonzeros.
@@ -35,6 +41,8 @@ class Functions:
     """
 
     outputs: ca.Function
+    quick: ca.Function
+    quick_outputs: tuple[int, ...]
     derivatives: ca.Function
     jacobian: ca.Function
     jacobian_pattern: tuple[tuple[int, int], ...]
@@ -95,8 +103,12 @@ def build_functions(model: Model) -> Functions:
             name, arguments + (extra or []), ca.cse([ca.densify(r) for r in results])
         )
 
+    whole = function("f_outputs", [xdot, y])
+    few = _quick(y, arguments) if whole.n_instructions() > LARGE else ()
     return Functions(
-        outputs=function("f_outputs", [xdot, y]),
+        outputs=whole,
+        quick=function("f_quick", [y[list(few)] if few else ca.SX(0, 1)]),
+        quick_outputs=few,
         derivatives=function("f_derivatives", [xdot]),
         jacobian=function("f_jacobian", [xdot, _nonzeros(jacobian), ca.jacobian(xdot, t)]),
         jacobian_pattern=tuple(zip(rows, columns, strict=True)),
@@ -110,6 +122,15 @@ def build_functions(model: Model) -> Functions:
         ),
         output_dependencies=dependencies(y, [v.name for v in outputs]),
         derivative_dependencies=dependencies(xdot, [v.name for v in roles["state"]]),
+    )
+
+
+def _quick(y: Any, arguments: list[Any]) -> tuple[int, ...]:
+    """Which outputs take few instructions, loads and stores included."""
+    return tuple(
+        index
+        for index in range(y.numel())
+        if ca.Function("f", arguments, [y[index]]).n_instructions() <= QUICK
     )
 
 

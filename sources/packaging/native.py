@@ -71,6 +71,8 @@ def _casadi_code(functions: Functions) -> str:
     used = [functions.outputs, functions.derivatives, functions.directional]
     if functions.derivatives.numel_out():
         used.append(functions.jacobian)
+    if functions.quick_outputs:
+        used.append(functions.quick)
     if functions.updates:
         used += [functions.periods, *functions.updates]
     for function in used:
@@ -103,6 +105,7 @@ def model_source(model: Model, functions: Functions, entries: list[Entry], ident
         "NC": len(functions.updates),
         "NJ": len(functions.jacobian_pattern),
         "NLU": elimination.size,
+        "NQ": len(functions.quick_outputs),
         "TIMED": int(any(functions.outputs.jac_sparsity(k, 0).nnz() for k in (0, 1))),
     }
     infinity = float("inf")
@@ -136,6 +139,13 @@ def model_source(model: Model, functions: Functions, entries: list[Entry], ident
         f"static const int OWNER[] = {{{', '.join(map(str, [*owners(entries), 0]))}}};",
         f"static const double NOMINAL[] = {{{', '.join(map(_number, [*nominal, 1.0]))}}};",
     ]
+    if functions.quick_outputs:
+        few = [str(int(k in functions.quick_outputs)) for k in range(counts["output"])]
+        places = map(str, functions.quick_outputs)
+        lines += [
+            f"static const char QUICK[] = {{{', '.join(few)}}};",
+            f"static const int QUICK_PLACE[] = {{{', '.join(places)}}};",
+        ]
     if functions.updates:
         names = ", ".join(function.name() for function in functions.updates)
         lines.append(

@@ -41,7 +41,7 @@ typedef struct {
   double slope[NU + 1];  /* first derivatives of the inputs at the present time */
   double curve[NU + 1];  /* second derivatives */
   int32_t mode;
-  int32_t stale;         /* outputs and derivatives must be evaluated again */
+  int32_t stale;         /* outputs and derivatives must be evaluated again; QUICK_DONE: but for the quick ones */
   int32_t moving;        /* inputs have been given derivatives */
   int32_t left;          /* for how many steps the Jacobian may still serve */
 } Memory;
@@ -130,11 +130,32 @@ static void move_on(Memory *m, double t) {
   m->v[0] = t;
 }
 
+enum { QUICK_DONE = 2 };
+
 static void refresh(Instance *c) {
   if (c->m.stale) {
     evaluate_outputs(c->m.v);
     c->m.stale = 0;
   }
+}
+
+/* Bring an output or derivative up to date: outputs such as a state without all the others. */
+static void refresh_for(Instance *c, uint32_t k) {
+#if NQ
+  if (k >= IY && QUICK[k - IY]) {
+    if (c->m.stale == QUICK_DONE) return;
+    double *v = c->m.v, y[NQ];
+    const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
+    double *res[] = {y};
+    f_quick(arg, res, 0, 0, 0);
+    for (int i = 0; i < NQ; i++) v[IY + QUICK_PLACE[i]] = y[i];
+    c->m.stale = QUICK_DONE;
+    return;
+  }
+#else
+  (void)k;
+#endif
+  refresh(c);
 }
 
 static int check_finite(Instance *c, int from, int count) {
@@ -184,7 +205,7 @@ static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[
     const uint32_t k = vr[i];
     if (k >= METHOD && (k >= NV || k == METHOD))
       return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
-    if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh(c);
+    if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh_for(c, k);
     const double value = c->m.v[k];
     values[i] = value;
     if (!isfinite(value)) return check_finite(c, k, 1);
