@@ -60,7 +60,7 @@ def _library(fmu: Fmu) -> Any:
                 f"{fmu.path}: its binary cannot be loaded ({error}); it may need a library that "
                 "this machine lacks"
             ) from error
-        # libraries of pythonfmu read freed memory when the process ends, unless told before
+        # libraries of pythonfmu release their state twice when the process ends, unless told before
         finalize = getattr(_libraries[path], "finalizePythonInterpreter", None)
         if finalize is not None:
             atexit.register(finalize)

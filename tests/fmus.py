@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
@@ -19,7 +20,7 @@ from sources.packaging import catalog
 from sources.packaging.build import build
 
 OUT = Path(__file__).parent.parent / "fmus"
-_FINALIZED: set[Path] = set()
+_KEPT: dict[str, ctypes.CDLL] = {}
 _HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
 
 
@@ -90,11 +91,14 @@ class Slave:
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
             self.fmu = FMU2Slave(**arguments)
-            # libraries of pythonfmu read freed memory when the process ends, unless told before
-            finalize = getattr(self.fmu.dll, "finalizePythonInterpreter", None)
-            if finalize is not None and path not in _FINALIZED:
-                _FINALIZED.add(path)
-                atexit.register(finalize)
+            # Libraries of pythonfmu release their state twice when the process ends, unless told
+            # before. FMPy unloads a library with its last instance: it is held, or the function
+            # would no longer be where it was. (The first one stays anyway, since it owns symbols
+            # that are unique in a process.)
+            library = str(self.fmu.dll._name)
+            if hasattr(self.fmu.dll, "finalizePythonInterpreter") and library not in _KEPT:
+                _KEPT[library] = ctypes.CDLL(library)
+                atexit.register(_KEPT[library].finalizePythonInterpreter)
             # an interpreted FMU reports its exceptions only when it may log
             chatty = bool(self.description.coSimulation.needsExecutionTool)
             self.fmu.instantiate(callbacks=self._callbacks, loggingOn=chatty)
