@@ -10,6 +10,12 @@ Printed per run and channel: root mean square, mean absolute and relative error 
 over norm of the channel), and what was fitted, with 95 % intervals. The errors are those of the
 whole simulated run.
 
+With `[end]` only the error at the last measured sample of each run counts: the dead reckoning of a
+vehicle over windows that begin at its measured pose. Printed per log and purpose: root mean square
+and median of the distance, root mean square of the yaw. `[[part]]` lists choices of runs (`only`,
+as in the mapping) that are modelled one after the other; a model with `parts` is for these only,
+and what it lists in `keep` stays as it was found before, in another part or model.
+
 With `[inverse]` the model is turned round, too: the force that it needs for the measured motion
 against the force that was commanded, both behind the same low-pass filter without phase. The
 command is held between samples, so it acts half a sample later than it was logged on average;
@@ -51,7 +57,8 @@ def model_of(problem: Problem, entry: Mapping[str, Any], known: Mapping[str, flo
         for p in problem.parameters
         if p.role == "effect" and not p.strength and p.name not in free
     }
-    problem = problem.hold({**held, **entry.get("hold", {})})
+    kept = {name: known[name] for name in entry.get("keep", ())}
+    problem = problem.hold({**held, **kept, **entry.get("hold", {})})
     changed = []
     for p in problem.parameters:
         value = min(max(start.get(p.name, p.nominal), p.minimum), p.maximum)
@@ -76,6 +83,34 @@ def errors(problem: Problem, theta: Vector, skip: float) -> list[tuple[str, str,
                 100.0 * float(np.linalg.norm(error) / np.linalg.norm(values)),
             ]))  # fmt: skip
     return table
+
+
+def ends(problem: Problem, theta: Vector, entry: Mapping[str, Any]) -> dict[str, Vector]:
+    """Error of the position [m] and of the yaw at the end of each run, by log and purpose.
+
+    Each row is one run: what the model lacks along x and y, and its yaw error.
+    """
+    names = [c.name for c in problem.channels]
+    place = [names.index(name) for name in (*entry["position"], entry["yaw"])]
+    rows: dict[str, list[Vector]] = {}
+    for name, residual in problem.residuals(theta, None):
+        run = problem.run(name)
+        error = residual[:, place] * problem.sigma[place]
+        last = error[np.flatnonzero(np.isfinite(error).all(axis=1))[-1]]
+        log = str(run.values.get("name", name))
+        for key in (f"{log} ({run.purpose})", f"all ({run.purpose})"):
+            rows.setdefault(key, []).append(last)
+    return {key: np.array(found) for key, found in rows.items()}
+
+
+def print_ends(problem: Problem, theta: Vector, entry: Mapping[str, Any]) -> None:
+    """Table of the errors at the ends of the runs."""
+    found = ends(problem, theta, entry)
+    for key in sorted(found, key=lambda k: (k.startswith("all"), k)):
+        distance = np.hypot(found[key][:, 0], found[key][:, 1])
+        yaw = found[key][:, 2]
+        print(f"  {key:40} {distance.size:4} runs  {np.sqrt(np.mean(distance**2)):.4f} m (median "
+              f"{np.median(distance):.4f}), {np.sqrt(np.mean(yaw**2)):.4f} rad")  # fmt: skip
 
 
 def smooth(values: Vector, interval: float, frequency: float) -> Vector:
@@ -141,11 +176,40 @@ def shown(estimate: Estimate) -> str:
     )
 
 
+def print_errors(problem: Problem, theta: Vector, skip: float) -> None:
+    """Table of the errors over whole runs."""
+    rows = errors(problem, theta, skip)
+    for run, channel, (rms, mean, relative) in rows:
+        purpose = problem.run(run).purpose
+        print(
+            f"  {run:22} {purpose:14} {channel:6} rms {rms:.4g}  mean {mean:.4g}  {relative:.4g} %"
+        )
+    for channel in dict.fromkeys(row[1] for row in rows):
+        mine = [row for row in rows if row[1] == channel]
+        for purpose in dict.fromkeys(problem.run(row[0]).purpose for row in mine):
+            part = [r[2][1] for r in mine if problem.run(r[0]).purpose == purpose]
+            print(f"  mean over runs         {purpose:14} {channel:6} {np.mean(part):.4g}")
+        print(f"  mean over runs         all            {channel:6} "
+              f"{np.mean([r[2][1] for r in mine]):.4g}")  # fmt: skip
+
+
 def compared(mapping: Path, folder: Path, models: Path) -> None:
-    """Print the table of all models."""
+    """Print the tables of all models, for each part of the runs."""
     table = read_toml(models)
-    base = read_problem(folder, mapping=mapping / str(table.get("mapping", "dataset.toml")))
-    known: dict[str, float] = {}
+    path = mapping / str(table.get("mapping", "dataset.toml"))
+    known: Mapping[str, float] = {}
+    for part in table.get("part", [{}]):
+        if "name" in part:
+            print(f"\n=== {part['name']}")
+        base = read_problem(folder, mapping=path, only=part.get("only"))
+        here = [m for m in table["model"] if part.get("name") in m.get("parts", [part.get("name")])]
+        known = compared_part(base, {**table, "model": here}, known)
+
+
+def compared_part(
+    base: Problem, table: Mapping[str, Any], known: Mapping[str, float]
+) -> Mapping[str, float]:
+    """Print the table of all models of a problem; what is known after it."""
     for entry in table["model"]:
         problem = model_of(base, entry, known)
         theta = problem.nominal
@@ -155,18 +219,10 @@ def compared(mapping: Path, folder: Path, models: Path) -> None:
             theta = estimate.theta
             known = {**known, **estimate.values}
             print(f"  {shown(estimate)}")
-        rows = errors(problem, theta, float(table.get("skip", 0.0)))
-        for run, channel, (rms, mean, relative) in rows:
-            purpose = problem.run(run).purpose
-            print(f"  {run:22} {purpose:14} {channel:6} rms {rms:.4g}  mean {mean:.4g}  "
-                  f"{relative:.4g} %")  # fmt: skip
-        for channel in dict.fromkeys(row[1] for row in rows):
-            mine = [row for row in rows if row[1] == channel]
-            for purpose in dict.fromkeys(problem.run(row[0]).purpose for row in mine):
-                part = [r[2][1] for r in mine if problem.run(r[0]).purpose == purpose]
-                print(f"  mean over runs         {purpose:14} {channel:6} {np.mean(part):.4g}")
-            print(f"  mean over runs         all            {channel:6} "
-                  f"{np.mean([r[2][1] for r in mine]):.4g}")  # fmt: skip
+        if "end" in table:
+            print_ends(problem, theta, table["end"])
+        else:
+            print_errors(problem, theta, float(table.get("skip", 0.0)))
         if "inverse" in table:
             for run in problem.runs:
                 found = inverse(problem, theta, run, table["inverse"])
@@ -174,6 +230,7 @@ def compared(mapping: Path, folder: Path, models: Path) -> None:
                     print(f"  inverse force {run.name}: {found[0]:.3f} % as logged, "
                           f"{found[1]:.3f} % held")  # fmt: skip
         problem.close()
+    return known
 
 
 def main() -> None:

@@ -73,7 +73,12 @@ KINDS: dict[str, Kind] = {
             deflection="twist [rad]", rate="twist rate [rad/s]", stiffness="stiffness [N.m/rad]"
         ),
     ),
-    "signal": Kind("", "", _names(value="the undisturbed signal")),
+    "signal": Kind(
+        "",
+        "",
+        _names(value="the undisturbed signal"),
+        _names(wheels="speeds of wheels that one controller commands [rad/s]"),
+    ),
     "coefficient": Kind(
         "",
         "",
@@ -86,6 +91,7 @@ KINDS: dict[str, Kind] = {
             current="current that the coefficient may depend on [A]",
             side="-1 right, +1 left of the vehicle",
             longitudinal="the same coefficient along the track or wheel",
+            roller="load on each wheel that runs across on rollers [N]",
         ),
     ),
     "pivot": Kind(

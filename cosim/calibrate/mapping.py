@@ -9,15 +9,12 @@ in the model. It is looked for in the data set's folder, above it, and among the
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 from .. import library
 from ..errors import ScenarioError, UnknownNameError, listing
@@ -27,7 +24,9 @@ from ..measurement import Run as DataRun
 from ..provider import Provider
 from ..signals import Table
 from ..system_file import SystemFile, read_system
+from .columns import ITEM, expand, prepared
 from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
+from .pieces import pieces, relative_pose, windows
 from .problem import Problem
 
 Vector = NDArray[np.float64]
@@ -35,15 +34,11 @@ KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
     "only", "run", "columns", "time", "ticks", "search_step", "search",
+    "resample", "relative",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
-GAP = 3.0
-"""Intervals of a clock longer than this many usual ones are gaps."""
-_COLUMN = {"source", "time", "late", "scale", "offset", "unit", "lowpass", "derivative"}
 _INPUT = {"column", "columns", "gain", "unit", "interpolation", "quantum"}
-_RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
-_ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
 
 
 def find_mapping(folder: Path, rig: str) -> Path:
@@ -83,15 +78,6 @@ def find_system(path: Path, name: str) -> SystemFile:
     raise UnknownNameError(f"{path}: there is no system {name!r}; {listing(known, name)}")
 
 
-def expand(name: str) -> list[str]:
-    """Column names behind a sheet's `q_1..6` or `m1..5_x` (others stand for themselves)."""
-    match = _RANGE.fullmatch(name)
-    if match is None:
-        return [name]
-    numbers = range(int(match["first"]), int(match["last"]) + 1)
-    return [f"{match['stem']}{i}{match['tail']}" for i in numbers]
-
-
 def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
     """`"a.b"`, a list of such, or a table variable -> factor."""
     if isinstance(entry, str):
@@ -104,7 +90,7 @@ def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
 
 
 def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
-    match = _ITEM.fullmatch(key)
+    match = ITEM.fullmatch(key)
     if match is None or match["key"] not in values:
         raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
     value = values[match["key"]]
@@ -118,6 +104,7 @@ def read_problem(
     mapping: Path | str | None = None,
     system: str | None = None,
     workers: int | None = None,
+    only: Mapping[str, Any] | None = None,
 ) -> Problem:
     """Read a data set as a calibration problem.
 
@@ -127,6 +114,7 @@ def read_problem(
         mapping: a `dataset.toml`, looked for if not given.
         system: another system than the mapping's, with the same instances.
         workers: threads.
+        only: entries that the runs must have, besides those of the mapping's `only`.
 
     Raises:
         ScenarioError, UnknownNameError: a file or a name in it is wrong.
@@ -142,7 +130,7 @@ def read_problem(
     else:
         path = Path(mapping) if mapping is not None else find_mapping(folder, "")
         data = _plain(folder, path)
-    return _Mapping(path, data).problem(provider, system, workers)
+    return _Mapping(path, data, only or {}).problem(provider, system, workers)
 
 
 def _plain(folder: Path, path: Path) -> DataSet:
@@ -165,18 +153,6 @@ def _plain(folder: Path, path: Path) -> DataSet:
     return DataSet(folder, folder.resolve().name, "", found, {}, {}, {})
 
 
-def _resampled(times: Vector, own: Vector, values: Vector) -> Vector:
-    """Values of another clock; NaN outside it and where it has gaps."""
-    good = np.isfinite(values) & np.isfinite(own)
-    own, values = own[good], values[good]
-    if own.size < 2:
-        return np.full(times.shape, np.nan)
-    result = np.interp(times, own, values, left=np.nan, right=np.nan)
-    place = np.clip(np.searchsorted(own, times), 1, own.size - 1)
-    gap = own[place] - own[place - 1] > GAP * float(np.median(np.diff(own)))
-    return np.where(gap, np.nan, result)
-
-
 def snapped(times: Vector, step: float) -> Vector:
     """Times on the grid of communication steps where they miss it by no more than rounding.
 
@@ -189,30 +165,10 @@ def snapped(times: Vector, step: float) -> Vector:
     return np.asarray(np.where(near, nearest, times), dtype=np.float64)
 
 
-def _filtered(times: Vector, values: Vector, entry: Mapping[str, Any], where: str) -> Vector:
-    """Low-pass without phase (fifth-order Butterworth, forward and back) and derivative."""
-    cutoff = float(entry.get("lowpass", 0.0))
-    if not cutoff and not entry.get("derivative", False):
-        return values
-    share = 2.0 * cutoff * float(np.median(np.diff(times)))
-    if share >= 1.0:
-        raise ScenarioError(f"{where}: a low-pass of {cutoff:g} is above half the sample rate")
-    if not np.isfinite(values).all():
-        raise ScenarioError(f"{where}: has gaps, which a filter does not bridge")
-
-    def smooth(rough: Vector) -> Vector:
-        return filtfilt(*butter(5, share), rough) if share else rough
-
-    values = smooth(values)
-    if entry.get("derivative", False):
-        values = smooth(np.gradient(values, times))
-    return np.asarray(values, dtype=np.float64)
-
-
 class _Mapping:
     """Joins a mapping file and a data set."""
 
-    def __init__(self, path: Path, data: DataSet) -> None:
+    def __init__(self, path: Path, data: DataSet, only: Mapping[str, Any]) -> None:
         self.path, self.data = path, data
         self.table = read_toml(path)
         unknown = set(self.table) - KEYS
@@ -223,65 +179,18 @@ class _Mapping:
             column: sigma for name, sigma in data.noise.items() for column in expand(name)
         }
         self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
-        wanted = self.table.get("only", {})
-        self.logs = {
-            name: self.prepared(data.log(name))
-            for name, run in data.runs.items()
-            if all(run.values.get(key, value) == value for key, value in wanted.items())
-        }
-
-    def prepared(self, log: Log) -> Log:
-        """The log on one clock, with the columns that the mapping makes."""
-        entries = self.table.get("columns", {})
-        name = str(self.table.get("time", "time"))
-        if not entries and name == "time":
-            return log
-        time = log[name]
-        columns: dict[str, Vector] = {
-            column: values for column, values in log.columns.items() if values.shape == time.shape
-        }
-        units = dict(log.units)
-        for column, entry in (
-            (
-                one,
-                {
-                    key: str(value).replace("{}", str(i)) if key == "source" else value
-                    for key, value in entry.items()
-                },
-            )
-            for name_, entry in entries.items()
-            for i, one in enumerate(expand(name_), 1)
-        ):
-            where = f"{self.path}: column {column}"
-            unknown = set(entry) - _COLUMN
-            if unknown:
-                raise ScenarioError(
-                    f"{where}: has no key {sorted(unknown)[0]!r}; {listing(sorted(_COLUMN))}"
-                )
-            values = log[str(entry.get("source", column))]
-            own = log[str(entry.get("time", name))] - float(entry.get("late", 0.0))
-            if own.shape != values.shape:
-                raise ScenarioError(
-                    f"{where}: {values.size} values, but its clock has {own.size} times; name its "
-                    "own clock with time"
-                )
-            if entry.get("time", name) != name or entry.get("late", 0.0):
-                values = _resampled(time, own, values)
-            values = _filtered(time, values, entry, where)
-            columns[column] = values * float(entry.get("scale", 1.0)) + float(
-                entry.get("offset", 0.0)
-            )
-            units[column] = str(entry.get("unit", units.get(column, "")))
-        clock = columns.get("time", time)
-        first, last = log.values.get("samples", (1, clock.size))
-        part = slice(int(first) - 1, int(last))
-        columns = {column: values[part] for column, values in columns.items()}
-        clock = clock[part]
-        if clock.size == 0:
-            raise ScenarioError(f"{log.name}: has {time.size} samples, none from {first} to {last}")
-        columns["time"] = clock - clock[0]
-        self.units.update({column: unit for column, unit in units.items() if unit})
-        return replace(log, columns=columns, units=units)
+        wanted = {**self.table.get("only", {}), **only}
+        self.logs: dict[str, Log] = {}
+        self.purposes: dict[str, str] = {}
+        lead = float(self.table.get("lead", 0.0))
+        for run in data.runs.values():
+            if any(run.values.get(key, value) != value for key, value in wanted.items()):
+                continue
+            for name, part in pieces(data.log(run.name)):
+                log = prepared(part, self.table, self.path)
+                self.units.update({column: unit for column, unit in log.units.items() if unit})
+                for one, window in windows(name, log, lead):
+                    self.logs[one], self.purposes[one] = window, run.purpose
 
     def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
         """The problem."""
@@ -318,6 +227,7 @@ class _Mapping:
             workers=workers,
             ticks=bool(table.get("ticks", False)),
             search=self.search(),
+            relative=[tuple(names) for names in self.table.get("relative", [])],
         )
 
     def search(self) -> Coarse | None:
@@ -408,7 +318,8 @@ class _Mapping:
         if isinstance(entry, (int, float)):
             return float(entry)
         if entry.startswith("first:"):
-            values = self.logs[run][entry.removeprefix("first:")]
+            log = self.logs[run]
+            values = log[entry.removeprefix("first:")][log.time >= 0.0]
             return float(values[np.isfinite(values)][0])
         return _lookup(self.logs[run].values, entry, where)
 
@@ -421,11 +332,21 @@ class _Mapping:
             value = self.value(key, name, where)
             starts.update({n: factor * value for n, factor in _targets(entry, where)})
         lead = float(self.table.get("lead", 0.0))
+        during = log.time >= 0.0
+        data = np.column_stack([self._measured(log, c)[during] for c in channels])
+        anchor = 0
+        for triple in self.table.get("relative", []):
+            place = [[c.name for c in channels].index(one) for one in triple]
+            known = np.flatnonzero(np.isfinite(data[:, place]).all(axis=1))
+            if not known.size:
+                raise ScenarioError(f"{log.name}: {', '.join(triple)} are never measured together")
+            anchor = int(known[0])
+            data[:, place] = relative_pose(data[:, place], anchor)
         return Run(
             name,
-            self.data.runs[name].purpose,
-            log.time + lead,
-            np.column_stack([self._measured(log, c) for c in channels]),
+            self.purposes[name],
+            log.time[during] + lead,
+            data,
             {
                 one: signal
                 for target, entry in self.table.get("inputs", {}).items()
@@ -434,6 +355,7 @@ class _Mapping:
             starts,
             log.values,
             lead,
+            anchor,
         )
 
     def _measured(self, log: Log, channel: Channel) -> Vector:
@@ -473,8 +395,11 @@ class _Mapping:
             before = float(values[0])
         else:
             before = float(values[0])
-        if lead > 0.0:
+        if times[0] > 0.0:
             times, values = np.append(0.0, times), np.append(before, values)
+        if "period" in self.table:  # recorded points may pass the last sample
+            times = np.append(times, times[-1] + float(self.table["period"]))
+            values = np.append(values, values[-1])
         return Table(
             times,
             values,

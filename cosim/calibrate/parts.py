@@ -149,6 +149,7 @@ class Run:
         starts: full variable name -> start value that is known for this run.
         values: entries of the run in its description.
         lead: the simulation begins this much before the first sample [s].
+        anchor: sample in whose frame relative poses are given.
     """
 
     name: str
@@ -159,6 +160,7 @@ class Run:
     starts: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     lead: float = 0.0
+    anchor: int = 0
 
 
 @dataclass(frozen=True)

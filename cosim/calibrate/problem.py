@@ -40,6 +40,7 @@ from .parts import (
     adjustable,
     free_parameter,
 )
+from .pieces import relative_pose
 
 Vector = NDArray[np.float64]
 LIMIT = 1e-2
@@ -65,6 +66,7 @@ class Problem:
         workers: threads.
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
         search: coarser way for thousands of simulations; it holds where `step` is its step.
+        relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
     """
 
     def __init__(
@@ -84,12 +86,14 @@ class Problem:
         workers: int | None = None,
         ticks: bool = False,
         search: Coarse | None = None,
+        relative: Sequence[Sequence[str]] = (),
     ) -> None:
         self.ticks, self.search = ticks, search or Coarse(step)
         self.search_step = self.search.step
         self.name, self.file, self.provider = name, file, provider
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
+        self.relative = tuple(relative)
         self.constants = dict(constants or {})
         self.step, self.algorithm, self.period = step, algorithm, period
         self.instances = dict(instances or file.instances)
@@ -239,9 +243,13 @@ class Problem:
         with self._lock:
             self._idle[run.name].append(session)
         place = {name: column for column, name in enumerate(session.names)}
-        return np.column_stack(
+        read = np.column_stack(
             [c.of(run.times, times, rows[:, place[c.signal]]) for c in self.channels]
         )
+        for names in self.relative:
+            pose = [[c.name for c in self.channels].index(name) for name in names]
+            read[:, pose] = relative_pose(read[:, pose], run.anchor)
+        return read
 
     def _map(self, function: Any, items: Sequence[Any]) -> list[Any]:
         if self.workers == 1 or len(items) < 2:
@@ -394,7 +402,7 @@ class Problem:
             "parameters": self.parameters, "channels": self.channels, "runs": self.runs,
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
-            "ticks": self.ticks, "search": self.search,
+            "ticks": self.ticks, "search": self.search, "relative": self.relative,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)

@@ -1,0 +1,52 @@
+"""Three omni wheels whose slip along and across balances on the base.
+
+Wheel i at arm (cos alpha_i, sin alpha_i) drives along t_i = (-sin alpha_i, cos alpha_i); its
+rollers let it run along n_i = (cos alpha_i, sin alpha_i). With the velocity V = (v_x, v_y, w_z):
+
+    slip along the wheel   s_i = T_i V - r w_i,   T_i = (t_i, arm)
+    run across it          u_i = A_i V,           A_i = (n_i, 0)
+    sum load_i (T_i^T s_i + rho_i A_i^T u_i) = 0
+
+The forces of the floor are in proportion to load and creep; rho_i, the drag of the rollers over the
+creep stiffness of the wheel, is 0 but for the effects on `roller`. With rho = 0 no wheel slips,
+whatever the loads: T V = r w.
+
+Not modelled: inertia, dry friction, bumps from roller to roller.
+
+Source: kinematics e.g. Siciliano et al., Robotics, 2009, ch. 11; linear creep in its simplest form,
+e.g. Kalker, Survey of wheel-rail rolling contact theory, 1979.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..laws import symmetric
+from ..laws.planar_frame import rotated
+from ..model import Model
+from . import ALPHA, ARM, LOAD, PHI, POSE_PHI, POSE_X, POSE_Y, V_X, V_Y, W_Z, R, W, X, Y
+
+LEVEL = 0
+SOLVER = Solver("rk4", 0.02)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    w = m.input(W)
+    w += m.balance("speeds", "signal", unit="rad/s", value=w).effort
+    r, arm, alpha, load = (m.parameter(q) for q in (R, ARM, ALPHA, LOAD))
+    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(3), roller=load).effort
+    cosine, sine = ca.cos(alpha), ca.sin(alpha)
+    along = ca.horzcat(-sine, cosine, ca.repmat(arm, 3))
+    across = ca.horzcat(cosine, sine, ca.DM.zeros(3))
+    weight = load / (ca.sum1(load) / 3)
+    matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
+    v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, along.T @ (weight * r * w)))
+    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
+    x_rate, y_rate = rotated(phi, v_x, v_y)
+    m.derivative(x, x_rate)
+    m.derivative(y, y_rate)
+    m.derivative(phi, w_z)
+    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V_X, v_x), (V_Y, v_y), (W_Z, w_z)):
+        m.output(quantity, value)
