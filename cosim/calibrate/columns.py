@@ -97,8 +97,14 @@ def _ends(log: Log, entry: Mapping[str, Any], time: Vector, where: str) -> Vecto
     values = np.full(time.shape, np.nan)
     values[[0, -1]] = [_element(log, str(item), where) for item in entry["ends"]]
     if entry.get("unwrap", False):
-        values[-1] -= 2 * np.pi * np.rint((values[-1] - values[0]) / (2 * np.pi))
+        period = _period(entry)
+        values[-1] -= period * np.rint((values[-1] - values[0]) / period)
     return values
+
+
+def _period(entry: Mapping[str, Any]) -> float:
+    """What a column's values jump by: a whole turn, or the number given."""
+    return 2 * np.pi if entry["unwrap"] is True else float(entry["unwrap"])
 
 
 def _element(log: Log, item: str, where: str) -> float:
@@ -127,7 +133,7 @@ def _column(log: Log, entry: Mapping[str, Any], main: str, time: Vector, where: 
     if entry.get("unwrap", False):
         values = values.copy()
         good = np.isfinite(values)
-        values[good] = np.unwrap(values[good])
+        values[good] = np.unwrap(values[good], period=_period(entry))
     same = name == main and not entry.get("late", 0.0) and time is log[main]
     if same and "gap" not in entry:
         return values

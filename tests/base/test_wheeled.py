@@ -74,3 +74,16 @@ def test_drag_of_the_rollers_takes_its_share_by_direction() -> None:
     got = base.outputs({**told, **unequal, "roller_drag.rho": 0.25})
     drive, drag = loads @ np.sin(ANGLES) ** 2, loads @ np.cos(ANGLES) ** 2
     assert got["v_x"] == pytest.approx(0.1 * drive / (drive + 0.25 * drag), rel=1e-12)
+
+
+def test_a_tricycle_turns_about_the_crossing_of_its_axles() -> None:
+    base = oracle("tricycle.sapienza/rolling")
+    told = {"steer": 0.5, "w": 2.0, "ratio": 1.2, "r": 0.1, "l": 1.5}
+    got = base.outputs(told)
+    radius = 1.5 / np.tan(0.6)
+    assert got["v"] == pytest.approx(got["w_z"] * radius, rel=1e-12)  # rounding
+    # the driven wheel itself does r w about the same point
+    assert got["w_z"] * np.hypot(radius, 1.5) == pytest.approx(0.2, rel=1e-12)
+    across = base.outputs({**told, "steer": np.pi / 2 / 1.2})
+    assert across["v"] == pytest.approx(0.0, abs=1e-12)
+    assert across["w_z"] == pytest.approx(0.2 / 1.5, rel=1e-12)
