@@ -7,6 +7,7 @@ Results go to stdout (one JSON value with `--json`), messages and progress to st
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import sys
 from collections.abc import Iterator
@@ -256,6 +257,7 @@ def fmus_build(
             _sources("variant").build_model(name)
     if kind is Kind.python and fmi == 3:
         raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
+    done = itertools.count(1)
     with _bad_names():
         built = build_many(
             names,
@@ -263,7 +265,7 @@ def fmus_build(
             fmi=fmi,
             kind=kind.value,
             platform=platform.value,
-            progress=lambda name, path: _say(f"{name}: {path}"),
+            progress=lambda name, path: _say(f"{next(done)}/{len(names)} {name}: {path}"),
         )
     paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
     if as_json:
@@ -290,15 +292,16 @@ def fmus_check(
             raise FmuFileError(f"{path}: there is no such file")
     if not paths:
         raise InputError(f"{library.fmus()}: has no .fmu; build some with 'cosim fmus build'")
-    results = {str(path): _check(path) for path in paths}
+    results = {}
+    for path in paths:
+        problems = results[str(path)] = _check(path)
+        if not as_json:
+            typer.echo(f"{path}: {'ok' if not problems else f'{len(problems)} problem(s)'}")
+            for problem in problems:
+                typer.echo(f"  {problem}")
     bad = sum(1 for problems in results.values() if problems)
     if as_json:
         _print_json({"checked": len(results), "with_problems": bad, "problems": results})
-    else:
-        for name, problems in results.items():
-            typer.echo(f"{name}: {'ok' if not problems else f'{len(problems)} problem(s)'}")
-            for problem in problems:
-                typer.echo(f"  {problem}")
     if bad:
         raise CheckError(f"{bad} of {len(results)} FMUs have problems")
 

@@ -67,6 +67,7 @@ def test_fmus_build_and_check(command: Command, tmp_path: Path) -> None:
     done = command("fmus", "build", "gearbox/ratio", "--out", tmp_path / "f", "--json")
     (built,) = json.loads(done.out)["built"]
     assert done.code == 0 and Path(built["file"]).is_file()
+    assert "1/1 gearbox/ratio: " in done.err
     done = command("fmus", "check", built["file"], "--json")
     assert done.code == 0
     assert json.loads(done.out) == {
