@@ -230,7 +230,8 @@ static void copy_scaled(const Copy *c, const Copy *end, double *values) {
   for (; c < end; c++) values[c->target] = values[c->source] * c->gain + c->offset;
 }
 
-static void add_energy(Run *run, int held) {
+/* Inlined with `held` known: it is no question of every term then. */
+static inline void add_energy(Run *run, int held) {
   const double *const values = run->values;
   const double half = 0.5 * run->step;
   Term *const end = run->terms + run->n_terms;
@@ -444,7 +445,8 @@ static int execute(Run *run, int64_t first, int64_t last) {
       member = step3(members + in->first, members + in->last, run->times[run->index], run->step, &status);
       break;
     case ENERGY:
-      add_energy(run, in->first == 1);
+      if (in->first == 1) add_energy(run, 1);
+      else add_energy(run, 0);
       break;
     case SOLVE:
       status = solve(run, run->loops + in->first);
