@@ -20,7 +20,7 @@ Vector = NDArray[np.float64]
 GAP = 3.0
 """Intervals of a clock longer than this many usual ones are gaps."""
 KEYS = {"source", "time", "late", "scale", "offset", "unit", "lowpass", "derivative", "hold", "gap",
-        "limit", "ends", "unwrap"}  # fmt: skip
+        "limit", "ends", "unwrap", "quaternion"}  # fmt: skip
 ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 
@@ -120,7 +120,7 @@ def _element(log: Log, item: str, where: str) -> float:
 
 def _column(log: Log, entry: Mapping[str, Any], main: str, time: Vector, where: str) -> Vector:
     """A column on the main clock."""
-    values = log[str(entry["source"])]
+    values = _yaw(log, entry["quaternion"]) if "quaternion" in entry else log[str(entry["source"])]
     name = str(entry.get("time", main))
     own = log[name] - float(entry.get("late", 0.0))
     if own.shape != values.shape:
@@ -139,6 +139,12 @@ def _column(log: Log, entry: Mapping[str, Any], main: str, time: Vector, where: 
         return values
     longest = float(entry["gap"]) if "gap" in entry else None
     return _resampled(time, own, values, longest=longest, hold=bool(entry.get("hold", False)))
+
+
+def _yaw(log: Log, names: list[str]) -> Vector:
+    """Yaw of a quaternion x, y, z, w that turns body into world axes."""
+    x, y, z, w = (log[name] for name in names)
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)))
 
 
 def _resampled(

@@ -34,7 +34,7 @@ KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
     "only", "run", "columns", "time", "ticks", "search_step", "search",
-    "resample", "relative",
+    "resample", "relative", "base",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
@@ -133,9 +133,17 @@ def read_problem(
     return _Mapping(path, data, only or {}).problem(provider, system, workers)
 
 
+def read_mapping(path: Path) -> dict[str, Any]:
+    """A mapping file; what it does not say is as in the file that it names as its `base`."""
+    table = read_toml(path)
+    if "base" not in table:
+        return table
+    return {**read_mapping(path.parent / str(table["base"])), **table}
+
+
 def _plain(folder: Path, path: Path) -> DataSet:
     """A data set of plain logs, whose runs the mapping lists."""
-    runs = read_toml(path).get("run", [])
+    runs = read_mapping(path).get("run", [])
     if not runs:
         raise ScenarioError(
             f"{folder}: has no set.toml, and {path} lists no runs "
@@ -170,7 +178,7 @@ class _Mapping:
 
     def __init__(self, path: Path, data: DataSet, only: Mapping[str, Any]) -> None:
         self.path, self.data = path, data
-        self.table = read_toml(path)
+        self.table = read_mapping(path)
         unknown = set(self.table) - KEYS
         if unknown:
             first = sorted(unknown)[0]

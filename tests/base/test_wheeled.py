@@ -87,3 +87,25 @@ def test_a_tricycle_turns_about_the_crossing_of_its_axles() -> None:
     across = base.outputs({**told, "steer": np.pi / 2 / 1.2})
     assert across["v"] == pytest.approx(0.0, abs=1e-12)
     assert across["w_z"] == pytest.approx(0.2 / 1.5, rel=1e-12)
+
+
+def mecanum_speeds(v_x: float, v_y: float, w_z: float, r: float = 0.07, arm: float = 0.369) -> dict:
+    rates = [v_x - v_y - arm * w_z, v_x + v_y + arm * w_z, v_x + v_y - arm * w_z,
+             v_x - v_y + arm * w_z]  # fmt: skip
+    return {f"w[{i}]": rate / r for i, rate in enumerate(rates, 1)}
+
+
+def test_mecanum_wheels_roll_as_in_the_book() -> None:
+    base = oracle("mecanum_wheels.polimi/rolling")
+    got = base.outputs({**mecanum_speeds(0.3, -0.2, 0.5), "load[1]": 90.0})
+    assert (got["v_x"], got["v_y"], got["w_z"]) == pytest.approx((0.3, -0.2, 0.5), rel=1e-12)
+
+
+def test_drag_of_mecanum_rollers_leaves_straight_driving_alone() -> None:
+    base = oracle("mecanum_wheels.polimi/rolling+roller_drag")
+    straight = base.outputs({**mecanum_speeds(0.3, 0.0, 0.0), "roller_drag.rho": 0.2})
+    assert (straight["v_x"], straight["v_y"]) == pytest.approx((0.3, 0.0), abs=1e-12)
+    # sideways, at 45 degrees: slip along v_y - r w ... and run across v_y + r w balance,
+    # (v - u) + rho (v + u) = 0 with u the speed of the wheels
+    aside = base.outputs({**mecanum_speeds(0.0, 0.3, 0.0), "roller_drag.rho": 0.2})
+    assert aside["v_y"] == pytest.approx(0.3 * (1 - 0.2) / (1 + 0.2), rel=1e-12)

@@ -183,3 +183,19 @@ def test_a_counter_that_begins_anew_is_counted_on(tmp_path: Path) -> None:
     text += "[columns]\nright = { unwrap = 8, scale = 0.004 }\n"
     # counts are exact here, so the speed is: residuals as small as those of the exact speeds
     assert worst(problem_of(tmp_path, text, **log)) < 1e-5
+
+
+def test_the_yaw_of_a_quaternion_and_a_mapping_on_another(tmp_path: Path) -> None:
+    log = {"t": TIMES, "left": LEFT, "right": RIGHT, **circle(TIMES, heading=2.9)}
+    yaw = log.pop("yaw")
+    tilt = 0.3  # about the world's x axis, before the yaw: does not change it
+    log["q"] = np.column_stack([np.cos(yaw / 2) * np.sin(tilt / 2), np.sin(yaw / 2)
+                                * np.sin(tilt / 2), np.sin(yaw / 2) * np.cos(tilt / 2),
+                                np.cos(yaw / 2) * np.cos(tilt / 2)])  # fmt: skip
+    (tmp_path / "first.toml").write_text(HEAD.replace("step = 0.05", "step = 0.01"))
+    text = 'base = "first.toml"\nstep = 0.05\n[columns]\n' + (
+        'yaw = { quaternion = ["q_1", "q_2", "q_3", "q_4"], unwrap = true }\n'
+    )
+    problem = problem_of(tmp_path, text, **log)
+    assert problem.step == 0.05
+    assert worst(problem) < 1e-5  # as above

@@ -1,0 +1,78 @@
+"""Four Mecanum wheels whose slip along and across their rollers balances on the base.
+
+Wheel i at p_i = (+-length, +-width) turns at w_i; its contact moves at v_i = v + w_z x p_i. The
+roller on the floor has its axis along g_i and rolls along h_i:
+
+    g_i = (cos gamma, -+sin gamma)   (front left and rear right: -, front right and rear left: +)
+    slip along the axis     s_i = g_i . (v_i - r w_i e_x)
+    run across the axis     u_i = h_i . (v_i - r w_i e_x)
+    sum load_i J_i^T (g_i s_i + rho_i h_i u_i) = 0
+
+The forces of the floor are in proportion to load and creep; rho_i, the drag of the rollers over the
+creep stiffness along their axis, is 0 but for the effects on `roller`. With rho = 0 the motion is
+the least squares solution of g_i . v_i = r w_i cos gamma, weighted with the loads: four wheels for
+three velocities.
+
+Not modelled: inertia, dry friction, bumps from roller to roller.
+
+Source: kinematics e.g. Siciliano et al., Handbook of Robotics, 2016, ch. 24; linear creep as in
+`omni_wheels/rolling`.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..component import Solver
+from ..laws import symmetric
+from ..laws.planar_frame import rotated
+from ..model import Model
+from . import (
+    GAMMA,
+    LENGTH,
+    LOAD,
+    PHI,
+    POSE_PHI,
+    POSE_X,
+    POSE_Y,
+    V_X,
+    V_Y,
+    W_Z,
+    WIDTH,
+    R,
+    W,
+    X,
+    Y,
+)
+
+LEVEL = 0
+SOLVER = Solver("rk4", 0.02)
+FRONT = ca.DM([1, 1, -1, -1])
+LEFT = ca.DM([1, -1, 1, -1])
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    w = m.input(W)
+    w += m.balance("speeds", "signal", unit="rad/s", value=w).effort
+    r, gamma, load = (m.parameter(q) for q in (R, GAMMA, LOAD))
+    p_x, p_y = FRONT * m.parameter(LENGTH), LEFT * m.parameter(WIDTH)
+    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(4), roller=load).effort
+    cosine, sine = ca.repmat(ca.cos(gamma), 4), -FRONT * LEFT * ca.sin(gamma)
+
+    def rows(x: ca.SX, y: ca.SX) -> ca.SX:
+        """(x, y) . v_i as rows on (v_x, v_y, w_z)."""
+        return ca.horzcat(x, y, p_x * y - p_y * x)
+
+    along, across = rows(cosine, sine), rows(-sine, cosine)
+    weight = load / (ca.sum1(load) / 4)
+    matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
+    right = along.T @ (weight * cosine * r * w) - across.T @ (weight * drag * sine * r * w)
+    v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, right))
+    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
+    x_rate, y_rate = rotated(phi, v_x, v_y)
+    m.derivative(x, x_rate)
+    m.derivative(y, y_rate)
+    m.derivative(phi, w_z)
+    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V_X, v_x), (V_Y, v_y), (W_Z, w_z)):
+        m.output(quantity, value)
