@@ -12,7 +12,7 @@ import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -174,4 +174,10 @@ def open_fmu(path: Path | str) -> Fmu:
                 f"{path}: cannot be unpacked into {folder.parent} ({error}); "
                 "set COSIM_CACHE to a folder that can be written"
             ) from error
-    return Fmu(path, digest, folder, read_description(folder, str(path)))
+    return Fmu(path, digest, folder, _described(folder, str(path)))
+
+
+@lru_cache(maxsize=256)
+def _described(folder: Path, where: str) -> Description:
+    """Description of an unpacked FMU; its folder is named after its content."""
+    return read_description(folder, where)

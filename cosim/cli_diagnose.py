@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -37,7 +38,11 @@ def diagnose_command(
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
     folder = out or Path("out") / problem.name
     folder.mkdir(parents=True, exist_ok=True)
-    result = diagnose(problem, folder, lambda text: typer.echo(text, err=True))
+    begun = time.monotonic()
+    result = diagnose(
+        problem, folder,
+        lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
+    )  # fmt: skip
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)
     result.files += [page, table]

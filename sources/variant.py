@@ -6,6 +6,7 @@ Examples: `gearbox/elastic+backlash`, `ur5_arm.ur5e/rigid`, `dc_motor/sampled+co
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import pkgutil
 import re
@@ -23,6 +24,8 @@ from .model import Attachment, Model
 from .units import parse
 
 _ROOT = Path(__file__).parent
+LONGEST = 160
+"""Characters of a file name: file systems take 255, Windows that many for the whole path."""
 _GRAMMAR = re.compile(
     r"(?P<component>\w+)(?:\.(?P<device>\w+))?/(?P<fidelity>\w+)"
     r"(?:\[(?P<slots>[\w=,]+)\])?(?P<effects>(?:\+\w+(?:@[\w.]+)?)*)"
@@ -54,12 +57,19 @@ class Name:
     @property
     def identifier(self) -> str:
         """The name as a C identifier, FMI's `modelIdentifier`."""
-        return re.sub(r"\W+", "_", str(self)).strip("_")
+        return _short(re.sub(r"\W+", "_", str(self)).strip("_"))
 
     @property
     def filename(self) -> str:
         """The name as a file name without suffix."""
-        return str(self).replace("/", "-")
+        return _short(str(self).replace("/", "-"))
+
+
+def _short(name: str) -> str:
+    """A name that file systems take: the end of a long one is replaced by its hash."""
+    if len(name) <= LONGEST:
+        return name
+    return f"{name[: LONGEST - 13]}_{hashlib.sha256(name.encode()).hexdigest()[:12]}"
 
 
 def parse_name(text: str) -> Name:

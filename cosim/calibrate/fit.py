@@ -444,6 +444,7 @@ def fit(
     limit: int = 25,
     polish: bool = True,
     robust: bool = True,
+    rough: bool = False,
     known: Known | None = None,
 ) -> Estimate:
     """Estimate the parameters of a problem.
@@ -455,6 +456,7 @@ def fit(
         limit: iterations at each size of difference steps.
         polish: end with a search without derivatives.
         robust: begin with large residuals counted linearly; off when `theta` is close.
+        rough: end without derivatives at the solution; only the values count.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
     """
@@ -476,9 +478,9 @@ def fit(
         run.descend(STEPS[1], 4, 0.01)
         run.set_cap(math.inf)
     run.descend(STEPS[1], limit, 1e-4)
-    if polish:
+    if polish and not rough:
         run.polish()
-    else:
+    elif not rough:
         run.normal(STEPS[-1], central=True)
     return _estimate(run)
 

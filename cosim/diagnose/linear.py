@@ -24,6 +24,11 @@ ABSORBED = 1e-3
 """A signature of which less than this share is left has no direction of its own: differences over
 rounded simulations carry relative errors of that order."""
 
+MATERIAL = 0.15
+"""Least RMS over noise that an effect must add to a channel of a run. It raises the residual by
+1 %: sheets do not give the noise more exactly, nor do solvers agree better, so a smaller difference
+has no name however many samples make it significant."""
+
 
 class Layout:
     """Where each sample of each run lies in one long vector.
@@ -55,6 +60,8 @@ class Layout:
         )  # fmt: skip
         self.run = np.concatenate([np.full(int(g.sum()), i) for i, g in enumerate(self.good)])
         self.size = int(self.block.size)
+        self._cell = self.run * self.channels + self.channel
+        self._count = np.maximum(np.bincount(self._cell), 1)
 
     def vector(self, rows: Sequence[Vector]) -> Vector:
         """One vector of (samples, channels) arrays, one per run."""
@@ -76,6 +83,11 @@ class Layout:
     def sums(self, values: Vector) -> Vector:
         """Sum over each block."""
         return np.asarray(np.bincount(self.block, values, self.blocks), dtype=np.float64)
+
+    def largest(self, change: Vector) -> float:
+        """Largest RMS of a change of the model values in a channel of a run."""
+        squares = np.bincount(self._cell, change**2, self._count.size)
+        return float(np.sqrt(np.max(squares / self._count, initial=0.0)))
 
     def by_run(self, vector: Vector) -> list[Vector]:
         """Back to (samples, channels) arrays, NaN in gaps."""
@@ -168,11 +180,16 @@ def score(direction: Vector, residual: Vector, layout: Layout, freedom: int) -> 
     return Score(amplitude, 0.5 * amplitude**2 * square, z, p_value, float(np.sqrt(square)), spread)
 
 
-def holm(p_values: Sequence[float]) -> Vector:
-    """P values corrected for the number of tests (family-wise, any dependence)."""
+def holm(p_values: Sequence[float], tests: int = 0) -> Vector:
+    """P values corrected for the number of tests (family-wise, any dependence).
+
+    Args:
+        p_values: the smallest ones.
+        tests: number of all tests, if more.
+    """
     values = np.asarray(p_values, dtype=np.float64)
     order = np.argsort(values)
-    scaled = values[order] * (values.size - np.arange(values.size))
+    scaled = values[order] * (max(tests, values.size) - np.arange(values.size))
     corrected = np.empty_like(values)
     corrected[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
     return corrected

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from .linear import Layout
-from .search import LEVEL, MATERIAL, Round, largest
+from .linear import MATERIAL, Layout
+from .search import LEVEL, Round
 
 POWER = 0.9
 """Probability with which an effect of the given strength is found."""
@@ -34,7 +34,7 @@ def power(current: Round, layout: Layout) -> dict[str, dict[str, Any]]:
             # the norm of what calibration leaves grows with the strength around the secant's value
             size = item.score.size / max(item.score.spread, 1.0)
             smallest = abs(item.value) * needed / size if size > 0 else math.inf
-            share = largest(item.rest.astype(np.float64), layout)
+            share = layout.largest(item.rest.astype(np.float64))
             if share > 0.0:
                 smallest = max(smallest, abs(item.value) * MATERIAL / share)
             entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None

@@ -18,8 +18,10 @@ from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, candidates, new_parameters
-from .linear import Absorber, Layout, Score, holm, score
-from .secant import FLOOR, Bench, Signature, merge, model_values
+from .linear import MATERIAL, Absorber, Layout, Score, holm, score
+from .probes import batches
+from .secant import FLOOR, Bench, Signature, merge, model_values, worthy
+from .structure import structures
 
 Vector = NDArray[np.float64]
 LEVEL = 0.01
@@ -29,10 +31,8 @@ GATE = math.log(1.0 / LEVEL)
 mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
 GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks."""
-MATERIAL = 0.15
-"""Least RMS over noise that an effect must add to a channel of a run. It raises the residual by
-1 %: sheets do not give the noise more exactly, nor do solvers agree better, so a smaller difference
-has no name however many samples make it significant."""
+NEARLY = 0.7
+"""Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
 REFITS = 8
@@ -110,14 +110,6 @@ def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate
     return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
 
 
-def largest(change: Vector, layout: Layout) -> float:
-    """Largest RMS of a change of the model values in a channel of a run."""
-    place = layout.run * layout.channels + layout.channel
-    count = np.bincount(place)
-    squares = np.bincount(place, change**2)
-    return float(np.sqrt(np.max(squares[count > 0] / count[count > 0])))
-
-
 @dataclass
 class Round:
     """One round.
@@ -126,6 +118,7 @@ class Round:
         base: model that the round began with.
         signatures: scored candidates, best first.
         corrected: p value by label, corrected for their number.
+        aside: labels of those that one run ruled out.
         fitted: refitted candidates, best first.
         winner: accepted one.
         rivals: fitted ones that the data cannot tell from it.
@@ -134,6 +127,7 @@ class Round:
     base: Fitted
     signatures: list[Signature]
     corrected: dict[str, float]
+    aside: tuple[str, ...] = ()
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
@@ -216,9 +210,10 @@ class Search:
     def prepare(self) -> None:
         """Have the candidates' FMUs built in the background, while the calibration runs."""
         provider = self.declared.provider
-        for item in self.known:
-            variant = apply(self.declared.instances, item.change, provider)[item.instance]
-            self._builder.submit(locate, variant, provider)
+        for batch in batches(self.known, self.declared):
+            first = batch.members[0][0]
+            variant = apply(self.declared.instances, batch.change or first.change, provider)
+            self._builder.submit(locate, variant[first.instance], provider)
 
     def close(self) -> None:
         """Stop building."""
@@ -226,17 +221,21 @@ class Search:
 
     def calibrated(self) -> Fitted:
         """Fit the declared system, errors of the communication step removed from then on."""
-        coarse = self.raw._with(step=self.raw.search_step)
-        first = fit(coarse, None, limit=6, robust=True, polish=False)
+        raw = self.raw
+        coarse = raw._with(step=raw.search_step)
+        exact = raw.ticks and raw.search_step == raw.step
+        first = fit(coarse, None, limit=6, robust=True, polish=exact, rough=not exact)
         coarse.close()
         self.evaluations += first.evaluations
         self.say(
             f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
         )
-        near = corrected(self.raw, first.theta, self.raw)
-        second = fit(near, first.theta, limit=6, robust=False, polish=False)
+        if exact:
+            return self.judged(first)
+        near = corrected(raw, first.theta, raw)
+        second = fit(near, first.theta, limit=6, robust=False, polish=False, rough=True)
         self.evaluations += second.evaluations
-        self.declared = corrected(self.raw, second.theta, self.raw)
+        self.declared = corrected(raw, second.theta, raw)
         return self.fitted(self.declared, second.theta)
 
     def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
@@ -291,23 +290,58 @@ class Search:
         jacobian = self.fitting.matrix(fitted.estimate.jacobian, fitted.problem.scale)
         return Absorber(jacobian, fitted.problem)
 
+    def bench(self, base: Fitted, layout: Layout) -> Bench:
+        """A bench for candidates around a fitted model."""
+        problem = base.problem
+        slopes = {item.run: item for item in base.estimate.jacobian}
+        matrix = layout.matrix([slopes[n] for n in layout.names], problem.scale)
+        model = model_values(problem, base.estimate.theta, layout)
+        rows = zip(
+            self.fitting.names, self.fitting.by_run(self.fit_data - base.fit), strict=True
+        )  # fmt: skip
+        rest = dict(rows)
+        residual = layout.vector([rest[n] for n in layout.names])
+        return Bench(
+            problem, base.estimate.theta, layout, model, residual, Absorber(matrix, problem)
+        )
+
+    def telling(self, base: Fitted) -> Layout:
+        """The run with most of what the model lacks; all, if no channel exceeds its noise."""
+        residual = self.fit_data - base.fit
+        if not any(s.structured for s in structures(residual, self.fitting)):
+            return self.fitting
+        rows = self.fitting.by_run(residual)
+        excess = [float(np.nansum(r**2)) - np.count_nonzero(np.isfinite(r)) for r in rows]
+        return Layout(self.raw, [self.fitting.runs[int(np.argmax(excess))]])
+
     def scored(self, base: Fitted) -> Round:
-        """Score all candidates against a model's residual."""
+        """Score all candidates against a model's residual.
+
+        Where the model evidently lacks something, one run tells which candidates are worth the
+        simulation of all runs.
+        """
         if base.effects and self.whole:  # what was added may have balances of its own
             self.known = candidates(base.problem)
-        model = model_values(base.problem, base.estimate.theta, self.fitting)
-        bench = Bench(
-            base.problem, base.estimate.theta, self.fitting, model,
-            self.fit_data - base.fit, self.absorber(base),
-        )  # fmt: skip
         present = {item.label for item in base.effects}
-        signatures = bench.signatures([c for c in self.known if c.label not in present])
+        chosen = [c for c in self.known if c.label not in present]
+        layout = self.telling(base)
+        bench = self.bench(base, layout)
+        signatures = bench.followed(bench.begun(chosen))
         self.evaluations += bench.evaluations
+        aside: tuple[str, ...] = ()
+        if layout is not self.fitting:
+            kept = worthy(signatures)
+            labels = {s.candidate.label for s in kept}
+            aside = tuple(s.candidate.label for s in signatures if s.candidate.label not in labels)
+            self.say(f"run {layout.names[0]} leaves {len(kept)} of {len(signatures)} candidates")
+            bench = self.bench(base, self.fitting)
+            signatures = bench.continued(kept)
+            self.evaluations += bench.evaluations
         signatures = merge(signatures)
-        corrected = holm([s.score.p_value for s in signatures])
+        corrected = holm([s.score.p_value for s in signatures], len(signatures) + len(aside))
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         signatures.sort(key=lambda s: -s.score.gain)
-        return Round(base, signatures, named)
+        return Round(base, signatures, named, aside)
 
     def promising(self, current: Round) -> list[Signature]:
         """Candidates worth a refit: significant, not too small to matter, the best gains first."""
@@ -317,14 +351,13 @@ class Search:
             if not s.unseen
             and current.corrected[s.candidate.label] < LEVEL
             and s.score.gain > GATE
-            and largest(s.score.amplitude * s.rest.astype(np.float64), self.fitting)
-            > 0.7 * MATERIAL
+            and self.fitting.largest(s.asked) > NEARLY * MATERIAL
         ]
         return good[:REFITS]
 
     def refit(self, base: Fitted, item: Signature, *, secondary: bool = False) -> Fitted | None:
         """Fit declared parameters and the effect's strength (or all its parameters) together."""
-        problem = item.problem
+        problem = item.candidate.added_to(base.problem)
         _, others = new_parameters(base.problem, problem)
         value = item.value * (item.score.amplitude or 1.0)
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
@@ -398,12 +431,13 @@ class Search:
         item = fitted.signature
         if item is None:
             return fitted
-        _, others = new_parameters(base.problem, item.problem)
+        whole = item.candidate.added_to(base.problem)
+        _, others = new_parameters(base.problem, whole)
         if not others:
             return fitted
         spans = {p.name: p.span for p in fitted.problem.parameters}
-        problem = item.problem.with_parameters(
-            [replace(p, span=spans.get(p.name, p.span)) for p in item.problem.parameters]
+        problem = whole.with_parameters(
+            [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
         )
         theta = problem.nominal
         for name, value in fitted.estimate.values.items():
@@ -452,7 +486,7 @@ class Search:
     def material(self, base: Fitted, other: Fitted) -> bool:
         """Whether the step between two models is large enough to be worth a cause."""
         return any(
-            largest(second - first, layout) > MATERIAL
+            layout.largest(second - first) > MATERIAL
             for first, second, layout in (
                 (base.fit, other.fit, self.fitting), (base.check, other.check, self.checking)
             )

@@ -6,7 +6,7 @@ strength is tried, what the residual asks for is estimated, and the simulation i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError
-from .candidates import Candidate, new_parameters
-from .linear import ABSORBED, Absorber, Layout, Score, score
+from .candidates import Candidate
+from .linear import ABSORBED, MATERIAL, Absorber, Layout, Score, score
+from .probes import Probe, batches
 
 Vector = NDArray[np.float64]
 Tick = Callable[[], None]
@@ -25,11 +26,20 @@ VISIBLE = 1.0
 EVIDENT, SHARE = 3.0, 0.02
 """A candidate whose first simulation gains less than 3 nats (noise does, in one of a hundred),
 or less than 1/50 of what the best one gains, is not simulated again."""
+WORTH = 0.5
+"""Share of `MATERIAL` that a candidate must promise, to first order, for another simulation."""
+KEPT = 40
+"""Candidates that go from one run to all of them at most."""
+HIDDEN = 0.98
+"""Share of a signature beyond which one run cannot tell it from other parameters."""
 TRIALS, NEAR = 3, 0.3
 """Trials at most; a strength this close to one that was tried is not tried again."""
 FLOOR = 1e-3
 """A time below this share of a typical one is as good as none: sampling or lagging that fast would
 only cost time."""
+STRETCH, COARSE = 64, 0.03
+"""Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
+8 times that, and rounding."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -39,9 +49,7 @@ class Signature:
     """What a candidate does to the model values.
 
     Attributes:
-        candidate: which.
-        problem: with the effect added.
-        strength: its strength parameter.
+        probe: the candidate in the system that was simulated.
         value: strength at which the secant was taken.
         change: model values over sigma with the effect less those without (float32).
         rest: what of it calibration cannot absorb.
@@ -50,15 +58,23 @@ class Signature:
         same: labels of candidates with the same signature.
     """
 
-    candidate: Candidate
-    problem: Problem
-    strength: Parameter
+    probe: Probe
     value: float
     change: NDArray[np.float32]
     rest: NDArray[np.float32]
     score: Score
     absorbed: float
     same: tuple[str, ...] = ()
+
+    @property
+    def candidate(self) -> Candidate:
+        """Which."""
+        return self.probe.candidate
+
+    @property
+    def strength(self) -> Parameter:
+        """Its strength parameter."""
+        return self.probe.strength
 
     @property
     def asked(self) -> Vector:
@@ -77,7 +93,7 @@ class Bench:
     Args:
         problem: without the candidates.
         theta: calibrated values.
-        layout: of the identification runs.
+        layout: of the runs that are simulated.
         model: model values over sigma at theta.
         residual: of theta.
         absorber: of the calibration.
@@ -96,60 +112,123 @@ class Bench:
         self.model, self.absorber = model, absorber
         self.residual = absorber.rest(residual)
         self.evaluations = 0
+        self._last: Problem | None = None
 
-    def at(self, problem: Problem, strength: Parameter, value: float) -> Vector:
-        """Model values over sigma with one effect at a strength."""
+    def at(self, problem: Problem, values: Mapping[str, float]) -> Vector:
+        """Model values over sigma with strengths set."""
+        if self._last is not None and self._last is not problem:
+            self._last.close()
+        self._last = problem
         theta = problem.nominal
         theta[: self.theta.size] = self.theta
-        theta[problem.index(strength.name)] = value
+        for name, value in values.items():
+            theta[problem.index(name)] = value
         self.evaluations += len(self.layout.runs)
         return model_values(problem, theta, self.layout)
 
-    def signatures(
-        self, candidates: Sequence[Candidate], tick: Tick = lambda: None
-    ) -> list[Signature]:
-        """Signatures at the strengths that the residual asks for.
+    def close(self) -> None:
+        """Free the sessions."""
+        if self._last is not None:
+            self._last.close()
+            self._last = None
 
-        Every candidate is simulated once. Only what then explains something is worth another
-        simulation at the strength that the residual asks for.
+    def begun(self, candidates: Sequence[Candidate], tick: Tick = lambda: None) -> list[Trials]:
+        """Every candidate simulated once, at a typical strength.
+
+        Elements of a vector are simulated together where each shows in channels of its own.
 
         Args:
             candidates: which; those that cannot be simulated are left out.
             tick: called after each.
         """
-        first = []
-        for candidate in candidates:
-            found = self._begun(candidate)
-            tick()
-            if found is not None:
-                first.append(found)
-        best = max((t.promise for t in first), default=0.0)
-        for trials in first:
-            while trials.open and trials.promise > max(EVIDENT, SHARE * best):
-                self._more(trials)
-        return [t.best for t in first if t.best is not None]
+        found = []
+        for batch in batches(candidates, self.problem):
+            trials = [Trials(p, p.strength.span) for p in batch.probes(self.problem)]
+            if batch.apart and len(trials) == len(batch.candidates):
+                masks = {c.label: mask[self.layout.channel]
+                         for c, mask in batch.members if mask is not None}  # fmt: skip
+                self._together(trials, masks)
+            else:
+                for one in trials:
+                    self._alone(one)
+            found += trials
+            for _ in batch.candidates:
+                tick()
+        self.close()
+        return found
 
-    def _begun(self, candidate: Candidate) -> _Trials | None:
-        try:
-            problem = candidate.added_to(self.problem)
-            problem.system()
-        except CosimError:
-            return None
-        strengths, _ = new_parameters(self.problem, problem)
-        if len(strengths) != 1:
-            return None
-        trials = _Trials(candidate, problem, strengths[0], strengths[0].span)
+    def _alone(self, trials: Trials) -> None:
         while trials.best is None and trials.open:
-            self._more(trials)
+            self.more(trials)
         if trials.best is not None and trials.open and not np.any(trials.best.change):
             trials.value = 10.0 * trials.tried[-1]  # a limit that does not bind yet
-            self._more(trials)
-        return trials
+            self.more(trials)
 
-    def _more(self, trials: _Trials) -> None:
+    def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
+        """First simulation of the elements of a vector, all in one."""
+        elements = [t for t in trials if t.probe.candidate.label in masks]
+        factor = 1.0
+        for _ in range(TRIALS):
+            values = {t.probe.names[0]: t.clipped(factor * t.value) for t in elements}
+            try:
+                change = self.at(elements[0].probe.problem, values) - self.model
+            except CosimError:
+                factor *= 0.1  # too strong for the system to run
+                continue
+            for t in trials:
+                mask = masks.get(t.probe.candidate.label)
+                part = change if mask is None else np.where(mask, change, 0.0)
+                value = values[t.probe.names[0]]
+                t.best = self._measure(t, value, part)
+                t.rough = mask is not None
+                t.value = self._wanted(t.best, value)
+                if not t.rough:
+                    t.tried.append(value)
+            if np.any(change):
+                return
+            factor *= 10.0  # a limit that does not bind yet
+        for t in trials:
+            if t.best is None:
+                t.open = False
+
+    def followed(self, begun: Sequence[Trials]) -> list[Signature]:
+        """Signatures; those that promise something at the strength that the residual asks for."""
+        best = max((t.promise for t in begun), default=0.0)
+        least = max(EVIDENT, SHARE * best)
+        for trials in begun:
+            if trials.rough and self._hopeful(trials, least):
+                trials.best, trials.rough = None, False
+                self._alone(trials)
+            while trials.open and self._hopeful(trials, least):
+                self.more(trials)
+        self.close()
+        return [t.best for t in begun if t.best is not None]
+
+    def _hopeful(self, trials: Trials, least: float) -> bool:
+        if trials.promise <= least or trials.best is None:
+            return False
+        found = trials.best
+        asked = abs(trials.wish) * found.rest.astype(np.float64)
+        return self.layout.largest(asked) > WORTH * MATERIAL
+
+    def continued(self, found: Sequence[Signature]) -> list[Signature]:
+        """Signatures over the runs of this bench of candidates that others have measured on some.
+
+        Args:
+            found: by a bench with fewer runs.
+        """
+        again = []
+        for item in found:
+            value = item.value * (item.score.amplitude or 1.0)
+            trials = Trials(item.probe, value)
+            self._alone(trials)
+            again.append(trials)
+        return self.followed(again)
+
+    def more(self, trials: Trials) -> None:
         """One more simulation."""
-        strength, tried = trials.strength, trials.tried
-        value = float(np.clip(trials.value, strength.minimum, strength.maximum))
+        strength, tried = trials.probe.strength, trials.tried
+        value = trials.clipped(trials.value)
         least = FLOOR * strength.span if strength.unit == "s" else 0.0
         if abs(value) <= least or any(abs(value / old - 1.0) < NEAR for old in tried):
             trials.open = False
@@ -157,60 +236,84 @@ class Bench:
         tried.append(value)
         trials.open = len(tried) < TRIALS
         try:
-            change = self.at(trials.problem, strength, value) - self.model
+            values = dict.fromkeys(trials.probe.names, value)
+            change = self.at(trials.probe.problem, values) - self.model
         except CosimError:
             trials.value = value * 0.1  # too strong for the system to run
             return
-        finally:
-            trials.problem.close()
-        found, trials.promise = self._measure(trials, value, change)
+        found = self._measure(trials, value, change)
         if trials.best is None or _mismatch(found) < _mismatch(trials.best):
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
             trials.open = False
+        trials.value = self._wanted(found, value)
+
+    @staticmethod
+    def _wanted(found: Signature, value: float) -> float:
+        """Strength that the residual asks for."""
         factor = found.score.amplitude
-        if factor <= 0.0 and strength.minimum >= 0.0:
+        if factor <= 0.0 and found.strength.minimum >= 0.0:
             factor = 0.1  # it cannot be negative: see whether a small one wants to be positive
         size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
-        trials.value = value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
+        return value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
 
-    def _measure(self, trials: _Trials, value: float, change: Vector) -> tuple[Signature, float]:
-        """The signature, and the gain that it would have if its strength could be negative."""
+    def _measure(self, trials: Trials, value: float, change: Vector) -> Signature:
+        """The signature; the trials note its gain as if its strength could be negative."""
         rest = self.absorber.rest(change)
         total = float(change @ change)
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
         result = score(rest, self.residual, self.layout, self.theta.size)
-        promise = result.gain
-        if result.amplitude < 0.0 and trials.strength.minimum >= 0.0:
+        trials.promise, trials.wish = result.gain, result.amplitude
+        if result.amplitude < 0.0 and trials.probe.strength.minimum >= 0.0:
             result = replace(result, amplitude=0.0, gain=0.0, z=0.0, p_value=1.0)
-        found = Signature(
-            trials.candidate, trials.problem, trials.strength, value, change.astype(np.float32),
-            rest.astype(np.float32), result, absorbed,
+        return Signature(
+            trials.probe, value, change.astype(np.float32), rest.astype(np.float32), result,
+            absorbed,
         )  # fmt: skip
-        return found, promise
 
 
 @dataclass
-class _Trials:
+class Trials:
     """Simulations of one candidate so far.
 
     Attributes:
-        candidate, problem, strength: see `Signature`.
+        probe: the candidate in its system.
         value: strength to try next.
         tried: strengths that were tried.
         best: signature at the strength nearest to the one that the residual asks for.
-        promise: gain [nats] of the last one, whatever its sign.
+        promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
         open: whether another may be tried.
+        rough: whether `best` was measured together with other elements of a vector.
     """
 
-    candidate: Candidate
-    problem: Problem
-    strength: Parameter
+    probe: Probe
     value: float
     tried: list[float] = field(default_factory=list)
     best: Signature | None = None
     promise: float = 0.0
+    wish: float = 0.0
     open: bool = True
+    rough: bool = False
+
+    def clipped(self, value: float) -> float:
+        """A strength inside its bounds."""
+        strength = self.probe.strength
+        return float(np.clip(value, strength.minimum, strength.maximum))
+
+
+def worthy(found: Sequence[Signature]) -> list[Signature]:
+    """Of candidates seen in one run, those worth a simulation of all runs, the best first.
+
+    What calibration absorbs in this run alone may still tell something in all of them together.
+    """
+    best = max((s.score.gain for s in found), default=0.0)
+    kept = [
+        s
+        for s in found
+        if s.score.gain > max(EVIDENT, SHARE * best) or (s.score.size > 0.0 and s.absorbed > HIDDEN)
+    ]
+    kept.sort(key=lambda s: -s.score.gain)
+    return kept[:KEPT]
 
 
 def _mismatch(item: Signature) -> float:
@@ -230,16 +333,23 @@ def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:
 
 def merge(signatures: list[Signature]) -> list[Signature]:
     """Leave one of those whose signatures are the same up to a factor, the first one."""
-    kept: list[Signature] = []
+    kept: list[tuple[Signature, NDArray[np.float32], float]] = []
     for item in signatures:
+        # sums over stretches are quick to compare, and differ where signatures do
+        coarse = np.add.reduceat(item.change, np.arange(0, item.change.size, STRETCH))
         size = float(np.linalg.norm(item.change))
-        for other in kept:
-            product = float(item.change @ other.change)
-            norm = size * float(np.linalg.norm(other.change))
-            # 1e-4: sine of the angle between float32 signatures of the same simulation
-            if norm > 0.0 and abs(product) / norm > 1.0 - 1e-6:
+        if size > 0.0:
+            coarse /= np.float32(size)
+        for other, rough, norm in kept:
+            if size * norm == 0.0 or (
+                float(np.linalg.norm(coarse - rough)) > COARSE
+                and float(np.linalg.norm(coarse + rough)) > COARSE
+            ):
+                continue
+            # 1e-6: cosine between float32 signatures of the same simulation
+            if abs(float(item.change @ other.change)) / (size * norm) > 1.0 - 1e-6:
                 other.same = (*other.same, item.candidate.label)
                 break
         else:
-            kept.append(item)
-    return kept
+            kept.append((item, coarse, size))
+    return [item for item, _, _ in kept]

@@ -1,0 +1,149 @@
+"""One FMU for all the places of an effect, so that a system with hundreds of candidates takes tens
+of FMUs; and which of these places one simulation shows apart.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.parts import Parameter
+from ..calibrate.problem import Problem
+from ..errors import CosimError
+from .candidates import Candidate, new_parameters
+
+MOST = 8
+"""Places in one FMU: effects that remember a signal's past make larger ones slow to compile."""
+_ELEMENT = re.compile(r"(.+)_(\d+)")
+_INDEX = re.compile(r"\[(\d+)\]$")
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A candidate in a system that may carry its siblings, too.
+
+    Attributes:
+        candidate: which.
+        problem: system with all of them absent at the nominal values.
+        strength: parameter of the candidate alone, as it is called where it is alone.
+        names: parameters of `problem` that make up its strength: those of all elements for the
+            effect on a whole vector.
+    """
+
+    candidate: Candidate
+    problem: Problem
+    strength: Parameter
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Candidates that are simulated together.
+
+    Attributes:
+        change: of the system, as of `cosim run --set`; None for a fidelity.
+        members: with channels that show the member apart from the others (None: all channels).
+        whole: the effect on all elements of the vector at once.
+    """
+
+    change: dict[str, str] | None
+    members: tuple[tuple[Candidate, NDArray[np.bool_] | None], ...]
+    whole: Candidate | None = None
+
+    @property
+    def apart(self) -> bool:
+        """Whether one simulation shows all members."""
+        return len(self.members) > 1 and all(mask is not None for _, mask in self.members)
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """All of them."""
+        return [c for c, _ in self.members] + ([self.whole] if self.whole else [])
+
+    def probes(self, base: Problem) -> list[Probe]:
+        """With the systems they are simulated in; one each if there is none for all.
+
+        Candidates that fit nothing are left out.
+        """
+        try:
+            if self.change is None or len(self.members) == 1:
+                return _single(base, self.candidates)
+            problem = base.with_effects(self.change)
+            problem.system()
+        except CosimError:
+            return _single(base, self.candidates)
+        strengths, _ = new_parameters(base, problem)
+        own = {c: [p for p in strengths if p.name.startswith(c.prefix)] for c, _ in self.members}
+        found = [Probe(c, problem, ps[0], (ps[0].name,)) for c, ps in own.items() if len(ps) == 1]
+        if self.whole is not None and len(found) == len(self.members):
+            first = found[0]
+            name = self.whole.prefix + first.strength.name.removeprefix(first.candidate.prefix)
+            names = tuple(n for probe in found for n in probe.names)
+            found.append(Probe(self.whole, problem, replace(first.strength, name=name), names))
+        return found
+
+
+def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
+    found = []
+    for candidate in candidates:
+        try:
+            problem = candidate.added_to(base)
+            problem.system()
+        except CosimError:
+            continue
+        strengths, _ = new_parameters(base, problem)
+        if len(strengths) == 1:
+            found.append(Probe(candidate, problem, strengths[0], (strengths[0].name,)))
+    return found
+
+
+def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
+    """Candidates by effect and component, elements of a vector together."""
+    ports = {(c.instance, c.effect, c.port): c for c in candidates}
+    groups: dict[tuple[str, str, str], list[Candidate]] = {}
+    wholes: dict[tuple[str, str, str], Candidate] = {}
+    result = []
+    for c in candidates:
+        match = _ELEMENT.fullmatch(c.port)
+        if c.refinement is not None:
+            result.append(Batch(None, ((c, None),)))
+        elif match and (c.instance, c.effect, match[1]) in ports:
+            key = (c.instance, c.effect, match[1])
+            groups.setdefault(key, []).append(c)
+            wholes[key] = ports[key]
+        else:
+            groups.setdefault((c.instance, c.effect, ""), []).append(c)
+    held = set(wholes.values())
+    shown = _shown(problem)
+    for key, members in groups.items():
+        members = [c for c in members if c not in held]
+        masks = [shown.get(_number(c)) for c in members] if key in wholes else []
+        if len(members) > MOST or any(m is None for m in masks):
+            masks = []
+        for first in range(0, len(members), MOST):
+            part = members[first : first + MOST]
+            chosen = masks[first : first + MOST] or [None] * len(part)
+            whole = wholes.get(key) if len(members) <= MOST else None
+            change = {key[0]: "".join(f"+{c.effect}@{c.port}" for c in part)}
+            result.append(Batch(change, tuple(zip(part, chosen, strict=True)), whole))
+        if key in wholes and len(members) > MOST:
+            result.append(Batch(wholes[key].change, ((wholes[key], None),)))
+    return result
+
+
+def _number(candidate: Candidate) -> int:
+    match = _ELEMENT.fullmatch(candidate.port)
+    return int(match[2]) if match else 0
+
+
+def _shown(problem: Problem) -> dict[int, NDArray[np.bool_]]:
+    """Element -> channels that measure this element of a vector."""
+    numbers = []
+    for channel in problem.channels:
+        match = _INDEX.search(channel.signal)
+        numbers.append(int(match[1]) if match else 0)
+    return {n: np.array(numbers) == n for n in sorted(set(numbers)) if n}
