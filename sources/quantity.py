@@ -27,6 +27,8 @@ class Quantity:
         nominal: typical magnitude, for solvers and scaling.
         size: 0 for a scalar, n for a vector.
         strength: marks the parameter of an effect whose value 0 means that the effect is absent.
+        turn: marks an angle of an effect whose values 0 and pi/2, added with factors, make up the
+            effect at any angle and strength (a phase, a direction).
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -39,6 +41,7 @@ class Quantity:
     nominal: float | None = None
     size: int = 0
     strength: bool = False
+    turn: bool = False
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

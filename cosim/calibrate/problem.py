@@ -460,6 +460,7 @@ class Problem:
                 continue
             before = old.members[name].description.variables
             strengths = set(member.description.extra.get("strengths", ()))
+            turns = set(member.description.extra.get("turns", ()))
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
@@ -467,8 +468,12 @@ class Problem:
                     and variable.name not in before
                     and full not in changed.constants
                 ):
-                    is_strength = variable.name in strengths
-                    added.append(free_parameter(variable, full, full, strength=is_strength))
+                    added.append(
+                        free_parameter(
+                            variable, full, full, strength=variable.name in strengths,
+                            turn=variable.name in turns,
+                        )
+                    )  # fmt: skip
         return changed._with(parameters=[*self.parameters, *added])
 
     def with_fidelity(self, instance: str, step: Refinement) -> Problem:

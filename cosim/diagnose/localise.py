@@ -27,14 +27,15 @@ from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, Catalogue
 from .linear import Absorber, Layout
+from .probes import ELEMENT
 from .search import Fitted, Search
 from .secant import model_values
 
 Vector = NDArray[np.float64]
 PROBE = "unknown_input"
-RUNS = 2
+RUNS = 1
 """Runs that are looked at: those with the largest residual over noise."""
-PLACES = 6
+PLACES = 4
 """Places that are probed, the best ones of the catalogue's scores first."""
 AIM = 3.0
 """Largest change by the probe, in units of the largest residual: where the system is asked."""
@@ -125,10 +126,14 @@ def localise(
     if not isinstance(problem.provider, Catalogue):
         return []
     runs = _worst(search, base)
-    found = []
+    found: list[Place] = []
+    probed = 0
     for instance, port in _places(problem, ranked):
+        if probed == PLACES:
+            break
         try:
             found += _Bench(search, base, runs, instance, port).places()
+            probed += 1
         except CosimError as error:
             say(f"{instance}.{port} could not be probed: {error}")
     found.sort(key=lambda p: -p.evidence)
@@ -149,8 +154,10 @@ def _places(problem: Problem, ranked: Sequence[Candidate]) -> list[tuple[str, st
         for name, member in problem.system().members.items()
         for balance in member.description.extra.get("balances", ())
     }
-    order = [(c.instance, c.port) for c in ranked if (c.instance, c.port) in names]
-    return list(dict.fromkeys(order))[:PLACES]
+    matches = [(name, ELEMENT.fullmatch(port)) for name, port in names]
+    known = names - {(name, match[1]) for name, match in matches if match}  # elements are probed
+    order = [(c.instance, c.port) for c in ranked if (c.instance, c.port) in known]
+    return list(dict.fromkeys(order))
 
 
 class _Bench:

@@ -18,7 +18,7 @@ from .candidates import Candidate, new_parameters
 
 MOST = 8
 """Places in one FMU: effects that remember a signal's past make larger ones slow to compile."""
-_ELEMENT = re.compile(r"(.+)_(\d+)")
+ELEMENT = re.compile(r"(.+)_(\d+)")
 _INDEX = re.compile(r"\[(\d+)\]$")
 
 
@@ -32,12 +32,20 @@ class Probe:
         strength: parameter of the candidate alone, as it is called where it is alone.
         names: parameters of `problem` that make up its strength: those of all elements for the
             effect on a whole vector.
+        turn: its angle, if it has one (see `Parameter.turn`), called as where it is alone.
+        turns: parameters of `problem` that make up its angle.
     """
 
     candidate: Candidate
     problem: Problem
     strength: Parameter
     names: tuple[str, ...]
+    turn: str = ""
+    turns: tuple[str, ...] = ()
+
+    def values(self, strength: float, angle: float) -> dict[str, float]:
+        """Parameter of `problem` -> value."""
+        return dict.fromkeys(self.names, strength) | dict.fromkeys(self.turns, angle)
 
 
 @dataclass(frozen=True)
@@ -76,15 +84,35 @@ class Batch:
             problem.system()
         except CosimError:
             return _single(base, self.candidates)
-        strengths, _ = new_parameters(base, problem)
-        own = {c: [p for p in strengths if p.name.startswith(c.prefix)] for c, _ in self.members}
-        found = [Probe(c, problem, ps[0], (ps[0].name,)) for c, ps in own.items() if len(ps) == 1]
+        found = [p for c, _ in self.members for p in _of(c, base, problem)]
         if self.whole is not None and len(found) == len(self.members):
             first = found[0]
-            name = self.whole.prefix + first.strength.name.removeprefix(first.candidate.prefix)
-            names = tuple(n for probe in found for n in probe.names)
-            found.append(Probe(self.whole, problem, replace(first.strength, name=name), names))
+
+            def own(name: str) -> str:
+                assert self.whole is not None
+                return self.whole.prefix + name.removeprefix(first.candidate.prefix)
+
+            found.append(
+                Probe(
+                    self.whole,
+                    problem,
+                    replace(first.strength, name=own(first.strength.name)),
+                    tuple(n for probe in found for n in probe.names),
+                    own(first.turn) if first.turn else "",
+                    tuple(n for probe in found for n in probe.turns),
+                )
+            )
         return found
+
+
+def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
+    """The candidate in a problem with its effect; nothing if it has not one strength."""
+    strengths, others = new_parameters(base, problem)
+    own = [p for p in strengths if p.name.startswith(candidate.prefix)]
+    turns = tuple(p.name for p in others if p.turn and p.name.startswith(candidate.prefix))[:1]
+    if len(own) != 1:
+        return []
+    return [Probe(candidate, problem, own[0], (own[0].name,), "".join(turns), turns)]
 
 
 def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
@@ -95,9 +123,7 @@ def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
             problem.system()
         except CosimError:
             continue
-        strengths, _ = new_parameters(base, problem)
-        if len(strengths) == 1:
-            found.append(Probe(candidate, problem, strengths[0], (strengths[0].name,)))
+        found += _of(candidate, base, problem)
     return found
 
 
@@ -108,7 +134,7 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
     wholes: dict[tuple[str, str, str], Candidate] = {}
     result = []
     for c in candidates:
-        match = _ELEMENT.fullmatch(c.port)
+        match = ELEMENT.fullmatch(c.port)
         if c.refinement is not None:
             result.append(Batch(None, ((c, None),)))
         elif match and (c.instance, c.effect, match[1]) in ports:
@@ -136,7 +162,7 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
 
 
 def _number(candidate: Candidate) -> int:
-    match = _ELEMENT.fullmatch(candidate.port)
+    match = ELEMENT.fullmatch(candidate.port)
     return int(match[2]) if match else 0
 
 

@@ -36,6 +36,9 @@ NEARLY = 0.7
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
 REFITS = 8
+PART = 0.1
+"""A candidate that gains less than this share of what the best one gains, to first order, is not
+refitted: it is no rival, and another round will ask again."""
 REFINED = 3
 ROUNDS = 3
 CHECK = "validation"
@@ -353,7 +356,8 @@ class Search:
             and s.score.gain > GATE
             and self.fitting.largest(s.asked) > NEARLY * MATERIAL
         ]
-        return good[:REFITS]
+        best = max((s.score.gain for s in good), default=0.0)
+        return [s for s in good if s.score.gain > PART * best][:REFITS]
 
     def refit(self, base: Fitted, item: Signature, *, secondary: bool = False) -> Fitted | None:
         """Fit declared parameters and the effect's strength (or all its parameters) together."""
@@ -369,8 +373,9 @@ class Search:
         moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
-        if not secondary and others:
-            problem = problem.hold({p.name: p.nominal for p in others})
+        held = [p for p in others if p.name != item.probe.turn]
+        if not secondary and held:
+            problem = problem.hold({p.name: p.nominal for p in held})
         absorber = self.absorber(base)
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
@@ -380,6 +385,8 @@ class Search:
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift
             theta[problem.index(item.strength.name)] = part * value
+            if item.probe.turn:
+                theta[problem.index(item.probe.turn)] = item.angle
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self._cost(problem, theta) for theta in starts]

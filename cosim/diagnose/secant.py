@@ -40,6 +40,7 @@ only cost time."""
 STRETCH, COARSE = 64, 0.03
 """Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
 8 times that, and rounding."""
+QUARTER = 0.5 * np.pi
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -55,6 +56,7 @@ class Signature:
         rest: what of it calibration cannot absorb.
         score: of `rest` against the residual.
         absorbed: share of the signature's energy that calibration absorbs.
+        angle: of an effect that has one.
         same: labels of candidates with the same signature.
     """
 
@@ -64,6 +66,7 @@ class Signature:
     rest: NDArray[np.float32]
     score: Score
     absorbed: float
+    angle: float = 0.0
     same: tuple[str, ...] = ()
 
     @property
@@ -167,24 +170,32 @@ class Bench:
     def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
         """First simulation of the elements of a vector, all in one."""
         elements = [t for t in trials if t.probe.candidate.label in masks]
+        angles = (0.0, QUARTER) if elements[0].probe.turns else (0.0,)
         factor = 1.0
         for _ in range(TRIALS):
             values = {t.probe.names[0]: t.clipped(factor * t.value) for t in elements}
             try:
-                change = self.at(elements[0].probe.problem, values) - self.model
+                changes = [
+                    self.at(
+                        elements[0].probe.problem,
+                        values | {n: angle for t in elements for n in t.probe.turns},
+                    )
+                    - self.model
+                    for angle in angles
+                ]
             except CosimError:
                 factor *= 0.1  # too strong for the system to run
                 continue
             for t in trials:
                 mask = masks.get(t.probe.candidate.label)
-                part = change if mask is None else np.where(mask, change, 0.0)
+                parts = [c if mask is None else np.where(mask, c, 0.0) for c in changes]
                 value = values[t.probe.names[0]]
-                t.best = self._measure(t, value, part)
+                t.best = self._turned(t, value, parts)
                 t.rough = mask is not None
                 t.value = self._wanted(t.best, value)
                 if not t.rough:
                     t.tried.append(value)
-            if np.any(change):
+            if np.any(changes[0]):
                 return
             factor *= 10.0  # a limit that does not bind yet
         for t in trials:
@@ -220,7 +231,7 @@ class Bench:
         again = []
         for item in found:
             value = item.value * (item.score.amplitude or 1.0)
-            trials = Trials(item.probe, value)
+            trials = Trials(item.probe, value, angle=item.angle)
             self._alone(trials)
             again.append(trials)
         return self.followed(again)
@@ -235,13 +246,21 @@ class Bench:
             return
         tried.append(value)
         trials.open = len(tried) < TRIALS
+        angles = [trials.angle]
+        if trials.probe.turns and trials.best is None:
+            angles = [0.0, QUARTER]
         try:
-            values = dict.fromkeys(trials.probe.names, value)
-            change = self.at(trials.probe.problem, values) - self.model
+            changes = [
+                self.at(trials.probe.problem, trials.probe.values(value, angle)) - self.model
+                for angle in angles
+            ]
         except CosimError:
             trials.value = value * 0.1  # too strong for the system to run
             return
-        found = self._measure(trials, value, change)
+        if len(changes) > 1:
+            found = self._turned(trials, value, changes)
+        else:
+            found = self._measure(trials, value, changes[0])
         if trials.best is None or _mismatch(found) < _mismatch(trials.best):
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
@@ -257,6 +276,23 @@ class Bench:
         size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
         return value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
 
+    def _turned(self, trials: Trials, value: float, changes: Sequence[Vector]) -> Signature:
+        """Measure an effect at the angle that the residual asks for.
+
+        Args:
+            trials: of the effect.
+            value: its strength.
+            changes: that it makes at angle 0 and a quarter turn on, only the first if it has none.
+        """
+        if len(changes) > 1:
+            rests = np.array([self.absorber.rest(change) for change in changes])
+            matrix = rests @ rests.T
+            wanted = np.linalg.lstsq(matrix, rests @ self.residual, rcond=1e-6)[0]
+            trials.angle = float(np.arctan2(wanted[1], wanted[0]))
+        along, across = np.cos(trials.angle), np.sin(trials.angle)
+        whole = changes[0] if len(changes) < 2 else along * changes[0] + across * changes[1]
+        return self._measure(trials, value, whole)
+
     def _measure(self, trials: Trials, value: float, change: Vector) -> Signature:
         """The signature; the trials note its gain as if its strength could be negative."""
         rest = self.absorber.rest(change)
@@ -264,11 +300,13 @@ class Bench:
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
         result = score(rest, self.residual, self.layout, self.theta.size)
         trials.promise, trials.wish = result.gain, result.amplitude
+        if trials.probe.turns:  # the angle was chosen by the same data: chi square of two
+            result = replace(result, p_value=float(np.exp(-0.5 * result.z**2)))
         if result.amplitude < 0.0 and trials.probe.strength.minimum >= 0.0:
             result = replace(result, amplitude=0.0, gain=0.0, z=0.0, p_value=1.0)
         return Signature(
             trials.probe, value, change.astype(np.float32), rest.astype(np.float32), result,
-            absorbed,
+            absorbed, trials.angle,
         )  # fmt: skip
 
 
@@ -281,6 +319,7 @@ class Trials:
         value: strength to try next.
         tried: strengths that were tried.
         best: signature at the strength nearest to the one that the residual asks for.
+        angle: at which it is tried, if it has one.
         promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
         open: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
@@ -290,6 +329,7 @@ class Trials:
     value: float
     tried: list[float] = field(default_factory=list)
     best: Signature | None = None
+    angle: float = 0.0
     promise: float = 0.0
     wish: float = 0.0
     open: bool = True

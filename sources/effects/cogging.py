@@ -23,7 +23,7 @@ AMPLITUDE = Quantity(
     "tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True
 )
 CYCLES = Quantity("n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0")
+PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
 
 EFFECT = Effect(
     "cogging",

@@ -19,7 +19,9 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 SLOPE = Quantity("slope", "rad", "angle of the slope, 0 = absent", start=0.005, strength=True)
-HEADING = Quantity("heading", "rad", "direction in which the floor rises, from the world x axis")
+HEADING = Quantity(
+    "heading", "rad", "direction in which the floor rises, from the world x axis", turn=True
+)
 
 EFFECT = Effect(
     "floor_slope",

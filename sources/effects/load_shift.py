@@ -24,7 +24,9 @@ SHIFT = Quantity(
     start=0.02,
     strength=True,
 )
-DIRECTION = Quantity("direction", "rad", "direction of the shift, 0 forward, positive to the left")
+DIRECTION = Quantity(
+    "direction", "rad", "direction of the shift, 0 forward, positive to the left", turn=True
+)
 
 EFFECT = Effect(
     "load_shift",

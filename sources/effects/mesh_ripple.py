@@ -29,7 +29,7 @@ ERROR = Quantity(
     strength=True,
 )
 CYCLES = Quantity("n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0")
+PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
 
 EFFECT = Effect(
     "mesh_ripple",

@@ -22,7 +22,7 @@ RIPPLE = Quantity(
     "r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True
 )
 CYCLES = Quantity("n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0")
+PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
 
 EFFECT = Effect(
     "torque_ripple",

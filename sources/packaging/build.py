@@ -96,6 +96,9 @@ def component_json(variant: Variant) -> bytes:
             if variable.of_effect and variable.quantity.strength
         ],
     }
+    turns = [v.name for v in model.of_role("parameter") if v.of_effect and v.quantity.turn]
+    if turns:
+        content["turns"] = turns
     return (json.dumps(content, indent=2) + "\n").encode()
 
 
