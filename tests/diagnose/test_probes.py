@@ -1,0 +1,105 @@
+"""Many places in one FMU and in one simulation tell the same as each alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import draw, write_sets
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.candidates import Candidate, candidates
+from cosim.diagnose.linear import Absorber, Layout
+from cosim.diagnose.probes import MOST, Batch, batches
+from cosim.diagnose.secant import Bench, model_values
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
+    """A short data set without undeclared effects."""
+    folder = tmp_path_factory.mktemp("probes")
+    (place,) = write_sets(folder, [draw(np.random.default_rng(4))], SHEET, 5, 2.0, ("ST", "MS"))
+    problem = read_problem(place, workers=2)
+    yield problem
+    problem.close()
+
+
+def places(*ports: str) -> list[Candidate]:
+    """One effect at several places of an arm."""
+    return [Candidate("arm", "ur5_arm", "coulomb", port) for port in ports]
+
+
+def measured(*signals: str) -> Any:
+    """A problem of which only the channels matter."""
+    return SimpleNamespace(channels=[SimpleNamespace(signal=s) for s in signals])
+
+
+def test_elements_of_a_vector_share_a_simulation() -> None:
+    problem = measured("arm.q[1]", "arm.q[2]", "drive.i[1]", "drive.i[2]")
+    (batch,) = batches(places("joint", "joint_1", "joint_2"), problem)
+    assert batch.apart
+    assert batch.change == {"arm": "+coulomb@joint_1+coulomb@joint_2"}
+    assert batch.whole is not None and batch.whole.port == "joint"
+    masks = {c.port: m.tolist() for c, m in batch.members if m is not None}
+    assert masks == {"joint_1": [True, False, True, False], "joint_2": [False, True, False, True]}
+
+
+def test_without_channels_of_their_own_they_do_not() -> None:
+    (batch,) = batches(places("joint", "joint_1", "joint_2"), measured("arm.q[1]", "tool.x"))
+    assert not batch.apart
+
+
+def test_no_candidate_is_lost() -> None:
+    known = places(*(f"wheel_{k}" for k in range(2 * MOST)), "wheel", "body", "tail")
+    found = batches(known, measured("body.x"))
+    assert sorted(c.label for b in found for c in b.candidates) == sorted(c.label for c in known)
+    assert max(len(b.members) for b in found) == MOST
+
+
+def test_an_effect_among_its_siblings_does_what_it_does_alone(bench: Problem) -> None:
+    known = [c for c in candidates(bench) if c.effect == "delay"]
+    assert len({c.instance for c in known}) == 2
+    layout = Layout(bench, bench.chosen("identification"))
+    several = [b for b in batches(known, bench) if len(b.members) > 1]
+    assert several
+    for batch in several:
+        for probe in batch.probes(bench):
+            (alone,) = Batch(None, ((probe.candidate, None),)).probes(bench)
+            assert alone.problem is not probe.problem
+            values = []
+            for one in (alone, probe):
+                theta = one.problem.nominal
+                for name, value in one.values(0.01, 0.0).items():
+                    theta[one.problem.index(name)] = value
+                values.append(model_values(one.problem, theta, layout))
+                one.problem.close()
+            # effects of strength 0 are absent exactly, so nothing but bits may be compared
+            assert np.array_equal(*values)
+
+
+def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> None:
+    (wanted,) = [c for c in candidates(bench) if c.label == "unbalance at load.flange"]
+    layout = Layout(bench, bench.chosen("identification"))
+    theta = bench.nominal
+    model = model_values(bench, theta, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+    strength, angle = 0.02, 2.2  # small against what moves the shaft, in no special direction
+    point = probe.problem.nominal
+    for name, value in probe.values(strength, angle).items():
+        point[probe.problem.index(name)] = value
+    seen = model_values(probe.problem, point, layout) - model
+    probe.problem.close()
+    jacobian = np.zeros((layout.size, len(bench.parameters)))
+    absorber = Absorber(jacobian, bench)
+    place = Bench(bench, theta, layout, model, seen, absorber)
+    (found,) = place.followed(place.begun([wanted]))
+    # the signature is linear in the strength to a percent, and so is the angle
+    assert found.angle == pytest.approx(angle, abs=0.02)
+    assert found.value * found.score.amplitude == pytest.approx(strength, rel=0.02)
