@@ -1,10 +1,11 @@
 """Does the diagnosis name undeclared effects, and stay quiet without? Data of an independent plant.
 
     python -m benchmarks.selftest --repeats 3 --out out/selftest
+    python -m benchmarks.selftest --example DATASET --out out/mirror
 
-Every effect of `motor_plant.EFFECTS` is put into benches with other parameters and sizes; half of
-the data sets have none. Prints the confusion matrix, false alarms and the coverage of the 95 %
-intervals, and writes them as a table.
+Every effect is put into rigs with other parameters and sizes; some of the data sets have none.
+Prints the confusion matrix, false alarms and the coverage of the 95 % intervals, and writes them as
+a table. With `--example` the data come from our own FMUs, for any rig that has a mapping.
 """
 
 from __future__ import annotations
@@ -13,16 +14,20 @@ import argparse
 import json
 import sys
 import tempfile
-import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.motor_plant import EFFECTS, Bench, draw, write_sets
+from benchmarks.own_plant import catalogue, example, made
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose import diagnose
+from cosim.diagnose.candidates import Candidate
+from cosim.diagnose.diagnosis import Diagnosis
+from cosim.diagnose.linear import MATERIAL
 
 SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml"
 
@@ -38,22 +43,60 @@ def benches(repeats: int, clean: int, seed: int) -> list[Bench]:
     return found
 
 
-def judge(bench: Bench, folder: Path, workers: int) -> dict[str, Any]:
-    """Diagnose one data set and compare with the truth."""
-    begun = time.perf_counter()
-    result = diagnose(read_problem(folder, workers=workers)).to_dict()
-    names = [e["effect"] for e in result["effects"]]
-    rivals = [e.partition(" at ")[0] for a in result["alternatives"] for e in a["effects"][-1:]]
+def judged(
+    result: Diagnosis, effect: str, size: float, names: tuple[str, ...], truth: dict[str, float]
+) -> dict[str, Any]:
+    """Compare a diagnosis with the truth.
+
+    Args:
+        result: the diagnosis.
+        effect: as shown in the table.
+        size: of it.
+        names: of the catalogue that count as this effect.
+        truth: true values of the declared parameters.
+    """
+    table = result.to_dict()
+    named = [e["effect"] for e in table["effects"]]
+    same = {label.partition(" at ")[0] for e in table["effects"][:1] for label in e["other_places"]}
+    rivals = [e.partition(" at ")[0] for a in table["alternatives"] for e in a["effects"][-1:]]
     covered = {}
-    for name, entry in result["parameters"].items():
+    for name, entry in table["parameters"].items():
         last = entry.get("after") or entry["before"]
-        if name in bench.parameters and last["identifiable"]:
+        if name in truth and last["identifiable"]:
             low, high = last["ci95"]
-            covered[name] = bool(low <= bench.parameters[name] <= high)
+            covered[name] = bool(low <= truth[name] <= high)
     return {
-        "truth": bench.effect, "size": bench.size, "verdict": result["verdict"], "named": names,
-        "rivals": rivals, "covered": covered, "wall_s": time.perf_counter() - begun,
+        "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
+        "right": bool(named) and bool(set(names) & {named[0], *same}),
+        "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
+        "wall_s": table["wall_s"],
     }  # fmt: skip
+
+
+def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[str, Any]]:
+    """Rows of sets from the independent motor bench."""
+    chosen = benches(arguments.repeats, arguments.clean, arguments.seed)
+    places = write_sets(folder, chosen, SHEET, arguments.seed, arguments.seconds)
+    for bench, place in zip(chosen, places, strict=True):
+        result = diagnose(read_problem(place, workers=arguments.workers))
+        names = EFFECTS[bench.effect][1]
+        yield judged(result, bench.effect, bench.size, names, bench.parameters)
+
+
+def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[str, Any]]:
+    """Rows of sets from our own FMUs; effects that the runs do not show count as clean."""
+    rig = example(example_set, arguments.seconds, arguments.workers)
+    jobs: list[tuple[Candidate | None, float]] = [(None, 0.0)] * arguments.clean
+    for repeat in range(arguments.repeats):
+        jobs += [(item, (1.0, 2.0, 0.5)[repeat % 3]) for item in catalogue(rig)]
+    for number, (item, factor) in enumerate(jobs):
+        seed = 1000 * arguments.seed + number
+        one = made(rig, item, factor, seed)
+        effect = "none" if item is None else item.effect
+        if item is not None and one.visible < MATERIAL:
+            effect = "none"
+        row = judged(diagnose(one.problem), effect, one.size, (effect,), one.parameters)
+        yield {**row, "label": one.effect, "visible": one.visible}
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
@@ -61,20 +104,17 @@ def summary(rows: list[dict[str, Any]]) -> str:
     lines = ["| effect in the data | sets | right | confounded with it | other | missed |",
              "|---|---|---|---|---|---|"]  # fmt: skip
     right = total = 0
-    for truth in EFFECTS:
+    for truth in dict.fromkeys(r["truth"] for r in rows):
         mine = [r for r in rows if r["truth"] == truth]
-        if not mine:
-            continue
-        same = set(EFFECTS[truth][1])
         counts: Counter[str] = Counter()
         for row in mine:
             if truth == "none":
                 counts["other" if row["named"] else "right"] += 1
             elif not row["named"]:
                 counts["missed"] += 1
-            elif row["verdict"] == "effect_found" and row["named"][0] in same:
+            elif row["verdict"] == "effect_found" and row["right"]:
                 counts["right"] += 1
-            elif same & {row["named"][0], *row["rivals"]}:
+            elif row["right"] or row["rival"]:
                 counts["confounded"] += 1
             else:
                 counts["other"] += 1
@@ -98,6 +138,10 @@ def summary(rows: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Run."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--example", type=Path, help="data set whose rig our own FMUs play; else the bench of "
+        "benchmarks/motor_plant.py, which shares nothing with them",
+    )  # fmt: skip
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clean", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
@@ -106,14 +150,18 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/selftest"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    made = benches(arguments.repeats, arguments.clean, arguments.seed)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        places = write_sets(Path(folder), made, SHEET, arguments.seed, arguments.seconds)
-        for bench, place in zip(made, places, strict=True):
-            rows.append(judge(bench, place, arguments.workers))
-            print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
-    (arguments.out / "selftest.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        if arguments.example is None:
+            found = independent(arguments, Path(folder))
+        else:
+            found = mirrored(arguments, arguments.example)
+        for row in found:
+            rows.append(row)
+            print(json.dumps(row), file=sys.stderr, flush=True)
+            (arguments.out / "selftest.json").write_text(
+                json.dumps(rows, indent=1), encoding="utf-8"
+            )
     table = summary(rows)
     (arguments.out / "selftest.md").write_text(table, encoding="utf-8")
     print(table)

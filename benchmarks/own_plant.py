@@ -1,0 +1,104 @@
+"""Data sets made by the components' own FMUs: other parameters, an undeclared effect, noise.
+
+A mirror rather than a test of the laws, but it covers the whole catalogue: every effect that fits
+the rig, at every place, with a size drawn around a typical one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.candidates import Candidate, candidates, new_parameters
+
+INSIDE = 0.2
+"""Share of a parameter's range, on both sides, from which no truth is drawn."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A data set and its truth.
+
+    Attributes:
+        problem: the declared system with the made data.
+        effect: label of the undeclared effect, "none" without.
+        size: of its strength.
+        parameters: true values of the declared parameters.
+        visible: largest change that the effect makes in a channel of a run, over its noise.
+    """
+
+    problem: Problem
+    effect: str
+    size: float
+    parameters: dict[str, float]
+    visible: float
+
+
+def example(folder: Path, seconds: float, workers: int) -> Problem:
+    """The rig of an example data set, with its runs cut after some seconds."""
+    problem = read_problem(folder, workers=workers)
+    runs = []
+    for run in problem.runs:
+        kept = run.times <= run.times[0] + seconds
+        runs.append(replace(run, times=run.times[kept], data=run.data[kept]))
+    return problem._with(runs=runs)
+
+
+def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int) -> Made:
+    """Simulate one individual of a rig.
+
+    Args:
+        problem: the rig with the inputs of its runs.
+        candidate: undeclared effect, None for none.
+        factor: its size over a typical one.
+        seed: of parameters and noise.
+    """
+    random = np.random.default_rng(seed)
+    theta = problem.nominal
+    for i, p in enumerate(problem.parameters):
+        if p.role == "declared":
+            theta[i] = random.uniform(
+                p.minimum + INSIDE * (p.maximum - p.minimum),
+                p.maximum - INSIDE * (p.maximum - p.minimum),
+            )
+    plain = {run.name: problem.simulate(theta, run) for run in problem.runs}
+    values, size = plain, 0.0
+    if candidate is not None:
+        real = candidate.added_to(problem)
+        strengths, _ = new_parameters(problem, real)
+        size = float(np.clip(factor * strengths[0].span, strengths[0].minimum,
+                             strengths[0].maximum))  # fmt: skip
+        point = real.nominal
+        point[: theta.size] = theta
+        point[real.index(strengths[0].name)] = size
+        for p in real.parameters:
+            if p.turn:
+                point[real.index(p.name)] = random.uniform(-np.pi, np.pi)
+        values = {run.name: real.simulate(point, run) for run in real.runs}
+        real.close()
+    data = {}
+    for run in problem.runs:
+        noise = problem.sigma * random.standard_normal(run.data.shape)
+        data[run.name] = np.where(np.isfinite(run.data), values[run.name] + noise, np.nan)
+    problem.close()
+    visible = max(
+        float(np.max(np.sqrt(np.mean(((values[n] - plain[n]) / problem.sigma) ** 2, axis=0))))
+        for n in plain
+    )
+    names = [p.name for p in problem.parameters]
+    truth = {n: float(v) for n, v, p in zip(names, theta, problem.parameters, strict=True)
+             if p.role == "declared"}  # fmt: skip
+    label = "none" if candidate is None else candidate.label
+    return Made(problem.with_data(data), label, size, truth, visible)
+
+
+def catalogue(problem: Problem) -> list[Candidate]:
+    """One place of every effect that fits the rig, the first, and every fidelity."""
+    found: dict[tuple[str, str], Candidate] = {}
+    for item in candidates(problem):
+        found.setdefault((item.component, item.effect), item)
+    return list(found.values())
