@@ -76,7 +76,7 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         point[: theta.size] = theta
         point[real.index(strengths[0].name)] = size
         for p in real.parameters:
-            if p.turn:
+            if p.mix == "turn":
                 point[real.index(p.name)] = random.uniform(-np.pi, np.pi)
         values = {run.name: real.simulate(point, run) for run in real.runs}
         real.close()

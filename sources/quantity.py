@@ -10,6 +10,7 @@ from typing import Literal
 from . import units
 
 Variability = Literal["tunable", "fixed"]
+Mix = Literal["", "turn", "shift"]
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -27,8 +28,11 @@ class Quantity:
         nominal: typical magnitude, for solvers and scaling.
         size: 0 for a scalar, n for a vector.
         strength: marks the parameter of an effect whose value 0 means that the effect is absent.
-        turn: marks an angle of an effect whose values 0 and pi/2, added with factors, make up the
-            effect at any angle and strength (a phase, a direction).
+        mix: how two simulations tell this parameter of a weak effect: `turn`, an angle (effect =
+            strength * (cos * effect at 0 + sin * effect at pi/2)); `shift`, an offset
+            (effect = strength * (effect at 0 + value * derivative)).
+        tries: values that a search should try, where a model with another one tells nothing of the
+            right one (cycles per revolution).
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -41,7 +45,8 @@ class Quantity:
     nominal: float | None = None
     size: int = 0
     strength: bool = False
-    turn: bool = False
+    mix: Mix = ""
+    tries: tuple[float, ...] = ()
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

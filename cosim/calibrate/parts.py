@@ -50,7 +50,8 @@ class Parameter:
         strength: whether 0 makes an effect absent exactly.
         span: size of a typical change; the distance of the bounds if not given.
         inverse: the targets get factor / value: a compliance that sets a stiffness.
-        turn: an angle whose values 0 and pi/2, added with factors, make up an effect at any angle.
+        tries: values that a search should try.
+        mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
     """
 
     name: str
@@ -66,7 +67,8 @@ class Parameter:
     span: float = 0.0
     text: str = ""
     inverse: bool = False
-    turn: bool = False
+    mix: str = ""
+    tries: tuple[float, ...] = ()
 
     def set(self, value: float) -> dict[str, float]:
         """Full variable name -> value."""
@@ -199,9 +201,7 @@ class Sensitivity(NamedTuple):
     roughness: Vector
 
 
-def free_parameter(
-    variable: Variable, name: str, target: str, *, strength: bool, turn: bool = False
-) -> Parameter:
+def free_parameter(variable: Variable, name: str, target: str, *, strength: bool) -> Parameter:
     """A parameter that a variant has brought, at its FMU's value; a strength begins at 0.
 
     Args:
@@ -209,7 +209,6 @@ def free_parameter(
         name: of the parameter.
         target: full variable name.
         strength: whether 0 is exact absence.
-        turn: see `Parameter`.
     """
     start = float(variable.start[0] or 0.0) if variable.start else 0.0
     span = abs(start) or variable.nominal or 1.0
@@ -217,7 +216,7 @@ def free_parameter(
     high = 100.0 * span if variable.maximum is None else variable.maximum
     return Parameter(
         name, variable.symbol, 0.0 if strength else start, low, high, ((target, 1.0),), "effect",
-        strength=strength, span=span, text=variable.text, turn=turn,
+        strength=strength, span=span, text=variable.text,
     )  # fmt: skip
 
 

@@ -460,7 +460,8 @@ class Problem:
                 continue
             before = old.members[name].description.variables
             strengths = set(member.description.extra.get("strengths", ()))
-            turns = set(member.description.extra.get("turns", ()))
+            mixes = member.description.extra.get("mixes", {})
+            tries = member.description.extra.get("tries", {})
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
@@ -468,12 +469,16 @@ class Problem:
                     and variable.name not in before
                     and full not in changed.constants
                 ):
+                    parameter = free_parameter(
+                        variable, full, full, strength=variable.name in strengths
+                    )
                     added.append(
-                        free_parameter(
-                            variable, full, full, strength=variable.name in strengths,
-                            turn=variable.name in turns,
+                        replace(
+                            parameter,
+                            mix=mixes.get(variable.name, ""),
+                            tries=tuple(map(float, tries.get(variable.name, ()))),
                         )
-                    )  # fmt: skip
+                    )
         return changed._with(parameters=[*self.parameters, *added])
 
     def with_fidelity(self, instance: str, step: Refinement) -> Problem:

@@ -5,7 +5,7 @@ of FMUs; and which of these places one simulation shows apart.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,20 +32,33 @@ class Probe:
         strength: parameter of the candidate alone, as it is called where it is alone.
         names: parameters of `problem` that make up its strength: those of all elements for the
             effect on a whole vector.
-        turn: its angle, if it has one (see `Parameter.turn`), called as where it is alone.
-        turns: parameters of `problem` that make up its angle.
+        mix: kind of its second parameter, if it has one (see `Parameter.mix`).
+        second: that parameter, called as where the candidate is alone.
+        seconds: parameters of `problem` that make it up.
+        tries: its parameters of which other values should be tried, and these values.
     """
 
     candidate: Candidate
     problem: Problem
     strength: Parameter
     names: tuple[str, ...]
-    turn: str = ""
-    turns: tuple[str, ...] = ()
+    mix: str = ""
+    second: str = ""
+    seconds: tuple[str, ...] = ()
+    tries: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
-    def values(self, strength: float, angle: float) -> dict[str, float]:
+    def values(
+        self, strength: float, second: float, fixed: Mapping[str, float]
+    ) -> dict[str, float]:
         """Parameter of `problem` -> value."""
-        return dict.fromkeys(self.names, strength) | dict.fromkeys(self.turns, angle)
+        return {
+            **dict.fromkeys(self.names, strength), **dict.fromkeys(self.seconds, second), **fixed
+        }  # fmt: skip
+
+    @property
+    def choices(self) -> list[dict[str, float]]:
+        """Parameter -> value, one parameter at a time."""
+        return [{name: value} for name, values in self.tries for value in values]
 
 
 @dataclass(frozen=True)
@@ -98,8 +111,9 @@ class Batch:
                     problem,
                     replace(first.strength, name=own(first.strength.name)),
                     tuple(n for probe in found for n in probe.names),
-                    own(first.turn) if first.turn else "",
-                    tuple(n for probe in found for n in probe.turns),
+                    first.mix,
+                    own(first.second) if first.second else "",
+                    tuple(n for probe in found for n in probe.seconds),
                 )
             )
         return found
@@ -109,10 +123,17 @@ def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
     """The candidate in a problem with its effect; nothing if it has not one strength."""
     strengths, others = new_parameters(base, problem)
     own = [p for p in strengths if p.name.startswith(candidate.prefix)]
-    turns = tuple(p.name for p in others if p.turn and p.name.startswith(candidate.prefix))[:1]
+    mixed = [p for p in others if p.mix and p.name.startswith(candidate.prefix)][:1]
+    seconds = tuple(p.name for p in mixed)
+    mix = "".join(p.mix for p in mixed)
     if len(own) != 1:
         return []
-    return [Probe(candidate, problem, own[0], (own[0].name,), "".join(turns), turns)]
+    tries = tuple(
+        (p.name, p.tries) for p in others if p.tries and p.name.startswith(candidate.prefix)
+    )
+    return [
+        Probe(candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, tries)
+    ]
 
 
 def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:

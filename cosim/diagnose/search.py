@@ -35,8 +35,8 @@ NEARLY = 0.7
 """Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
 RIVAL_Z = 2.0
 """Below this many standard deviations two explanations count as equal."""
-REFITS = 8
-PART = 0.1
+REFITS = 6
+PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
 REFINED = 3
@@ -210,13 +210,18 @@ class Search:
     def _data(self, layout: Layout) -> Vector:
         return layout.vector([run.data / self.declared.sigma for run in layout.runs])
 
-    def prepare(self) -> None:
-        """Have the candidates' FMUs built in the background, while the calibration runs."""
-        provider = self.declared.provider
-        for batch in batches(self.known, self.declared):
+    def prepare(self, problem: Problem | None = None) -> None:
+        """Have the candidates' FMUs built in the background, while something else is computed.
+
+        Args:
+            problem: to which they will be added, the declared one if not given.
+        """
+        known = self.known if problem is None else candidates(problem)
+        problem = problem or self.declared
+        for batch in batches(known, problem):
             first = batch.members[0][0]
-            variant = apply(self.declared.instances, batch.change or first.change, provider)
-            self._builder.submit(locate, variant[first.instance], provider)
+            variant = apply(problem.instances, batch.change or first.change, problem.provider)
+            self._builder.submit(locate, variant[first.instance], problem.provider)
 
     def close(self) -> None:
         """Stop building."""
@@ -329,7 +334,7 @@ class Search:
         chosen = [c for c in self.known if c.label not in present]
         layout = self.telling(base)
         bench = self.bench(base, layout)
-        signatures = bench.followed(bench.begun(chosen))
+        signatures = bench.followed(bench.begun(chosen, thorough=layout is not self.fitting))
         self.evaluations += bench.evaluations
         aside: tuple[str, ...] = ()
         if layout is not self.fitting:
@@ -373,9 +378,9 @@ class Search:
         moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
-        held = [p for p in others if p.name != item.probe.turn]
+        held = [p for p in others if p.name != item.probe.second]
         if not secondary and held:
-            problem = problem.hold({p.name: p.nominal for p in held})
+            problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
         absorber = self.absorber(base)
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
@@ -385,8 +390,8 @@ class Search:
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift
             theta[problem.index(item.strength.name)] = part * value
-            if item.probe.turn:
-                theta[problem.index(item.probe.turn)] = item.angle
+            if item.probe.second:
+                theta[problem.index(item.probe.second)] = item.second
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self._cost(problem, theta) for theta in starts]
@@ -424,6 +429,8 @@ class Search:
                 current.winner = fitted
                 break
         if current.winner is not None:
+            if self.whole:
+                self.prepare(current.winner.problem)
             place = current.fitted.index(current.winner)
             current.winner = current.fitted[place] = self.sharpened(current.winner, base)
             current.rivals = [
@@ -447,7 +454,7 @@ class Search:
             [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
         )
         theta = problem.nominal
-        for name, value in fitted.estimate.values.items():
+        for name, value in {**item.fixed, **fitted.estimate.values}.items():
             theta[problem.index(name)] = value
         try:
             result = self.fitted(problem, theta, fitted.estimate)

@@ -40,7 +40,10 @@ only cost time."""
 STRETCH, COARSE = 64, 0.03
 """Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
 8 times that, and rounding."""
-QUARTER = 0.5 * np.pi
+SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
+"""Values of a second parameter between which all others are mixed, by its kind."""
+FARTHEST = 100.0
+"""Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
 
@@ -56,7 +59,8 @@ class Signature:
         rest: what of it calibration cannot absorb.
         score: of `rest` against the residual.
         absorbed: share of the signature's energy that calibration absorbs.
-        angle: of an effect that has one.
+        second: value of the effect's second parameter (see `Parameter.mix`).
+        fixed: its parameters that have another value than its FMU's.
         same: labels of candidates with the same signature.
     """
 
@@ -66,7 +70,8 @@ class Signature:
     rest: NDArray[np.float32]
     score: Score
     absorbed: float
-    angle: float = 0.0
+    second: float = 0.0
+    fixed: dict[str, float] = field(default_factory=dict)
     same: tuple[str, ...] = ()
 
     @property
@@ -135,13 +140,20 @@ class Bench:
             self._last.close()
             self._last = None
 
-    def begun(self, candidates: Sequence[Candidate], tick: Tick = lambda: None) -> list[Trials]:
+    def begun(
+        self,
+        candidates: Sequence[Candidate],
+        *,
+        thorough: bool = False,
+        tick: Tick = lambda: None,
+    ) -> list[Trials]:
         """Every candidate simulated once, at a typical strength.
 
         Elements of a vector are simulated together where each shows in channels of its own.
 
         Args:
             candidates: which; those that cannot be simulated are left out.
+            thorough: try other values of parameters that ask for it (see `Parameter.tries`).
             tick: called after each.
         """
         found = []
@@ -151,9 +163,13 @@ class Bench:
                 masks = {c.label: mask[self.layout.channel]
                          for c, mask in batch.members if mask is not None}  # fmt: skip
                 self._together(trials, masks)
+                if thorough:
+                    self._varied([t for t in trials if t.rough], masks)
             else:
                 for one in trials:
                     self._alone(one)
+                    if thorough and one.best is not None:
+                        self._varied([one], {})
             found += trials
             for _ in batch.candidates:
                 tick()
@@ -170,7 +186,7 @@ class Bench:
     def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
         """First simulation of the elements of a vector, all in one."""
         elements = [t for t in trials if t.probe.candidate.label in masks]
-        angles = (0.0, QUARTER) if elements[0].probe.turns else (0.0,)
+        seconds = SECONDS[elements[0].probe.mix]
         factor = 1.0
         for _ in range(TRIALS):
             values = {t.probe.names[0]: t.clipped(factor * t.value) for t in elements}
@@ -178,10 +194,10 @@ class Bench:
                 changes = [
                     self.at(
                         elements[0].probe.problem,
-                        values | {n: angle for t in elements for n in t.probe.turns},
+                        values | {n: second for t in elements for n in t.probe.seconds},
                     )
                     - self.model
-                    for angle in angles
+                    for second in seconds
                 ]
             except CosimError:
                 factor *= 0.1  # too strong for the system to run
@@ -201,6 +217,35 @@ class Bench:
         for t in trials:
             if t.best is None:
                 t.open = False
+
+    def _varied(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
+        """Other values of the parameters that tell nothing but where they are right."""
+        if not trials:
+            return
+        problem = trials[0].probe.problem
+        strengths = {t.probe.candidate.label: t.best.value for t in trials if t.best is not None}
+        for choices in zip(*(t.probe.choices for t in trials), strict=True):
+            changes = []
+            try:
+                for second in SECONDS[trials[0].probe.mix]:
+                    values: dict[str, float] = {}
+                    for t, fixed in zip(trials, choices, strict=True):
+                        value = strengths[t.probe.candidate.label]
+                        values |= t.probe.values(value, second, fixed)
+                    changes.append(self.at(problem, values) - self.model)
+            except CosimError:
+                continue
+            for t, fixed in zip(trials, choices, strict=True):
+                label = t.probe.candidate.label
+                parts = [np.where(masks[label], c, 0.0) if label in masks else c for c in changes]
+                before = t.best, t.promise, t.wish, t.second, t.fixed
+                t.fixed = fixed
+                found = self._turned(t, strengths[label], parts)
+                if before[0] is not None and found.score.gain <= before[0].score.gain:
+                    t.best, t.promise, t.wish, t.second, t.fixed = before
+                else:
+                    t.best, t.value = found, self._wanted(found, strengths[label])
+                    t.tried = t.tried[-1:]
 
     def followed(self, begun: Sequence[Trials]) -> list[Signature]:
         """Signatures; those that promise something at the strength that the residual asks for."""
@@ -231,7 +276,7 @@ class Bench:
         again = []
         for item in found:
             value = item.value * (item.score.amplitude or 1.0)
-            trials = Trials(item.probe, value, angle=item.angle)
+            trials = Trials(item.probe, value, second=item.second, fixed=item.fixed, known=True)
             self._alone(trials)
             again.append(trials)
         return self.followed(again)
@@ -246,13 +291,14 @@ class Bench:
             return
         tried.append(value)
         trials.open = len(tried) < TRIALS
-        angles = [trials.angle]
-        if trials.probe.turns and trials.best is None:
-            angles = [0.0, QUARTER]
+        seconds: tuple[float, ...] = (trials.second,)
+        if trials.best is None and not trials.known:
+            seconds = SECONDS[trials.probe.mix]
         try:
             changes = [
-                self.at(trials.probe.problem, trials.probe.values(value, angle)) - self.model
-                for angle in angles
+                self.at(trials.probe.problem, trials.probe.values(value, second, trials.fixed))
+                - self.model
+                for second in seconds
             ]
         except CosimError:
             trials.value = value * 0.1  # too strong for the system to run
@@ -277,20 +323,27 @@ class Bench:
         return value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
 
     def _turned(self, trials: Trials, value: float, changes: Sequence[Vector]) -> Signature:
-        """Measure an effect at the angle that the residual asks for.
+        """Measure an effect at the value of its second parameter that the residual asks for.
 
         Args:
             trials: of the effect.
             value: its strength.
-            changes: that it makes at angle 0 and a quarter turn on, only the first if it has none.
+            changes: that it makes at `SECONDS`, only the first if it has no second parameter.
         """
-        if len(changes) > 1:
-            rests = np.array([self.absorber.rest(change) for change in changes])
-            matrix = rests @ rests.T
-            wanted = np.linalg.lstsq(matrix, rests @ self.residual, rcond=1e-6)[0]
-            trials.angle = float(np.arctan2(wanted[1], wanted[0]))
-        along, across = np.cos(trials.angle), np.sin(trials.angle)
-        whole = changes[0] if len(changes) < 2 else along * changes[0] + across * changes[1]
+        if len(changes) < 2:
+            return self._measure(trials, value, changes[0])
+        one, other = changes
+        if trials.probe.mix == "shift":
+            other = (other - one) / SECONDS["shift"][1]
+        rests = np.array([self.absorber.rest(change) for change in (one, other)])
+        wanted = np.linalg.lstsq(rests @ rests.T, rests @ self.residual, rcond=1e-6)[0]
+        if trials.probe.mix == "turn":
+            trials.second = float(np.arctan2(wanted[1], wanted[0]))
+            whole = np.cos(trials.second) * one + np.sin(trials.second) * other
+        else:
+            share = wanted[1] / wanted[0] if wanted[0] else 0.0
+            trials.second = float(np.clip(share, -FARTHEST, FARTHEST))
+            whole = one + trials.second * other
         return self._measure(trials, value, whole)
 
     def _measure(self, trials: Trials, value: float, change: Vector) -> Signature:
@@ -300,13 +353,13 @@ class Bench:
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
         result = score(rest, self.residual, self.layout, self.theta.size)
         trials.promise, trials.wish = result.gain, result.amplitude
-        if trials.probe.turns:  # the angle was chosen by the same data: chi square of two
+        if trials.probe.mix:  # two values were chosen by the same data: chi square of two
             result = replace(result, p_value=float(np.exp(-0.5 * result.z**2)))
         if result.amplitude < 0.0 and trials.probe.strength.minimum >= 0.0:
             result = replace(result, amplitude=0.0, gain=0.0, z=0.0, p_value=1.0)
         return Signature(
             trials.probe, value, change.astype(np.float32), rest.astype(np.float32), result,
-            absorbed, trials.angle,
+            absorbed, trials.second, dict(trials.fixed),
         )  # fmt: skip
 
 
@@ -319,21 +372,25 @@ class Trials:
         value: strength to try next.
         tried: strengths that were tried.
         best: signature at the strength nearest to the one that the residual asks for.
-        angle: at which it is tried, if it has one.
+        second: value of its second parameter at which it is tried.
+        fixed: its parameters that have another value than its FMU's.
         promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
         open: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
+        known: whether its second parameter is known well enough to begin with.
     """
 
     probe: Probe
     value: float
     tried: list[float] = field(default_factory=list)
     best: Signature | None = None
-    angle: float = 0.0
+    second: float = 0.0
+    fixed: Mapping[str, float] = field(default_factory=dict)
     promise: float = 0.0
     wish: float = 0.0
     open: bool = True
     rough: bool = False
+    known: bool = False
 
     def clipped(self, value: float) -> float:
         """A strength inside its bounds."""

@@ -18,7 +18,7 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 TILT = Quantity("tilt", "rad", "angle from the level, 0 = absent", start=0.01, strength=True)
-HEADING = Quantity("heading", "rad", "direction of the axis of tilt, from the x axis", turn=True)
+HEADING = Quantity("heading", "rad", "direction of the axis of tilt, from the x axis", mix="turn")
 
 EFFECT = Effect(
     "base_tilt",

@@ -17,13 +17,16 @@ import casadi as ca
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
+from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
 AMPLITUDE = Quantity(
     "tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True
 )
-CYCLES = Quantity("n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
+CYCLES = Quantity(
+    "n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1, tries=ORDERS
+)
+PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "cogging",

@@ -20,7 +20,7 @@ from ..quantity import Quantity
 
 SLOPE = Quantity("slope", "rad", "angle of the slope, 0 = absent", start=0.005, strength=True)
 HEADING = Quantity(
-    "heading", "rad", "direction in which the floor rises, from the world x axis", turn=True
+    "heading", "rad", "direction in which the floor rises, from the world x axis", mix="turn"
 )
 
 EFFECT = Effect(

@@ -24,7 +24,7 @@ AMPLITUDE = Quantity(
     "a", "N.m", "amplitude on the joint, 0 = absent", start=1.0, nominal=1.0, strength=True
 )
 RATIO = Quantity("N", "1", "ratio of the gear", start=101.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
+PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "harmonic_ripple",

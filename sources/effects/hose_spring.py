@@ -17,7 +17,7 @@ from ..quantity import Quantity
 STIFFNESS = Quantity(
     "k", "N.m/rad", "stiffness, 0 = absent", start=2.0, minimum=0.0, nominal=1.0, strength=True
 )
-REST = Quantity("theta_0", "rad", "angle at which the hose hangs free")
+REST = Quantity("theta_0", "rad", "angle at which the hose hangs free", mix="shift")
 
 EFFECT = Effect(
     "hose_spring",

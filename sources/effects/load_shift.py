@@ -25,7 +25,7 @@ SHIFT = Quantity(
     strength=True,
 )
 DIRECTION = Quantity(
-    "direction", "rad", "direction of the shift, 0 forward, positive to the left", turn=True
+    "direction", "rad", "direction of the shift, 0 forward, positive to the left", mix="turn"
 )
 
 EFFECT = Effect(

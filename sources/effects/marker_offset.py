@@ -22,7 +22,7 @@ DISTANCE = Quantity(
     "distance", "m", "offset of the marker, 0 = absent", start=0.01, minimum=0.0, strength=True
 )
 DIRECTION = Quantity(
-    "direction", "rad", "direction of the offset in the body, 0 forward, left > 0", turn=True
+    "direction", "rad", "direction of the offset in the body, 0 forward, left > 0", mix="turn"
 )
 
 EFFECT = Effect(

@@ -19,6 +19,7 @@ import casadi as ca
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
+from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
 ERROR = Quantity(
@@ -28,8 +29,10 @@ ERROR = Quantity(
     start=2e-4,
     strength=True,
 )
-CYCLES = Quantity("n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
+CYCLES = Quantity(
+    "n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1, tries=ORDERS
+)
+PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "mesh_ripple",

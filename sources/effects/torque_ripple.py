@@ -16,13 +16,16 @@ import casadi as ca
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
+from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
 RIPPLE = Quantity(
     "r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True
 )
-CYCLES = Quantity("n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0", turn=True)
+CYCLES = Quantity(
+    "n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1, tries=ORDERS
+)
+PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "torque_ripple",

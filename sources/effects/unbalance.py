@@ -21,7 +21,7 @@ from ..quantity import Quantity
 MOMENT = Quantity(
     "m_u", "N.m", "weight times its distance from the axis, 0 = absent", start=0.2, strength=True
 )
-PHASE = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0", turn=True)
+PHASE = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0", mix="turn")
 
 EFFECT = Effect(
     "unbalance",

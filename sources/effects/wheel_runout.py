@@ -18,7 +18,7 @@ from ..quantity import Quantity
 ECCENTRICITY = Quantity(
     "e", "m", "amplitude of the radius, 0 = absent", start=5e-4, nominal=1e-3, strength=True
 )
-PHASE = Quantity("phi_0", "rad", "wheel angle at which the radius is largest", turn=True)
+PHASE = Quantity("phi_0", "rad", "wheel angle at which the radius is largest", mix="turn")
 
 EFFECT = Effect(
     "wheel_runout",

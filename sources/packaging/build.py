@@ -96,9 +96,12 @@ def component_json(variant: Variant) -> bytes:
             if variable.of_effect and variable.quantity.strength
         ],
     }
-    turns = [v.name for v in model.of_role("parameter") if v.of_effect and v.quantity.turn]
-    if turns:
-        content["turns"] = turns
+    mixes = {v.name: v.quantity.mix for v in model.of_role("parameter") if v.quantity.mix}
+    if mixes:
+        content["mixes"] = mixes
+    tries = {v.name: v.quantity.tries for v in model.of_role("parameter") if v.quantity.tries}
+    if tries:
+        content["tries"] = tries
     return (json.dumps(content, indent=2) + "\n").encode()
 
 

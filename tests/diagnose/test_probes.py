@@ -76,7 +76,7 @@ def test_an_effect_among_its_siblings_does_what_it_does_alone(bench: Problem) ->
             values = []
             for one in (alone, probe):
                 theta = one.problem.nominal
-                for name, value in one.values(0.01, 0.0).items():
+                for name, value in one.values(0.01, 0.0, {}).items():
                     theta[one.problem.index(name)] = value
                 values.append(model_values(one.problem, theta, layout))
                 one.problem.close()
@@ -92,7 +92,7 @@ def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> Non
     (probe,) = Batch(None, ((wanted, None),)).probes(bench)
     strength, angle = 0.02, 2.2  # small against what moves the shaft, in no special direction
     point = probe.problem.nominal
-    for name, value in probe.values(strength, angle).items():
+    for name, value in probe.values(strength, angle, {}).items():
         point[probe.problem.index(name)] = value
     seen = model_values(probe.problem, point, layout) - model
     probe.problem.close()
@@ -101,5 +101,28 @@ def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> Non
     place = Bench(bench, theta, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted]))
     # the signature is linear in the strength to a percent, and so is the angle
-    assert found.angle == pytest.approx(angle, abs=0.02)
+    assert found.second == pytest.approx(angle, abs=0.02)
     assert found.value * found.score.amplitude == pytest.approx(strength, rel=0.02)
+
+
+def test_cycles_per_revolution_are_tried(bench: Problem) -> None:
+    (wanted,) = [c for c in candidates(bench) if c.effect == "torque_ripple"]
+    layout = Layout(bench, bench.chosen("identification"))
+    theta = bench.nominal
+    model = model_values(bench, theta, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+    ((name, tried),) = probe.tries
+    assert 7.0 in tried
+    truth = probe.values(0.01, 0.7, {name: 7.0})
+    point = probe.problem.nominal
+    for full, value in truth.items():
+        point[probe.problem.index(full)] = value
+    seen = model_values(probe.problem, point, layout) - model
+    probe.problem.close()
+    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
+    place = Bench(bench, theta, layout, model, seen, absorber)
+    (found,) = place.followed(place.begun([wanted], thorough=True))
+    assert found.fixed == {name: 7.0}
+    assert found.second == pytest.approx(0.7, abs=0.02)  # linear in the strength to a percent
+    (blind,) = place.followed(place.begun([wanted]))
+    assert blind.score.gain < 0.1 * found.score.gain
