@@ -35,6 +35,10 @@ DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 KNOWN = 0.25
 """A combination is identifiable if its standard deviation is below this fraction of the span."""
+CORRECTIONS = 4
+"""Steps at most with the Jacobian of a point that is close."""
+CALM = 0.8
+"""Share of the information on a direction that runs without jumps give: then derivatives do."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
 PURPOSE = "identification"
@@ -414,6 +418,15 @@ class _Fit:
         weight = self.weight if math.isfinite(self.cap) else None
         return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
+    def correct(self) -> None:
+        """Steps with one Jacobian, taken here."""
+        normal = self.normal(STEPS[-1], central=True)
+        for _ in range(CORRECTIONS):
+            before = self.cost
+            if not self.attempt(self.step(normal, 1e-9)) or before - self.cost < SETTLED:
+                return
+            normal.gradient = self.gradient()
+
     def polish(self) -> None:
         """Search along the main directions of the normal matrix, without derivatives."""
         p = self.problem
@@ -423,7 +436,7 @@ class _Fit:
             return
         values, vectors = np.linalg.eigh(normal.matrix)
         for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
-            if value < 1.0 / KNOWN**2:
+            if value < 1.0 / KNOWN**2 or float(direction @ normal.calm @ direction) > CALM * value:
                 continue
             size = 1.0 / math.sqrt(value)
             for sign in (1.0, -1.0):
@@ -445,6 +458,7 @@ def fit(
     polish: bool = True,
     robust: bool = True,
     rough: bool = False,
+    near: bool = False,
     known: Known | None = None,
 ) -> Estimate:
     """Estimate the parameters of a problem.
@@ -457,6 +471,7 @@ def fit(
         polish: end with a search without derivatives.
         robust: begin with large residuals counted linearly; off when `theta` is close.
         rough: end without derivatives at the solution; only the values count.
+        near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
     """
@@ -464,6 +479,9 @@ def fit(
     run = _Fit(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
     if known is not None:
         run.follow(known, limit)
+        return _estimate(run)
+    if near:
+        run.correct()
         return _estimate(run)
     if robust and _uneven(run):
         run = _Fit(problem, _calmest(run), run.theta)

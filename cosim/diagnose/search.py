@@ -256,7 +256,7 @@ class Search:
     def sharpened(self, quick: Fitted, base: Fitted) -> Fitted:
         """A quickly fitted model fitted again with derivatives of its own."""
         theta = quick.estimate.theta
-        result = self.fitted(corrected(quick.problem, theta, self.raw), theta)
+        result = self.judged(fit(corrected(quick.problem, theta, self.raw), theta, near=True))
         result.effects, result.signature = quick.effects, quick.signature
         result.p_value = quick.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)
