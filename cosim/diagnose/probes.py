@@ -154,6 +154,11 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
     groups: dict[tuple[str, str, str], list[Candidate]] = {}
     wholes: dict[tuple[str, str, str], Candidate] = {}
     result = []
+    balances = {
+        (name, str(balance["name"]))
+        for name, member in problem.system().members.items()
+        for balance in member.description.extra.get("balances", ())
+    }
     for c in candidates:
         match = ELEMENT.fullmatch(c.port)
         if c.refinement is not None:
@@ -163,7 +168,9 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
             groups.setdefault(key, []).append(c)
             wholes[key] = ports[key]
         else:
-            groups.setdefault((c.instance, c.effect, ""), []).append(c)
+            # an effect on a group of balances declares what those on its members would
+            own = "" if (c.instance, c.port) in balances else "group"
+            groups.setdefault((c.instance, c.effect, own), []).append(c)
     held = set(wholes.values())
     shown = _shown(problem)
     for key, members in groups.items():

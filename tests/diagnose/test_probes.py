@@ -37,8 +37,14 @@ def places(*ports: str) -> list[Candidate]:
 
 
 def measured(*signals: str) -> Any:
-    """A problem of which only the channels matter."""
-    return SimpleNamespace(channels=[SimpleNamespace(signal=s) for s in signals])
+    """A problem of which only channels and balances matter; `tail` is a group of balances."""
+    names = ["wheel", "body", "joint", *(f"wheel_{k}" for k in range(2 * MOST))]
+    extra = {"balances": [{"name": name} for name in [*names, "joint_1", "joint_2"]]}
+    arm = SimpleNamespace(description=SimpleNamespace(extra=extra))
+    return SimpleNamespace(
+        channels=[SimpleNamespace(signal=s) for s in signals],
+        system=lambda: SimpleNamespace(members={"arm": arm}),
+    )
 
 
 def test_elements_of_a_vector_share_a_simulation() -> None:
@@ -61,6 +67,8 @@ def test_no_candidate_is_lost() -> None:
     found = batches(known, measured("body.x"))
     assert sorted(c.label for b in found for c in b.candidates) == sorted(c.label for c in known)
     assert max(len(b.members) for b in found) == MOST
+    (alone,) = [b for b in found if any(c.port == "tail" for c, _ in b.members)]
+    assert len(alone.members) == 1
 
 
 def test_an_effect_among_its_siblings_does_what_it_does_alone(bench: Problem) -> None:
