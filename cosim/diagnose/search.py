@@ -40,7 +40,7 @@ PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
 REFINED = 3
-ROUNDS = 3
+ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
 

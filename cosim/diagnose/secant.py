@@ -165,6 +165,7 @@ class Bench:
                 self._together(trials, masks)
                 if thorough:
                     self._varied([t for t in trials if t.rough], masks)
+                    trials = _shared(trials)
             else:
                 for one in trials:
                     self._alone(one)
@@ -396,6 +397,18 @@ class Trials:
         """A strength inside its bounds."""
         strength = self.probe.strength
         return float(np.clip(value, strength.minimum, strength.maximum))
+
+
+def _shared(trials: list[Trials]) -> list[Trials]:
+    """Trials without the effect on a whole vector, unless every element asks for it.
+
+    Else it would be taken for its gain at the elements that have it, and rounds would be spent on
+    taking it off the others.
+    """
+    gains = [t.best.score.gain for t in trials if t.rough and t.best is not None]
+    if min(gains, default=0.0) > SHARE * sum(gains):
+        return trials
+    return [t for t in trials if t.rough]
 
 
 def worthy(found: Sequence[Signature]) -> list[Signature]:

@@ -16,7 +16,7 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.linear import Absorber, Layout
 from cosim.diagnose.probes import MOST, Batch, batches
-from cosim.diagnose.secant import Bench, model_values
+from cosim.diagnose.secant import Bench, _shared, model_values
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 
@@ -134,3 +134,15 @@ def test_cycles_per_revolution_are_tried(bench: Problem) -> None:
     assert found.second == pytest.approx(0.7, abs=0.02)  # linear in the strength to a percent
     (blind,) = place.followed(place.begun([wanted]))
     assert blind.score.gain < 0.1 * found.score.gain
+
+
+def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it() -> None:
+    def trials(gains: tuple[float, ...]) -> list[Any]:
+        parts = [
+            SimpleNamespace(rough=True, best=SimpleNamespace(score=SimpleNamespace(gain=g)))
+            for g in gains
+        ]
+        return [*parts, SimpleNamespace(rough=False, best=None)]
+
+    assert len(_shared(trials((200.0, 150.0, 90.0)))) == 4
+    assert len(_shared(trials((200.0, 150.0, 1.0)))) == 3
