@@ -498,7 +498,15 @@ class Search:
         return fitted
 
     def material(self, base: Fitted, other: Fitted) -> bool:
-        """Whether the step between two models is large enough to be worth a cause."""
+        """Whether the step between two models is large enough to be worth a cause.
+
+        On a rig that acts in ticks, a time shorter than a tick says when within the tick something
+        is read, and not that anything is missing.
+        """
+        last = other.signature.strength if other.signature is not None else None
+        tick = self.raw.step if self.raw.ticks else 0.0
+        if last is not None and last.unit == "s" and other.estimate.values[last.name] < tick:
+            return False
         return any(
             layout.largest(second - first) > MATERIAL
             for first, second, layout in (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.diagnose.linear import Layout, holm, score
-from cosim.diagnose.search import GATE, compare
+from cosim.diagnose.search import GATE, Search, compare
 
 RATE, SECONDS = 100, 40
 
@@ -64,3 +64,19 @@ def test_the_gate_opens_for_the_better_model_only() -> None:
     assert there.passed and there.gain > GATE
     assert not back.passed
     assert back.gain == pytest.approx(-there.gain)
+
+
+@pytest.mark.parametrize(("time", "named"), [(3e-4, False), (6e-4, True)])
+def test_a_time_below_the_tick_of_the_rig_has_no_name(time: float, named: bool) -> None:
+    place = layout()
+    rig: Any = SimpleNamespace(
+        raw=SimpleNamespace(ticks=True, step=5e-4), fitting=place, checking=place
+    )
+    model = np.zeros(place.size)
+    base: Any = SimpleNamespace(fit=model, check=model)
+    strength = SimpleNamespace(name="delay.t_d", unit="s")
+    other: Any = SimpleNamespace(
+        fit=model + 1.0, check=model + 1.0, signature=SimpleNamespace(strength=strength),
+        estimate=SimpleNamespace(values={"delay.t_d": time}),
+    )  # fmt: skip
+    assert Search.material(rig, base, other) is named
