@@ -37,6 +37,8 @@ TRIALS, NEAR = 3, 0.3
 FLOOR = 1e-3
 """A time below this share of a typical one is as good as none: sampling or lagging that fast would
 only cost time."""
+RUNAWAY = 1e15
+"""Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
 STRETCH, COARSE = 64, 0.03
 """Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
 8 times that, and rounding."""
@@ -132,7 +134,10 @@ class Bench:
         for name, value in values.items():
             theta[problem.index(name)] = value
         self.evaluations += len(self.layout.runs)
-        return model_values(problem, theta, self.layout)
+        found = model_values(problem, theta, self.layout)
+        if not np.max(np.abs(found), initial=0.0) < RUNAWAY:
+            raise CosimError(f"{problem.name}: with {values} the simulation runs away")
+        return found
 
     def close(self) -> None:
         """Free the sessions."""
