@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -9,6 +10,8 @@ from typing import Protocol, runtime_checkable
 from ..calibrate.parts import Parameter, Refinement
 from ..calibrate.problem import Problem
 from ..variants import component
+
+_ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
 @runtime_checkable
@@ -92,20 +95,33 @@ def candidates(problem: Problem) -> list[Candidate]:
     return found
 
 
+def balances(problem: Problem) -> dict[tuple[str, str], str]:
+    """(instance, balance) -> kind, for all that the system's FMUs declare.
+
+    Groups of balances, at which effects fit too, are not among them.
+    """
+    return {
+        (name, str(balance["name"])): str(balance["kind"])
+        for name, member in problem.system().members.items()
+        for balance in member.description.extra.get("balances", ())
+    }
+
+
+def element_of(port: str) -> tuple[str, int] | None:
+    """Vector and number of a balance that is one of its elements (`joint_3`), None for others."""
+    match = _ELEMENT.fullmatch(port)
+    return (match[1], int(match[2])) if match else None
+
+
 def _twins(problem: Problem) -> set[tuple[str, str]]:
     """Balances that stand for the same shaft as one on the other end of a power bond.
 
     What acts on a shaft is left to the end that gives the motion: there it enters the equation of
     motion itself, and not a tick later through the exchange.
     """
-    system = problem.system()
-    kinds = {
-        (name, balance["name"]): balance["kind"]
-        for name, member in system.members.items()
-        for balance in member.description.extra.get("balances", ())
-    }
+    kinds = balances(problem)
     twins = set()
-    for bond in system.bonds():
+    for bond in problem.system().bonds():
         giver, _, port = bond.first.partition(".")
         taker, _, other = bond.second.partition(".")
         kind = kinds.get((giver, port))
@@ -120,8 +136,8 @@ def _twins(problem: Problem) -> set[tuple[str, str]]:
 
 def _of(balance: str, port: str) -> bool:
     """Whether it is the port's balance, or that of one of its shafts (`joint_3` of `joint`)."""
-    stem, _, number = balance.rpartition("_")
-    return balance == port or (stem == port and number.isdigit())
+    part = element_of(balance)
+    return balance == port or (part is not None and part[0] == port)
 
 
 def new_parameters(before: Problem, after: Problem) -> tuple[list[Parameter], list[Parameter]]:

@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from ..calibrate.parts import Channel, Parameter, Run
 from ..calibrate.problem import Problem
 from ..errors import CosimError
-from .candidates import Candidate, Catalogue
+from .candidates import Candidate, Catalogue, balances, element_of
 from .linear import Absorber, Layout
-from .probes import ELEMENT
 from .search import Fitted, Search
 from .secant import model_values
 
@@ -149,13 +148,9 @@ def _worst(search: Search, base: Fitted) -> list[Run]:
 
 def _places(problem: Problem, ranked: Sequence[Candidate]) -> list[tuple[str, str]]:
     """Balances, those with promising candidates first."""
-    names = {
-        (name, str(balance["name"]))
-        for name, member in problem.system().members.items()
-        for balance in member.description.extra.get("balances", ())
-    }
-    matches = [(name, ELEMENT.fullmatch(port)) for name, port in names]
-    known = names - {(name, match[1]) for name, match in matches if match}  # elements are probed
+    names = set(balances(problem))
+    parts = [(name, element_of(port)) for name, port in names]
+    known = names - {(name, part[0]) for name, part in parts if part}  # elements are probed
     order = [(c.instance, c.port) for c in ranked if (c.instance, c.port) in known]
     return list(dict.fromkeys(order))
 
@@ -215,10 +210,8 @@ class _Bench:
         )  # fmt: skip
         coarse = model_values(base.problem, base.estimate.theta, search.fitting)
         model = dict(zip(search.fitting.names, search.fitting.by_run(coarse), strict=True))
-        slopes = {item.run: item for item in base.estimate.jacobian}
         for names, layout in self.layouts.items():
-            matrix = layout.matrix([slopes[n] for n in names], base.problem.scale)
-            self.absorber[names] = Absorber(matrix, base.problem)
+            self.absorber[names] = search.absorber(base, layout)
             self.residual[names] = self.absorber[names].rest(
                 layout.vector([rows[n] for n in names])
             )

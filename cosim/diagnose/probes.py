@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError
-from .candidates import Candidate, new_parameters
+from .candidates import Candidate, balances, element_of, new_parameters
 
 MOST = 8
 """Places in one FMU: effects that remember a signal's past make larger ones slow to compile."""
-ELEMENT = re.compile(r"(.+)_(\d+)")
 _INDEX = re.compile(r"\[(\d+)\]$")
 
 
@@ -154,44 +153,40 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
     groups: dict[tuple[str, str, str], list[Candidate]] = {}
     wholes: dict[tuple[str, str, str], Candidate] = {}
     result = []
-    balances = {
-        (name, str(balance["name"]))
-        for name, member in problem.system().members.items()
-        for balance in member.description.extra.get("balances", ())
-    }
+    known = balances(problem)
     for c in candidates:
-        match = ELEMENT.fullmatch(c.port)
+        part = element_of(c.port)
         if c.refinement is not None:
             result.append(Batch(None, ((c, None),)))
-        elif match and (c.instance, c.effect, match[1]) in ports:
-            key = (c.instance, c.effect, match[1])
+        elif part and (c.instance, c.effect, part[0]) in ports:
+            key = (c.instance, c.effect, part[0])
             groups.setdefault(key, []).append(c)
             wholes[key] = ports[key]
         else:
             # an effect on a group of balances declares what those on its members would
-            own = "" if (c.instance, c.port) in balances else "group"
+            own = "" if (c.instance, c.port) in known else "group"
             groups.setdefault((c.instance, c.effect, own), []).append(c)
     held = set(wholes.values())
     shown = _shown(problem)
     for key, members in groups.items():
         members = [c for c in members if c not in held]
-        masks = [shown.get(_number(c)) for c in members] if key in wholes else []
+        masks = [shown.get(n) for n in _numbers(members)] if key in wholes else []
         if len(members) > MOST or any(m is None for m in masks):
             masks = []
         for first in range(0, len(members), MOST):
-            part = members[first : first + MOST]
-            chosen = masks[first : first + MOST] or [None] * len(part)
+            few = members[first : first + MOST]
+            chosen = masks[first : first + MOST] or [None] * len(few)
             whole = wholes.get(key) if len(members) <= MOST else None
-            change = {key[0]: "".join(f"+{c.effect}@{c.port}" for c in part)}
-            result.append(Batch(change, tuple(zip(part, chosen, strict=True)), whole))
+            change = {key[0]: "".join(f"+{c.effect}@{c.port}" for c in few)}
+            result.append(Batch(change, tuple(zip(few, chosen, strict=True)), whole))
         if key in wholes and len(members) > MOST:
             result.append(Batch(wholes[key].change, ((wholes[key], None),)))
     return result
 
 
-def _number(candidate: Candidate) -> int:
-    match = ELEMENT.fullmatch(candidate.port)
-    return int(match[2]) if match else 0
+def _numbers(elements: Sequence[Candidate]) -> list[int]:
+    """Of elements of a vector."""
+    return [part[1] for part in (element_of(c.port) for c in elements) if part]
 
 
 def _shown(problem: Problem) -> dict[int, NDArray[np.bool_]]:

@@ -293,16 +293,15 @@ class Search:
 
     # -- one round ---------------------------------------------------------------------------------
 
-    def absorber(self, fitted: Fitted) -> Absorber:
-        """Of a fitted model."""
-        jacobian = self.fitting.matrix(fitted.estimate.jacobian, fitted.problem.scale)
-        return Absorber(jacobian, fitted.problem)
+    def absorber(self, fitted: Fitted, layout: Layout) -> Absorber:
+        """What the parameters of a fitted model can do in some of the identification runs."""
+        slopes = {item.run: item for item in fitted.estimate.jacobian}
+        matrix = layout.matrix([slopes[n] for n in layout.names], fitted.problem.scale)
+        return Absorber(matrix, fitted.problem)
 
     def bench(self, base: Fitted, layout: Layout) -> Bench:
         """A bench for candidates around a fitted model."""
         problem = base.problem
-        slopes = {item.run: item for item in base.estimate.jacobian}
-        matrix = layout.matrix([slopes[n] for n in layout.names], problem.scale)
         model = model_values(problem, base.estimate.theta, layout)
         rows = zip(
             self.fitting.names, self.fitting.by_run(self.fit_data - base.fit), strict=True
@@ -310,7 +309,7 @@ class Search:
         rest = dict(rows)
         residual = layout.vector([rest[n] for n in layout.names])
         return Bench(
-            problem, base.estimate.theta, layout, model, residual, Absorber(matrix, problem)
+            problem, base.estimate.theta, layout, model, residual, self.absorber(base, layout)
         )
 
     def telling(self, base: Fitted) -> Layout:
@@ -381,7 +380,7 @@ class Search:
         held = [p for p in others if p.name != item.probe.second]
         if not secondary and held:
             problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
-        absorber = self.absorber(base)
+        absorber = self.absorber(base, self.fitting)
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         starts = []

@@ -6,7 +6,7 @@ strength is tried, what the residual asks for is estimated, and the simulation i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,7 +20,6 @@ from .linear import ABSORBED, MATERIAL, Absorber, Layout, Score, score
 from .probes import Probe, batches
 
 Vector = NDArray[np.float64]
-Tick = Callable[[], None]
 VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
 EVIDENT, SHARE = 3.0, 0.02
@@ -145,13 +144,7 @@ class Bench:
             self._last.close()
             self._last = None
 
-    def begun(
-        self,
-        candidates: Sequence[Candidate],
-        *,
-        thorough: bool = False,
-        tick: Tick = lambda: None,
-    ) -> list[Trials]:
+    def begun(self, candidates: Sequence[Candidate], *, thorough: bool = False) -> list[Trials]:
         """Every candidate simulated once, at a typical strength.
 
         Elements of a vector are simulated together where each shows in channels of its own.
@@ -159,7 +152,6 @@ class Bench:
         Args:
             candidates: which; those that cannot be simulated are left out.
             thorough: try other values of parameters that ask for it (see `Parameter.tries`).
-            tick: called after each.
         """
         found = []
         for batch in batches(candidates, self.problem):
@@ -177,8 +169,6 @@ class Bench:
                     if thorough and one.best is not None:
                         self._varied([one], {})
             found += trials
-            for _ in batch.candidates:
-                tick()
         self.close()
         return found
 
@@ -212,7 +202,7 @@ class Bench:
                 mask = masks.get(t.probe.candidate.label)
                 parts = [c if mask is None else np.where(mask, c, 0.0) for c in changes]
                 value = values[t.probe.names[0]]
-                t.best = self._turned(t, value, parts)
+                t.best = self._mixed(t, value, parts)
                 t.rough = mask is not None
                 t.value = self._wanted(t.best, value)
                 if not t.rough:
@@ -246,7 +236,7 @@ class Bench:
                 parts = [np.where(masks[label], c, 0.0) if label in masks else c for c in changes]
                 before = t.best, t.promise, t.wish, t.second, t.fixed
                 t.fixed = fixed
-                found = self._turned(t, strengths[label], parts)
+                found = self._mixed(t, strengths[label], parts)
                 if before[0] is not None and found.score.gain <= before[0].score.gain:
                     t.best, t.promise, t.wish, t.second, t.fixed = before
                 else:
@@ -309,10 +299,7 @@ class Bench:
         except CosimError:
             trials.value = value * 0.1  # too strong for the system to run
             return
-        if len(changes) > 1:
-            found = self._turned(trials, value, changes)
-        else:
-            found = self._measure(trials, value, changes[0])
+        found = self._mixed(trials, value, changes)
         if trials.best is None or _mismatch(found) < _mismatch(trials.best):
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
@@ -328,7 +315,7 @@ class Bench:
         size = max(abs(factor), VISIBLE / max(found.score.size, VISIBLE / GREATEST))
         return value * float(np.sign(factor) or 1.0) * min(size, GREATEST)
 
-    def _turned(self, trials: Trials, value: float, changes: Sequence[Vector]) -> Signature:
+    def _mixed(self, trials: Trials, value: float, changes: Sequence[Vector]) -> Signature:
         """Measure an effect at the value of its second parameter that the residual asks for.
 
         Args:

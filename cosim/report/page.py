@@ -270,6 +270,13 @@ def _against(curve: Curve) -> str:
     return f"{curve.driver} ({curve.run})" if curve.run else curve.driver
 
 
+def _ruled_out(count: int) -> str:
+    """A line on the candidates that one run has shown to be none."""
+    if not count:
+        return ""
+    return f"<p>{count} more were ruled out by the run with the largest excess over the noise.</p>"
+
+
 def _candidates(result: Diagnosis) -> str:
     if result.search is None:
         return ""
@@ -293,6 +300,7 @@ def _candidates(result: Diagnosis) -> str:
             )  # fmt: skip
         parts.append(
             f"<h3>Round {number + 1}: {len(stage.signatures)} distinct candidates</h3>"
+            + _ruled_out(len(stage.aside))
             + _table(
                 [
                     "effect",

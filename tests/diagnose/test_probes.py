@@ -17,6 +17,7 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.linear import Absorber, Layout
 from cosim.diagnose.probes import MOST, Batch, batches
 from cosim.diagnose.secant import Bench, _shared, model_values
+from cosim.errors import CosimError
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 
@@ -39,7 +40,9 @@ def places(*ports: str) -> list[Candidate]:
 def measured(*signals: str) -> Any:
     """A problem of which only channels and balances matter; `tail` is a group of balances."""
     names = ["wheel", "body", "joint", *(f"wheel_{k}" for k in range(2 * MOST))]
-    extra = {"balances": [{"name": name} for name in [*names, "joint_1", "joint_2"]]}
+    extra = {
+        "balances": [{"name": name, "kind": "rotation"} for name in [*names, "joint_1", "joint_2"]]
+    }
     arm = SimpleNamespace(description=SimpleNamespace(extra=extra))
     return SimpleNamespace(
         channels=[SimpleNamespace(signal=s) for s in signals],
@@ -146,3 +149,18 @@ def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it() -> None:
 
     assert len(_shared(trials((200.0, 150.0, 90.0)))) == 4
     assert len(_shared(trials((200.0, 150.0, 1.0)))) == 3
+
+
+def test_a_simulation_that_runs_away_is_refused(
+    bench: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layout = Layout(bench, bench.chosen("identification"))
+    nothing = np.zeros(layout.size)
+    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
+    place = Bench(bench, bench.nominal, layout, nothing, nothing, absorber)
+    for value in (1e30, np.nan):
+        monkeypatch.setattr(
+            "cosim.diagnose.secant.model_values", lambda *_, v=value: np.full(layout.size, v)
+        )
+        with pytest.raises(CosimError, match="runs away"):
+            place.at(bench, {})
