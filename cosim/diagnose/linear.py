@@ -104,9 +104,9 @@ class Layout:
 class Absorber:
     """Projection onto what the parameters of a model can do.
 
-    Attributes:
-        basis: orthonormal columns.
-        normal: J^T J in scaled parameters, priors included.
+    Args:
+        jacobian: columns in units of the parameters' scales.
+        problem: gives priors and scales.
     """
 
     def __init__(self, jacobian: Vector, problem: Problem) -> None:
@@ -115,21 +115,27 @@ class Absorber:
             for i, p in enumerate(problem.parameters)
             if p.prior
         ]
-        self.extra = np.array(rows).reshape(-1, jacobian.shape[1])
-        self.jacobian = jacobian
-        self.normal = jacobian.T @ jacobian + self.extra.T @ self.extra
-        values, vectors = np.linalg.eigh(self.normal)
+        extra = np.array(rows).reshape(-1, jacobian.shape[1])
+        values, vectors = np.linalg.eigh(jacobian.T @ jacobian + extra.T @ extra)
         # a direction along which the whole span changes less than the noise absorbs nothing
         keep = values > 1.0
-        self.inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+        self._back = vectors[:, keep] / np.sqrt(values[keep])
+        # float32: rounding is 1e-7 of a vector, and less than `ABSORBED` of it is not judged
+        self._basis = (jacobian @ self._back).astype(np.float32)
 
     def change(self, vector: Vector) -> Vector:
         """Scaled parameter change that explains a vector best."""
-        return np.asarray(self.inverse @ (self.jacobian.T @ vector))
+        return np.asarray(self._back @ self._share(vector))
 
     def rest(self, vector: Vector) -> Vector:
         """What is left of a vector."""
-        return np.asarray(vector - self.jacobian @ self.change(vector))
+        share = self._share(vector).astype(np.float32)
+        return np.asarray(vector - self._basis @ share, dtype=np.float64)
+
+    def _share(self, vector: Vector) -> Vector:
+        size = float(np.max(np.abs(vector), initial=0.0)) or 1.0  # squares must fit float32
+        share = (vector / size).astype(np.float32) @ self._basis
+        return np.asarray(share * size, dtype=np.float64)
 
 
 @dataclass(frozen=True)

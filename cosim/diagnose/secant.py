@@ -6,8 +6,11 @@ strength is tried, what the residual asks for is estimated, and the simulation i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +20,10 @@ from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate
 from .linear import ABSORBED, MATERIAL, Absorber, Layout, Score, score
-from .probes import Probe, batches
+from .probes import Batch, Probe, batches
 
 Vector = NDArray[np.float64]
+Item = TypeVar("Item")
 VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
 EVIDENT, SHARE = 3.0, 0.02
@@ -121,28 +125,34 @@ class Bench:
         self.model, self.absorber = model, absorber
         self.residual = absorber.rest(residual)
         self.evaluations = 0
-        self._last: Problem | None = None
+        self._lock = threading.Lock()
 
     def at(self, problem: Problem, values: Mapping[str, float]) -> Vector:
         """Model values over sigma with strengths set."""
-        if self._last is not None and self._last is not problem:
-            self._last.close()
-        self._last = problem
         theta = problem.nominal
         theta[: self.theta.size] = self.theta
         for name, value in values.items():
             theta[problem.index(name)] = value
-        self.evaluations += len(self.layout.runs)
+        with self._lock:
+            self.evaluations += len(self.layout.runs)
         found = model_values(problem, theta, self.layout)
         if not np.max(np.abs(found), initial=0.0) < RUNAWAY:
             raise CosimError(f"{problem.name}: with {values} the simulation runs away")
         return found
 
-    def close(self) -> None:
-        """Free the sessions."""
-        if self._last is not None:
-            self._last.close()
-            self._last = None
+    def _spread(
+        self, function: Callable[[Item], list[Trials]], items: Iterable[Item]
+    ) -> list[Trials]:
+        """Apply a function to batches of trials in threads, and free the sessions that it used."""
+
+        def one(item: Item) -> list[Trials]:
+            trials = function(item)
+            for problem in {id(t.probe.problem): t.probe.problem for t in trials}.values():
+                problem.close()
+            return trials
+
+        with ThreadPoolExecutor(self.problem.workers) as pool:
+            return [t for found in pool.map(one, items) for t in found]
 
     def begun(self, candidates: Sequence[Candidate], *, thorough: bool = False) -> list[Trials]:
         """Every candidate simulated once, at a typical strength.
@@ -153,8 +163,8 @@ class Bench:
             candidates: which; those that cannot be simulated are left out.
             thorough: try other values of parameters that ask for it (see `Parameter.tries`).
         """
-        found = []
-        for batch in batches(candidates, self.problem):
+
+        def simulated(batch: Batch) -> list[Trials]:
             trials = [Trials(p, p.strength.span) for p in batch.probes(self.problem)]
             if batch.apart and len(trials) == len(batch.candidates):
                 masks = {c.label: mask[self.layout.channel]
@@ -168,9 +178,9 @@ class Bench:
                     self._alone(one)
                     if thorough and one.best is not None:
                         self._varied([one], {})
-            found += trials
-        self.close()
-        return found
+            return trials
+
+        return self._spread(simulated, batches(candidates, self.problem))
 
     def _alone(self, trials: Trials) -> None:
         while trials.best is None and trials.open:
@@ -247,13 +257,17 @@ class Bench:
         """Signatures; those that promise something at the strength that the residual asks for."""
         best = max((t.promise for t in begun), default=0.0)
         least = max(EVIDENT, SHARE * best)
-        for trials in begun:
-            if trials.rough and self._hopeful(trials, least):
-                trials.best, trials.rough = None, False
-                self._alone(trials)
-            while trials.open and self._hopeful(trials, least):
-                self.more(trials)
-        self.close()
+
+        def pursued(group: list[Trials]) -> list[Trials]:
+            for trials in group:
+                if trials.rough and self._hopeful(trials, least):
+                    trials.best, trials.rough = None, False
+                    self._alone(trials)
+                while trials.open and self._hopeful(trials, least):
+                    self.more(trials)
+            return group
+
+        self._spread(pursued, _by_problem(begun))
         return [t.best for t in begun if t.best is not None]
 
     def _hopeful(self, trials: Trials, least: float) -> bool:
@@ -269,12 +283,20 @@ class Bench:
         Args:
             found: by a bench with fewer runs.
         """
-        again = []
-        for item in found:
-            value = item.value * (item.score.amplitude or 1.0)
-            trials = Trials(item.probe, value, second=item.second, fixed=item.fixed, known=True)
-            self._alone(trials)
-            again.append(trials)
+
+        def simulated(group: list[Trials]) -> list[Trials]:
+            for trials in group:
+                self._alone(trials)
+            return group
+
+        again = [
+            Trials(
+                item.probe, item.value * (item.score.amplitude or 1.0), second=item.second,
+                fixed=item.fixed, known=True,
+            )
+            for item in found
+        ]  # fmt: skip
+        self._spread(simulated, _by_problem(again))
         return self.followed(again)
 
     def more(self, trials: Trials) -> None:
@@ -389,6 +411,14 @@ class Trials:
         """A strength inside its bounds."""
         strength = self.probe.strength
         return float(np.clip(value, strength.minimum, strength.maximum))
+
+
+def _by_problem(trials: Sequence[Trials]) -> list[list[Trials]]:
+    """Trials in the same system, which share its sessions."""
+    groups: dict[int, list[Trials]] = {}
+    for one in trials:
+        groups.setdefault(id(one.probe.problem), []).append(one)
+    return list(groups.values())
 
 
 def _shared(trials: list[Trials]) -> list[Trials]:
