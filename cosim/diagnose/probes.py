@@ -4,6 +4,7 @@ of FMUs; and which of these places one simulation shows apart.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,6 +35,7 @@ class Probe:
         mix: kind of its second parameter, if it has one (see `Parameter.mix`).
         second: that parameter, called as where the candidate is alone.
         seconds: parameters of `problem` that make it up.
+        reach: bounds of that parameter.
         tries: its parameters of which other values should be tried, and these values.
     """
 
@@ -44,6 +46,7 @@ class Probe:
     mix: str = ""
     second: str = ""
     seconds: tuple[str, ...] = ()
+    reach: tuple[float, float] = (-math.inf, math.inf)
     tries: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def values(
@@ -113,6 +116,7 @@ class Batch:
                     first.mix,
                     own(first.second) if first.second else "",
                     tuple(n for probe in found for n in probe.seconds),
+                    first.reach,
                 )
             )
         return found
@@ -130,9 +134,12 @@ def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
     tries = tuple(
         (p.name, p.tries) for p in others if p.tries and p.name.startswith(candidate.prefix)
     )
+    reach = (mixed[0].minimum, mixed[0].maximum) if mixed else (-math.inf, math.inf)
     return [
-        Probe(candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, tries)
-    ]
+        Probe(
+            candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, reach, tries
+        )
+    ]  # fmt: skip
 
 
 def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:

@@ -113,6 +113,11 @@ def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate
     return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
 
 
+def more_general(first: Fitted, second: Fitted) -> bool:
+    """Whether a model has more parameters for what it adds at the same place."""
+    return first.effects[-1].place == second.effects[-1].place and first.free > second.free
+
+
 @dataclass
 class Round:
     """One round.
@@ -428,6 +433,7 @@ class Search:
                 current.winner = fitted
                 break
         if current.winner is not None:
+            current.winner = self.simplest(base, current.winner, current.fitted)
             if self.whole:
                 self.prepare(current.winner.problem)
             place = current.fitted.index(current.winner)
@@ -435,9 +441,21 @@ class Search:
             current.rivals = [
                 f for f in current.fitted if f is not current.winner and f.gate is not None
                 and f.gate.passed and not self.apart(f, current.winner)
+                and not more_general(f, current.winner)
             ]  # fmt: skip
         self.rounds.append(current)
         return current
+
+    def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
+        """What explains the data as well as the best one, at the same place, by fewer parameters.
+
+        A law with a parameter more often does better by a hair where the simpler one is true.
+        """
+        simpler = [
+            f for f in fitted if f.gate is not None and f.gate.passed and more_general(best, f)
+            and self.material(base, f) and not self.apart(f, best)
+        ]  # fmt: skip
+        return min(simpler, key=lambda f: f.free, default=best)
 
     def refined(self, base: Fitted, fitted: Fitted) -> Fitted:
         """The fit with all parameters of its last effect free, if unused runs want that."""

@@ -357,7 +357,8 @@ class Bench:
             whole = np.cos(trials.second) * one + np.sin(trials.second) * other
         else:
             share = wanted[1] / wanted[0] if wanted[0] else 0.0
-            trials.second = float(np.clip(share, -FARTHEST, FARTHEST))
+            low, high = trials.probe.reach
+            trials.second = float(np.clip(share, max(low, -FARTHEST), min(high, FARTHEST)))
             whole = one + trials.second * other
         return self._measure(trials, value, whole)
 

@@ -1,8 +1,9 @@
 """Coulomb friction that differs between the two directions of rotation.
 
-    f = -f_c (1 + a s) s,   s = tanh(v / v_0),   P_loss = f_c (1 + a s) s v
+    f = -f_c (1 + a sgn v) tanh(v / v_0),   P_loss = -f v
 
-Friction is f_c (1 + a) forward and f_c (1 - a) backward; a = 1 is friction forward only.
+Friction is f_c (1 + a) forward and f_c (1 - a) backward, each regularised as `coulomb` is; a = 1 is
+friction forward only.
 
 Not modelled: stiction; the asymmetry of viscous friction.
 
@@ -33,6 +34,7 @@ ASYMMETRY = Quantity(
     start=1.0,
     minimum=-1.0,
     maximum=1.0,
+    mix="shift",
 )
 W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 
@@ -48,7 +50,7 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
     velocity = e.signal("velocity")
-    sign = ca.tanh(velocity / e.parameter(W_0))
-    torque = -e.parameter(TAU_C) * (1 + e.parameter(ASYMMETRY) * sign) * sign
+    sides = 1 + e.parameter(ASYMMETRY) * ca.sign(velocity)
+    torque = -e.parameter(TAU_C) * sides * ca.tanh(velocity / e.parameter(W_0))
     e.add(torque)
     e.loss(-torque * velocity)
