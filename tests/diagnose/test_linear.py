@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.diagnose.linear import Layout, holm, score
-from cosim.diagnose.search import GATE, Search, compare
+from cosim.diagnose.search import GATE, Search, compare, more_general
 
 RATE, SECONDS = 100, 40
 
@@ -80,3 +80,17 @@ def test_a_time_below_the_tick_of_the_rig_has_no_name(time: float, named: bool) 
         estimate=SimpleNamespace(values={"delay.t_d": time}),
     )  # fmt: skip
     assert Search.material(rig, base, other) is named
+
+
+@pytest.mark.parametrize("told_apart", [False, True])
+def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
+    def law(free: int, place: str = "load.flange") -> Any:
+        gate = SimpleNamespace(passed=True)
+        return SimpleNamespace(free=free, effects=[SimpleNamespace(place=place)], gate=gate)
+
+    rig: Any = SimpleNamespace(material=lambda *_: True, apart=lambda *_: told_apart)
+    best, simple, elsewhere = law(12), law(11), law(10, "gearbox.flange_a")
+    chosen = Search.simplest(rig, law(10), best, [best, simple, elsewhere])
+    assert chosen is (best if told_apart else simple)
+    assert more_general(best, simple)
+    assert not more_general(simple, best)

@@ -27,16 +27,18 @@ def sets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
     """A bench with a soft supply, and the same bench without."""
     folder = tmp_path_factory.mktemp("benches")
     plain = draw(np.random.default_rng(3))
-    benches = [plain, Bench(plain.parameters, "supply_sag", SIZE)]
-    clean, sagging = write_sets(folder, benches, SHEET, 5, 2.0, ("ST", "MS", "LW"))
-    yield {"clean": clean, "supply_sag": sagging}
+    benches = [
+        plain, Bench(plain.parameters, "supply_sag", SIZE), Bench(plain.parameters, "coulomb", 0.4)
+    ]  # fmt: skip
+    places = write_sets(folder, benches, SHEET, 5, 2.0, ("ST", "MS", "LW"))
+    yield dict(zip(("clean", "supply_sag", "coulomb"), places, strict=True))
 
 
-def searched(folder: Path) -> tuple[Search, Round]:
+def searched(folder: Path, choice: set[str] = CHOICE) -> tuple[Search, Round]:
     """One round over a part of the catalogue."""
     problem = read_problem(folder, workers=2)
-    chosen = [c for c in candidates(problem) if c.effect in CHOICE]
-    assert len({c.effect for c in chosen}) == len(CHOICE)
+    chosen = [c for c in candidates(problem) if c.effect in choice]
+    assert len({c.effect for c in chosen}) == len(choice)
     search = Search(problem, only=chosen)
     return search, search.round(search.calibrated())
 
@@ -57,6 +59,16 @@ def test_the_clean_twin_stays_quiet(sets: dict[str, Path]) -> None:
     search, found = searched(sets["clean"])
     assert found.winner is None
     assert np.sqrt(np.mean((search.check_data - found.base.check) ** 2)) < 1.1
+
+
+def test_a_law_is_not_mistaken_for_one_that_contains_it(sets: dict[str, Path]) -> None:
+    _, found = searched(sets["coulomb"], {"coulomb", "asymmetric_coulomb", "quadratic_drag"})
+    assert found.winner is not None
+    assert found.winner.effects[-1].effect == "coulomb"
+    assert not [f for f in found.rivals if f.effects[-1].place == found.winner.effects[-1].place]
+    assert found.winner.signature is not None
+    strength = found.winner.estimate.values[found.winner.signature.strength.name]
+    assert strength == pytest.approx(0.4, rel=0.03)  # five times its 95 % interval
 
 
 def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:

@@ -116,6 +116,29 @@ def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> Non
     assert found.value * found.score.amplitude == pytest.approx(strength, rel=0.02)
 
 
+@pytest.mark.parametrize("asymmetry", [-0.4, 0.0, 1.0])
+def test_the_asymmetry_of_friction_is_found_without_a_search(
+    bench: Problem, asymmetry: float
+) -> None:
+    (wanted,) = [c for c in candidates(bench) if c.label == "asymmetric_coulomb at load.flange"]
+    layout = Layout(bench, bench.chosen("identification"))
+    model = model_values(bench, bench.nominal, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+    assert probe.reach == (-1.0, 1.0)
+    point = probe.problem.nominal
+    for name, value in probe.values(0.02, asymmetry, {}).items():
+        point[probe.problem.index(name)] = value
+    seen = model_values(probe.problem, point, layout) - model
+    probe.problem.close()
+    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
+    place = Bench(bench, bench.nominal, layout, model, seen, absorber)
+    (found,) = place.followed(place.begun([wanted]))
+    # linear in both to a few percent: the speed at which the sign is smoothed is passed elsewhere
+    assert found.second == pytest.approx(asymmetry, abs=0.05)
+    assert -1.0 <= found.second <= 1.0
+    assert found.value * found.score.amplitude == pytest.approx(0.02, rel=0.05)
+
+
 def test_cycles_per_revolution_are_tried(bench: Problem) -> None:
     (wanted,) = [c for c in candidates(bench) if c.effect == "torque_ripple"]
     layout = Layout(bench, bench.chosen("identification"))
