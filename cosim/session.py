@@ -10,6 +10,8 @@ one of its own; the compiled executor releases the interpreter lock.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
@@ -26,6 +28,8 @@ from .recording import Recording
 from .start import find_past
 
 Vector = NDArray[np.float64]
+LOOK = 100
+"""Communication steps after which a limited run looks at the clock."""
 
 
 class Session:
@@ -73,18 +77,21 @@ class Session:
         position = list(self.master.system.members).index(member.name)
         return Block(self._run.instances[position], variables), variables
 
-    def run(self, values: Mapping[str, float] | Vector | None = None) -> tuple[Vector, Vector]:
+    def run(
+        self, values: Mapping[str, float] | Vector | None = None, *, limit: float = math.inf
+    ) -> tuple[Vector, Vector]:
         """Run with these values on top of the system's own.
 
         Args:
             values: by full name, or one per target.
+            limit: processor time that it may take [s].
 
         Returns:
             times, and one row per time with a column per name in `names` (a copy).
 
         Raises:
             ValueRangeError: outside the declared bounds.
-            StepError: an FMU failed.
+            StepError: an FMU failed, or the run took too long.
         """
         if values is None:
             values = {}
@@ -102,14 +109,27 @@ class Session:
         run.initialize()
         try:
             find_past(run)
-            self._advance(self.count)
+            self._advance_within(limit)
             run.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
-            time = float(run.times[min(run.index, self.count)])
-            text = f"run stopped at t = {time:.9g} s: {error}"
+            at = float(run.times[min(run.index, self.count)])
+            text = f"run stopped at t = {at:.9g} s: {error}"
             messages = error.messages if isinstance(error, FmuCallError) else ()
-            raise StepError(text, messages, time=time) from error
+            raise StepError(text, messages, time=at) from error
         return self.times, run.rows[: run.row].copy()
+
+    def _advance_within(self, limit: float) -> None:
+        if math.isinf(limit):
+            self._advance(self.count)
+            return
+        begun = time.thread_time()
+        for last in [*range(LOOK, self.count, LOOK), self.count]:
+            self._advance(last)
+            if time.thread_time() - begun > limit:
+                raise FmuCallError(
+                    f"it took more than {limit:.3g} s of processor time: with these values a "
+                    "solver takes very small steps"
+                )
 
     def record(self, progress: Callable[[float], None] | None = None) -> Recording:
         """Run with the values that the system has now: change them by `master.system.set`.

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -67,6 +68,11 @@ class Problem:
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
+
+    Attributes:
+        evaluations: simulated runs so far.
+        costs: processor time that a run took, the last time [s].
+        limits: processor time that it may take, no limit if not given [s].
     """
 
     def __init__(
@@ -99,6 +105,8 @@ class Problem:
         self.instances = dict(instances or file.instances)
         self.workers = workers or os.cpu_count() or 1
         self.evaluations = 0
+        self.costs: dict[str, float] = {}
+        self.limits: dict[str, float] = {}
         self._by_name = {run.name: run for run in self.runs}
         self._idle: dict[str, list[Session]] = {run.name: [] for run in self.runs}
         self._lock = threading.Lock()
@@ -227,7 +235,7 @@ class Problem:
         """What the channels would read: one row per sample.
 
         Raises:
-            StepError: an FMU failed.
+            StepError: an FMU failed, or the run exceeded its limit.
             ValueRangeError: a value outside the bounds that its FMU declares.
         """
         run = self.run(run) if isinstance(run, str) else run
@@ -235,12 +243,15 @@ class Problem:
             self.evaluations += 1
             idle = self._idle[run.name]
             session = idle.pop() if idle else self.session(run)
+        begun = time.thread_time()
         try:
-            times, rows = session.run(self.values(theta, run))
+            limit = self.limits.get(run.name, math.inf)
+            times, rows = session.run(self.values(theta, run), limit=limit)
         except FmuCallError:
             session.close()
             raise
         with self._lock:
+            self.costs[run.name] = time.thread_time() - begun
             self._idle[run.name].append(session)
         place = {name: column for column, name in enumerate(session.names)}
         read = np.column_stack(

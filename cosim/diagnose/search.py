@@ -20,7 +20,7 @@ from ..variants import apply
 from .candidates import Candidate, candidates, new_parameters
 from .linear import MATERIAL, Absorber, Layout, Score, holm, score
 from .probes import batches
-from .secant import FLOOR, Bench, Signature, merge, model_values, worthy
+from .secant import FLOOR, Bench, Signature, merge, model_values, patience, worthy
 from .structure import structures
 
 Vector = NDArray[np.float64]
@@ -385,6 +385,7 @@ class Search:
         held = [p for p in others if p.name != item.probe.second]
         if not secondary and held:
             problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
+        problem.limits = patience(base.problem)
         absorber = self.absorber(base, self.fitting)
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale

@@ -42,6 +42,9 @@ FLOOR = 1e-3
 only cost time."""
 RUNAWAY = 1e15
 """Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
+PATIENCE = 20.0
+"""Times as long as without the effect: a fidelity with more states takes a few times as long, and
+what takes longer is an instability that a solver tries to resolve."""
 STRETCH, COARSE = 64, 0.03
 """Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
 8 times that, and rounding."""
@@ -129,6 +132,7 @@ class Bench:
 
     def at(self, problem: Problem, values: Mapping[str, float]) -> Vector:
         """Model values over sigma with strengths set."""
+        problem.limits = patience(self.problem)
         theta = problem.nominal
         theta[: self.theta.size] = self.theta
         for name, value in values.items():
@@ -452,6 +456,11 @@ def worthy(found: Sequence[Signature]) -> list[Signature]:
 def _mismatch(item: Signature) -> float:
     """How far the strength of the trial is from the one that the residual asks for."""
     return abs(float(np.log(max(item.score.amplitude, 1e-6))))
+
+
+def patience(base: Problem) -> dict[str, float]:
+    """Processor time that the runs may take with an effect, from what they took without."""
+    return {run: PATIENCE * cost for run, cost in base.costs.items()}
 
 
 def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:

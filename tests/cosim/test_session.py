@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cosim.cli import default_provider
-from cosim.errors import UnknownNameError, ValueRangeError
+from cosim.errors import StepError, UnknownNameError, ValueRangeError
 from cosim.master import Master
 from cosim.scenario import find
 from cosim.session import Session
@@ -53,6 +53,20 @@ def test_values_by_array_and_by_name(parts) -> None:
         with pytest.raises(ValueRangeError):
             session.run({"load.J": -1.0})
         assert np.array_equal(session.run({"load.J": 0.09, "motor.R_a": 0.36})[1], named)
+
+
+@pytest.mark.parametrize("executor", ["c", "python"])
+def test_a_run_that_takes_too_long_is_stopped(parts, executor) -> None:
+    master, inputs = parts
+    master = Master(master.system, master.algorithm, master.step, executor=executor)
+    with Session(master, DURATION, inputs=inputs, record=RECORD) as session:
+        free = session.run()
+        with pytest.raises(
+            StepError, match=r"stopped at t = 0\.01 s: it took more than 0 s of proc"
+        ):
+            session.run(limit=0.0)
+        timed = session.run(limit=60.0)
+    assert np.array_equal(free[1], timed[1])  # looking at the clock changes nothing
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's statm")
