@@ -33,6 +33,8 @@ class Quantity:
             (effect = strength * (effect at 0 + value * derivative)).
         tries: values that a search should try, where a model with another one tells nothing of the
             right one (cycles per revolution).
+        visits: output of the component among whose values along a run the right value is, for a
+            parameter that tells nothing where it is wrong (where a patch lies).
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -47,6 +49,7 @@ class Quantity:
     strength: bool = False
     mix: Mix = ""
     tries: tuple[float, ...] = ()
+    visits: str = ""
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

@@ -39,6 +39,10 @@ CORRECTIONS = 4
 """Steps at most with the Jacobian of a point that is close."""
 CALM = 0.8
 """Share of the information on a direction that runs without jumps give: then derivatives do."""
+RENEWALS = 5
+"""Jacobians that a fit from close by takes at most."""
+SHORTER = 8
+"""Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
 PURPOSE = "identification"
@@ -396,19 +400,13 @@ class _Fit:
         Parameters that were there before hardly change what they do when one is added, so a step
         costs one simulation and one for each new parameter.
         """
-        damping = 1e-9
         for _ in range(limit):
             self.iterations += 1
             self.jacobian = known.extended(self.problem, self.theta, self.purpose)
             weight = self.weight if math.isfinite(self.cap) else None
             normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
             before = self.cost
-            for _ in range(4):
-                if self.attempt(self.step(normal, damping)):
-                    damping = max(damping * 0.1, 1e-12)
-                    break
-                damping = max(damping, 1e-7) * 30.0
-            else:
+            if self.settle(normal, 1) or self.cost == before:
                 return
             if before - self.cost <= max(SETTLED, 1e-4 * before):
                 return
@@ -418,14 +416,31 @@ class _Fit:
         weight = self.weight if math.isfinite(self.cap) else None
         return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
-    def correct(self) -> None:
-        """Steps with one Jacobian, taken here."""
-        normal = self.normal(STEPS[-1], central=True)
-        for _ in range(CORRECTIONS):
-            before = self.cost
-            if not self.attempt(self.step(normal, 1e-9)) or before - self.cost < SETTLED:
-                return
+    def settle(self, normal: Normal, limit: int) -> bool:
+        """Damped steps with one Jacobian; whether they came to where it promises no more."""
+        damping = 1e-9
+        for _ in range(limit):
+            for _ in range(SHORTER):
+                wanted = self.step(normal, damping)
+                away = (wanted - self.theta) / self.problem.scale
+                if 0.5 * float(normal.gradient @ away) < SETTLED:
+                    return True
+                if self.attempt(wanted):
+                    damping = max(damping * 0.1, 1e-12)
+                    break
+                damping = max(damping, 1e-7) * 30.0
+            else:
+                return False
             normal.gradient = self.gradient()
+        return False
+
+    def correct(self) -> None:
+        """Steps with a Jacobian taken here, and with another one as long as they lead far."""
+        for _ in range(RENEWALS):
+            before = self.cost
+            settled = self.settle(self.normal(STEPS[-1], central=True), CORRECTIONS)
+            if settled or before - self.cost < SETTLED:
+                return
 
     def polish(self) -> None:
         """Search along the main directions of the normal matrix, without derivatives."""

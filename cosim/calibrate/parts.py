@@ -51,6 +51,7 @@ class Parameter:
         span: size of a typical change; the distance of the bounds if not given.
         inverse: the targets get factor / value: a compliance that sets a stiffness.
         tries: values that a search should try.
+        visits: variable of the system among whose values along a run the right one is.
         mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
     """
 
@@ -69,6 +70,7 @@ class Parameter:
     inverse: bool = False
     mix: str = ""
     tries: tuple[float, ...] = ()
+    visits: str = ""
 
     def set(self, value: float) -> dict[str, float]:
         """Full variable name -> value."""

@@ -473,6 +473,7 @@ class Problem:
             strengths = set(member.description.extra.get("strengths", ()))
             mixes = member.description.extra.get("mixes", {})
             tries = member.description.extra.get("tries", {})
+            visits = member.description.extra.get("visits", {})
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
@@ -488,6 +489,9 @@ class Problem:
                             parameter,
                             mix=mixes.get(variable.name, ""),
                             tries=tuple(map(float, tries.get(variable.name, ()))),
+                            visits=f"{name}.{place}"
+                            if (place := visits.get(variable.name))
+                            else "",
                         )
                     )
         return changed._with(parameters=[*self.parameters, *added])

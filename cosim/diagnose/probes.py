@@ -37,6 +37,8 @@ class Probe:
         seconds: parameters of `problem` that make it up.
         reach: bounds of that parameter.
         tries: its parameters of which other values should be tried, and these values.
+        visits: its parameters that are tried together along a run, with the variables that tell
+            their values.
     """
 
     candidate: Candidate
@@ -48,6 +50,7 @@ class Probe:
     seconds: tuple[str, ...] = ()
     reach: tuple[float, float] = (-math.inf, math.inf)
     tries: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    visits: tuple[tuple[str, str], ...] = ()
 
     def values(
         self, strength: float, second: float, fixed: Mapping[str, float]
@@ -134,10 +137,14 @@ def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
     tries = tuple(
         (p.name, p.tries) for p in others if p.tries and p.name.startswith(candidate.prefix)
     )
+    visits = tuple(
+        (p.name, p.visits) for p in others if p.visits and p.name.startswith(candidate.prefix)
+    )
     reach = (mixed[0].minimum, mixed[0].maximum) if mixed else (-math.inf, math.inf)
     return [
         Probe(
-            candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, reach, tries
+            candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, reach,
+            tries, visits,
         )
     ]  # fmt: skip
 

@@ -21,6 +21,7 @@ from ..errors import CosimError
 from .candidates import Candidate
 from .linear import ABSORBED, MATERIAL, Absorber, Layout, Score, score
 from .probes import Batch, Probe, batches
+from .visits import visited
 
 Vector = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -50,6 +51,8 @@ STRETCH, COARSE = 64, 0.03
 8 times that, and rounding."""
 SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
 """Values of a second parameter between which all others are mixed, by its kind."""
+PLACES = 24
+"""Places along a run that are tried: half a metre apart on a path of 12 m."""
 FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
@@ -234,7 +237,7 @@ class Bench:
             return
         problem = trials[0].probe.problem
         strengths = {t.probe.candidate.label: t.best.value for t in trials if t.best is not None}
-        for choices in zip(*(t.probe.choices for t in trials), strict=True):
+        for choices in zip(*(self._choices(t.probe) for t in trials), strict=True):
             changes = []
             try:
                 for second in SECONDS[trials[0].probe.mix]:
@@ -256,6 +259,15 @@ class Bench:
                 else:
                     t.best, t.value = found, self._wanted(found, strengths[label])
                     t.tried = t.tried[-1:]
+
+    def _choices(self, probe: Probe) -> list[dict[str, float]]:
+        """Values of its parameters to try, by name."""
+        choices = probe.choices
+        if probe.visits:
+            names, variables = zip(*probe.visits, strict=True)
+            points = visited(self.problem, self.theta, self.layout.runs, variables, PLACES)
+            choices += [dict(zip(names, point.tolist(), strict=True)) for point in points]
+        return choices
 
     def followed(self, begun: Sequence[Trials]) -> list[Signature]:
         """Signatures; those that promise something at the strength that the residual asks for."""

@@ -24,8 +24,8 @@ REDUCTION = Quantity(
     maximum=1.0,
     strength=True,
 )
-X_P = Quantity("x_p", "m", "world position of the centre", start=0.5)
-Y_P = Quantity("y_p", "m", "world position of the centre")
+X_P = Quantity("x_p", "m", "world position of the centre", start=0.5, visits="pose_x")
+Y_P = Quantity("y_p", "m", "world position of the centre", visits="pose_y")
 RADIUS = Quantity("radius", "m", "radius of the patch", start=0.3, minimum=1e-3)
 
 EFFECT = Effect(

@@ -102,6 +102,9 @@ def component_json(variant: Variant) -> bytes:
     tries = {v.name: v.quantity.tries for v in model.of_role("parameter") if v.quantity.tries}
     if tries:
         content["tries"] = tries
+    visits = {v.name: v.quantity.visits for v in model.of_role("parameter") if v.quantity.visits}
+    if visits:
+        content["visits"] = visits
     return (json.dumps(content, indent=2) + "\n").encode()
 
 

@@ -1,0 +1,56 @@
+"""Where a run comes by: values that a parameter like a place on the floor may have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.parts import Channel, Run
+from ..calibrate.problem import Problem
+from ..errors import UnknownNameError
+
+Vector = NDArray[np.float64]
+
+
+def visited(
+    problem: Problem, theta: Vector, runs: Sequence[Run], variables: Sequence[str], most: int
+) -> Vector:
+    """Points that the variables come by in a simulation, far from each other.
+
+    Each is the one farthest from those before it, so the first few already span the path.
+
+    Args:
+        problem: system.
+        theta: its parameters.
+        runs: to simulate.
+        variables: full names.
+        most: number of points.
+
+    Returns:
+        one row per point; none if the system lacks a variable.
+    """
+    system = problem.system()
+    try:
+        for name in variables:
+            system.variables(name)
+    except UnknownNameError:
+        return np.empty((0, len(variables)))
+    names = {run.name for run in runs}
+    silent = [
+        replace(run, data=np.zeros((run.times.size, len(variables))))
+        for run in problem.runs
+        if run.name in names
+    ]
+    channels = [Channel(name, "", 1.0, name) for name in variables]
+    spy = problem._with(runs=silent, channels=channels, relative=())
+    path = np.concatenate([spy.simulate(theta, run) for run in silent])
+    spy.close()
+    points = [path[0]]
+    away = np.linalg.norm(path - path[0], axis=1)
+    while len(points) < most and float(away.max()) > 0.0:
+        points.append(path[int(np.argmax(away))])
+        away = np.minimum(away, np.linalg.norm(path - points[-1], axis=1))
+    return np.array(points)
