@@ -35,12 +35,18 @@ DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 KNOWN = 0.25
 """A combination is identifiable if its standard deviation is below this fraction of the span."""
+WEAK = 1e-4
+"""Share of the best known direction's information up to which a direction is measured again."""
+LONG, SHORT = 0.1, 0.01
+"""Spans of the step with which that is done, and the least that the bounds must leave."""
 CORRECTIONS = 4
 """Steps at most with the Jacobian of a point that is close."""
 CALM = 0.8
 """Share of the information on a direction that runs without jumps give: then derivatives do."""
 RENEWALS = 5
 """Jacobians that a fit from close by takes at most."""
+PARTS = (1.0, 0.3, 0.1)
+"""Shares of a step that are tried."""
 SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
@@ -420,17 +426,18 @@ class _Fit:
         """Damped steps with one Jacobian; whether they came to where it promises no more."""
         damping = 1e-9
         for _ in range(limit):
-            for _ in range(SHORTER):
-                wanted = self.step(normal, damping)
-                away = (wanted - self.theta) / self.problem.scale
-                if 0.5 * float(normal.gradient @ away) < SETTLED:
-                    return True
-                if self.attempt(wanted):
-                    damping = max(damping * 0.1, 1e-12)
-                    break
-                damping = max(damping, 1e-7) * 30.0
-            else:
-                return False
+            whole = self.step(normal, damping)
+            if 0.5 * float(normal.gradient @ ((whole - self.theta) / self.problem.scale)) < SETTLED:
+                return True
+            # a limit or a threshold is passed: the direction is right, but not so far
+            if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
+                for _ in range(SHORTER):
+                    damping = max(damping, 1e-7) * 30.0
+                    if self.attempt(self.step(normal, damping)):
+                        break
+                else:
+                    return False
+            damping = max(damping * 0.1, 1e-12)
             normal.gradient = self.gradient()
         return False
 
@@ -497,7 +504,7 @@ def fit(
         return _estimate(run)
     if near:
         run.correct()
-        return _estimate(run)
+        return _estimate(run, confirm=True)
     if robust and _uneven(run):
         run = _Fit(problem, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
@@ -515,7 +522,7 @@ def fit(
         run.polish()
     elif not rough:
         run.normal(STEPS[-1], central=True)
-    return _estimate(run)
+    return _estimate(run, confirm=not rough)
 
 
 def _uneven(run: _Fit) -> bool:
@@ -530,13 +537,62 @@ def _calmest(run: _Fit) -> list[str]:
     return [name for _, name in sorted(worth)[: max((len(worth) + 1) // 2, 1)]]
 
 
-def _estimate(run: _Fit) -> Estimate:
+def _confirmed(run: _Fit, values: Vector, vectors: Vector) -> Vector:
+    """Information on the weak directions, from steps large enough to be seen if they change much.
+
+    Differences over small steps of a model with friction are rounded by the ticks at which it
+    sticks, and that looks like information on combinations that change nothing (all torques and
+    inertias by the same factor).
+
+    Args:
+        run: its residuals are those at theta.
+        values, vectors: of the normal matrix.
+
+    Returns:
+        one per direction; infinite where none was measured.
+    """
+    p = run.problem
+    common = np.array([not item.run for item in p.parameters])
+    found = np.full(values.size, np.inf)
+    base = run.residuals
+    for i in np.flatnonzero((values >= 1.0 / KNOWN**2) & (values < WEAK * values.max())):
+        direction = vectors[:, i]
+        if float(np.sum(direction[common] ** 2)) < 0.5:
+            continue
+        seen = []
+        for sign in (1.0, -1.0):
+            way = sign * direction * p.scale
+            with np.errstate(divide="ignore", invalid="ignore"):
+                room = np.where(way > 0, p.upper - run.theta, p.lower - run.theta) / way
+            length = min(LONG, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
+            if length < SHORT:
+                continue
+            try:
+                there = np.clip(run.theta + length * way, p.lower, p.upper)
+                moved = p.residuals(there, run.purpose)
+            except FmuCallError:
+                continue
+            pairs = zip(moved, base, strict=True)
+            square = sum(float(np.nansum((a - b) ** 2)) for (_, a), (_, b) in pairs)
+            drawn = sum(
+                (length * way[k] / item.prior) ** 2
+                for k, item in enumerate(p.parameters) if item.prior
+            )  # fmt: skip
+            seen.append((square + drawn) / length**2)
+        if seen:
+            found[i] = min(seen)
+    return found
+
+
+def _estimate(run: _Fit, *, confirm: bool = False) -> Estimate:
     problem = run.problem
     # the last Jacobian, whose point is less than the steps of its differences away
     normal = Normal(problem, run.theta, run.jacobian, run.residuals)
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
+    if confirm:
+        values = np.minimum(values, _confirmed(run, values, vectors))
     poor = values < 1.0 / KNOWN**2
     fitted = {name for name, _ in run.residuals}
     concerned = np.array([not p.run or p.run in fitted for p in problem.parameters])

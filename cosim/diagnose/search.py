@@ -114,8 +114,14 @@ def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate
 
 
 def more_general(first: Fitted, second: Fitted) -> bool:
-    """Whether a model has more parameters for what it adds at the same place."""
-    return first.effects[-1].place == second.effects[-1].place and first.free > second.free
+    """Whether a model has more parameters for what it adds at the same place.
+
+    Places where an effect does the same are one place.
+    """
+    item = second.signature
+    same = {label.partition(" at ")[2] for label in (item.same if item is not None else ())}
+    places = {second.effects[-1].place, *same}
+    return first.effects[-1].place in places and first.free > second.free
 
 
 @dataclass
@@ -349,7 +355,7 @@ class Search:
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
             self.evaluations += bench.evaluations
-        signatures = merge(signatures)
+        signatures = merge(sorted(signatures, key=lambda s: s.tuned))
         corrected = holm([s.score.p_value for s in signatures], len(signatures) + len(aside))
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         signatures.sort(key=lambda s: -s.score.gain)
@@ -426,19 +432,20 @@ class Search:
                 f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
             )
         current.fitted.sort(key=lambda f: -self.total(base, f))
-        best = [self.refined(base, f) for f in current.fitted[:REFINED]]
-        current.fitted = [*best, *current.fitted[REFINED:]]
-        current.fitted.sort(key=lambda f: -self.total(base, f))
-        for fitted in current.fitted:
-            if fitted.gate is not None and fitted.gate.passed and self.material(base, fitted):
-                current.winner = fitted
-                break
+        # quick fits are too far from their minima to be told apart
+        done: list[Fitted] = []
+        self.finish(base, current, [f for f in current.fitted if self.accepted(base, f)], done)
+        current.winner = self.chosen(base, current)
         if current.winner is not None:
-            current.winner = self.simplest(base, current.winner, current.fitted)
+            name = current.winner.effects[-1].effect
+            rest = [f for f in current.fitted if all(f is not d for d in done)]
+            rest = [f for f in rest if f.effects[-1].effect == name and self.accepted(base, f)]
+            if rest:  # the same elsewhere: thoroughly, too, before a place is named
+                self.finish(base, current, rest, done)
+                current.winner = self.chosen(base, current)
+        if current.winner is not None:
             if self.whole:
                 self.prepare(current.winner.problem)
-            place = current.fitted.index(current.winner)
-            current.winner = current.fitted[place] = self.sharpened(current.winner, base)
             current.rivals = [
                 f for f in current.fitted if f is not current.winner and f.gate is not None
                 and f.gate.passed and not self.apart(f, current.winner)
@@ -447,14 +454,32 @@ class Search:
         self.rounds.append(current)
         return current
 
+    def finish(
+        self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
+    ) -> None:
+        """Replace the first few quick fits by thorough ones; `done` gets these."""
+        better = {id(f): self.refined(base, self.sharpened(f, base)) for f in chosen[:REFINED]}
+        done += better.values()
+        current.fitted = [better.get(id(f), f) for f in current.fitted]
+        current.fitted.sort(key=lambda f: -self.total(base, f))
+
+    def chosen(self, base: Fitted, current: Round) -> Fitted | None:
+        """The best model of a round that unused runs want, None if there is none."""
+        best = next((f for f in current.fitted if self.accepted(base, f)), None)
+        return None if best is None else self.simplest(base, best, current.fitted)
+
+    def accepted(self, base: Fitted, fitted: Fitted) -> bool:
+        """Whether unused runs want it, and it is worth a cause."""
+        return fitted.gate is not None and fitted.gate.passed and self.material(base, fitted)
+
     def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
         """What explains the data as well as the best one, at the same place, by fewer parameters.
 
         A law with a parameter more often does better by a hair where the simpler one is true.
         """
         simpler = [
-            f for f in fitted if f.gate is not None and f.gate.passed and more_general(best, f)
-            and self.material(base, f) and not self.apart(f, best)
+            f for f in fitted
+            if self.accepted(base, f) and more_general(best, f) and not self.apart(f, best)
         ]  # fmt: skip
         return min(simpler, key=lambda f: f.free, default=best)
 
@@ -488,7 +513,7 @@ class Search:
         ):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
-        return result
+        return self.sharpened(result, base)
 
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""

@@ -91,6 +91,11 @@ class Signature:
         return self.probe.candidate
 
     @property
+    def tuned(self) -> int:
+        """How many of its parameters were chosen besides the strength."""
+        return len(self.fixed) + bool(self.probe.mix)
+
+    @property
     def strength(self) -> Parameter:
         """Its strength parameter."""
         return self.probe.strength
@@ -486,7 +491,11 @@ def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:
 
 
 def merge(signatures: list[Signature]) -> list[Signature]:
-    """Leave one of those whose signatures are the same up to a factor, the first one."""
+    """Leave one of those whose signatures are the same up to a factor, the first one.
+
+    Args:
+        signatures: simpler ones first, lest one turn of a ripple stand for an unbalance.
+    """
     kept: list[tuple[Signature, NDArray[np.float32], float]] = []
     for item in signatures:
         # sums over stretches are quick to compare, and differ where signatures do

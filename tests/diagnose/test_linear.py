@@ -84,13 +84,16 @@ def test_a_time_below_the_tick_of_the_rig_has_no_name(time: float, named: bool) 
 
 @pytest.mark.parametrize("told_apart", [False, True])
 def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
-    def law(free: int, place: str = "load.flange") -> Any:
-        gate = SimpleNamespace(passed=True)
-        return SimpleNamespace(free=free, effects=[SimpleNamespace(place=place)], gate=gate)
+    def law(free: int, place: str = "load.flange", same: tuple[str, ...] = ()) -> Any:
+        gate, item = SimpleNamespace(passed=True), SimpleNamespace(same=same)
+        effects = [SimpleNamespace(place=place)]
+        return SimpleNamespace(free=free, effects=effects, gate=gate, signature=item)
 
-    rig: Any = SimpleNamespace(material=lambda *_: True, apart=lambda *_: told_apart)
+    rig: Any = SimpleNamespace(accepted=lambda *_: True, apart=lambda *_: told_apart)
     best, simple, elsewhere = law(12), law(11), law(10, "gearbox.flange_a")
     chosen = Search.simplest(rig, law(10), best, [best, simple, elsewhere])
     assert chosen is (best if told_apart else simple)
     assert more_general(best, simple)
     assert not more_general(simple, best)
+    assert not more_general(best, elsewhere)
+    assert more_general(best, law(10, "gearbox.flange_a", ("coulomb at load.flange",)))
