@@ -441,19 +441,19 @@ class _Fit:
             normal.gradient = self.gradient()
         return False
 
-    def correct(self) -> None:
+    def correct(self) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far."""
         for _ in range(RENEWALS):
             before = self.cost
-            settled = self.settle(self.normal(STEPS[-1], central=True), CORRECTIONS)
-            if settled or before - self.cost < SETTLED:
-                return
+            normal = self.normal(STEPS[-1], central=True)
+            if self.settle(normal, CORRECTIONS) or before - self.cost < SETTLED:
+                break
+        return normal
 
     def polish(self) -> None:
         """Search along the main directions of the normal matrix, without derivatives."""
         p = self.problem
-        normal = self.normal(STEPS[-1], central=True)
-        self.attempt(self.step(normal, 1e-9))
+        normal = self.correct()
         if not normal.rough:
             return
         values, vectors = np.linalg.eigh(normal.matrix)
