@@ -34,7 +34,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
-from cosim.calibrate.fit import Estimate, fit
+from cosim.calibrate.estimate import Estimate
+from cosim.calibrate.fit import fit
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Run
 from cosim.calibrate.problem import Problem

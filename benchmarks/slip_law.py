@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.calibrate.fit import Estimate, fit
+from cosim.calibrate.estimate import Estimate
+from cosim.calibrate.fit import fit
 from cosim.calibrate.parts import Channel, Parameter, Run
 from cosim.calibrate.problem import Problem
 from cosim.cli import default_provider

@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from .calibrate.fit import Estimate, channel_rms, fit
+from .calibrate.estimate import Estimate, channel_rms
+from .calibrate.fit import fit
 from .calibrate.mapping import read_problem
 from .calibrate.nuisance import settled
 from .calibrate.sensitivity import Correlation, correlation_index, local, tornado

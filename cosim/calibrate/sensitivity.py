@@ -23,7 +23,7 @@ from scipy.stats import qmc
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
-from .fit import Estimate
+from .estimate import Estimate
 from .problem import Problem
 
 Vector = NDArray[np.float64]

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CosimError
-from .fit import Estimate, Normal
+from .estimate import Estimate
+from .normal import Normal
 from .parts import Run
 from .problem import Problem
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from ..calibrate.fit import BLOCK
+from ..calibrate.normal import BLOCK
 from ..calibrate.parts import Run, Sensitivity
 from ..calibrate.problem import Problem
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.fit import Estimate, Known, fit
+from ..calibrate.estimate import Estimate
+from ..calibrate.fit import Known, fit
 from ..calibrate.nuisance import settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem

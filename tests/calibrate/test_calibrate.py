@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cosim.calibrate.fit import channel_rms, fit
+from cosim.calibrate.estimate import channel_rms
+from cosim.calibrate.fit import fit
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
 from cosim.calibrate.validate import check_machines
 

@@ -1,0 +1,140 @@
+"""Normal equations of weighted residuals, and derivatives that are used again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .parts import Sensitivity
+from .problem import Problem
+
+Vector = NDArray[np.float64]
+BLOCK = 1.0
+"""Length of the blocks over which residuals may be correlated [s]."""
+DISTRUST = 4.0
+"""Multiple of the disagreement of both sides that is taken off the information of a run."""
+
+
+class Normal:
+    """Normal equations in scaled parameters, gathered run by run.
+
+    Where the model jumps (an integrator that stops a tick earlier), differences over a small step
+    are noise that looks like information. What the derivatives on both sides do not agree on is
+    taken off the run's matrix, and the run's gradient is reduced with it.
+
+    Attributes:
+        matrix, gradient: J^T J and J^T r, with priors.
+        scores: J^T r of each block (rows), for the sandwich.
+        rough: runs that jump.
+        calm: the matrix of the others.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        theta: Vector,
+        sensitivities: Iterable[Sensitivity],
+        residuals: Iterable[tuple[str, Vector]],
+        weight: Callable[[Vector], Vector] | None = None,
+        block: float = BLOCK,
+    ) -> None:
+        size, scale = theta.size, problem.scale
+        self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
+        self.rough: list[str] = []
+        calm = np.zeros((size, size))
+        scores = []
+        for item, (name, residual) in zip(sensitivities, residuals, strict=True):
+            run = problem.run(name)
+            columns = item.columns
+            derivative = item.values * scale[columns]
+            good = np.isfinite(residual) & np.isfinite(derivative).all(axis=2)
+            errors = np.where(good, residual, 0.0)
+            factor = np.where(good, 1.0 if weight is None else weight(errors), 0.0)
+            derivative = np.where(good[:, :, None], derivative, 0.0)
+            flat = derivative.reshape(-1, columns.size)
+            matrix = (flat * factor.reshape(-1, 1)).T @ flat
+            bend = np.where(good[:, :, None], item.roughness * scale[columns], 0.0)
+            bend = bend.reshape(-1, columns.size)
+            reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
+            if share is not None:
+                self.rough += [name] * bool(np.trace(reliable) < 0.99 * np.trace(matrix))
+            if name not in self.rough:
+                calm[np.ix_(columns, columns)] += matrix
+            self.matrix[np.ix_(columns, columns)] += reliable
+            per_sample = np.einsum("tcp,tc->tp", derivative, factor * errors)
+            index = ((run.times - run.times[0]) / block).astype(np.intp)
+            sums = np.zeros((int(index[-1]) + 1, size))
+            for place, column in enumerate(columns):
+                sums[:, column] = np.bincount(index, per_sample[:, place], sums.shape[0])
+            if share is not None:
+                sums[:, columns] = sums[:, columns] @ share.T
+            scores.append(sums)
+            self.gradient += sums.sum(axis=0)
+        self.calm = calm
+        self.scores = np.concatenate(scores) if scores else np.zeros((0, size))
+        for i, p in enumerate(problem.parameters):
+            if p.prior:
+                ratio = scale[i] / p.prior
+                self.matrix[i, i] += ratio**2
+                self.gradient[i] -= ratio * (theta[i] - p.nominal) / p.prior
+
+
+def _reliable(matrix: Vector, bend: Vector) -> tuple[Vector, Vector | None]:
+    """The part of J^T J that both sides agree on, and the factor on J^T r (None for all of it)."""
+    if not np.any(bend):
+        return matrix, None
+    values, vectors = np.linalg.eigh(matrix - DISTRUST * bend)
+    kept = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    whole, directions = np.linalg.eigh(matrix)
+    small = whole <= 1e-12 * max(whole[-1], 1e-300)
+    inverse = (directions / np.where(small, np.inf, whole)) @ directions.T
+    return kept, kept @ inverse
+
+
+def gradient(
+    problem: Problem,
+    theta: Vector,
+    sensitivities: Iterable[Sensitivity],
+    residuals: Iterable[tuple[str, Vector]],
+    weight: Callable[[Vector], Vector] | None = None,
+) -> Vector:
+    """J^T r in scaled parameters, with priors."""
+    result = np.zeros(theta.size)
+    scale = problem.scale
+    for item, (_, residual) in zip(sensitivities, residuals, strict=True):
+        good = np.isfinite(residual) & np.isfinite(item.values).all(axis=2)
+        errors = np.where(good, residual, 0.0)
+        if weight is not None:
+            errors = errors * weight(errors)
+        values = np.where(good[:, :, None], item.values, 0.0)
+        result[item.columns] += np.einsum("tcp,tc->p", values, errors) * scale[item.columns]
+    for i, p in enumerate(problem.parameters):
+        if p.prior:
+            result[i] -= scale[i] / p.prior * (theta[i] - p.nominal) / p.prior
+    return result
+
+
+def cost_of(
+    problem: Problem, theta: Vector, residuals: Iterable[tuple[str, Vector]], cap: float = math.inf
+) -> float:
+    """Half the sum of squares; residuals beyond `cap` sigma count linearly (Huber)."""
+    total = 0.0
+    for _, residual in residuals:
+        size = np.abs(residual[np.isfinite(residual)])
+        total += float(
+            np.sum(np.where(size <= cap, 0.5 * size**2, cap * size - 0.5 * cap**2))
+            if math.isfinite(cap)
+            else 0.5 * np.sum(size**2)
+        )
+    for value, p in zip(theta.tolist(), problem.parameters, strict=True):
+        if p.prior:
+            total += 0.5 * ((value - p.nominal) / p.prior) ** 2
+    return total
+
+
+def drawn(problem: Problem) -> NDArray[np.bool_]:
+    """Parameters that the sheet's bounds draw towards their nominal values."""
+    return np.array([p.role == "declared" and not p.prior for p in problem.parameters])
