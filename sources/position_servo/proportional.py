@@ -38,6 +38,7 @@ I = Quantity("i", "A", "winding current, positive drives forward")  # noqa: E741
 def equations(m: Model) -> None:
     """Collect the equations."""
     command, angle, speed = m.input(Q_REF), m.input(PHI), m.input(W)
+    m.input_rate(angle, speed)
     supply, enable = m.input(U_SUPPLY), m.input(ENABLE)
     command = command + m.balance("command", "signal", unit="rad", value=command).effort
     sensed = angle + m.balance("angle_sensor", "signal", unit="rad", value=angle).effort
@@ -79,4 +80,6 @@ def equations(m: Model) -> None:
     m.output(I, current)
     m.port(SHAFT, torque, speed)
     m.supply(on * held * current)
-    m.loss("winding", resistance * current**2)
+    # effects book their power at the current that flows without them; without an inductance there is
+    # no other before they act. What they change of it is the winding's.
+    m.loss("winding", resistance * current**2 - on * winding.effort * (current - plain))
