@@ -110,6 +110,7 @@ class Descent:
         self.theta = np.clip(theta, problem.lower, problem.upper)
         self.cap = math.inf
         self.iterations = 0
+        self.promised = math.inf
         self.begun = problem.evaluations if begun is None else begun
         self.drawn = drawn(problem)
         self.residuals = problem.residuals(self.theta, self.purpose)
@@ -162,25 +163,29 @@ class Descent:
         return True
 
     def step(self, normal: Normal, damping: float) -> Vector:
-        """Damped Gauss-Newton step inside the bounds."""
+        """Damped Gauss-Newton step inside the bounds; `promised` says what it should gain.
+
+        Parameters that would leave their bounds go there, and the others go where that leaves the
+        minimum: cutting them off would spoil the step along collinear ones.
+        """
         p = self.problem
         free = np.ones(self.theta.size, dtype=bool)
         change = np.zeros(self.theta.size)
         whole = normal.matrix + np.diag(BOUNDS * self.drawn)
         gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
-        for _ in range(self.theta.size):
+        while free.any():
             matrix = whole[np.ix_(free, free)]
             ridge = damping * np.trace(matrix) / self.theta.size + 1e-9
-            change[:] = 0.0
-            change[free] = np.linalg.solve(matrix + ridge * np.eye(matrix.shape[0]), gradient[free])
+            rest = gradient[free] - whole[np.ix_(free, ~free)] @ change[~free]
+            change[free] = np.linalg.solve(matrix + ridge * np.eye(matrix.shape[0]), rest)
             wanted = self.theta + change * p.scale
-            outside = free & (
-                ((self.theta <= p.lower) & (wanted < p.lower))
-                | ((self.theta >= p.upper) & (wanted > p.upper))
-            )
+            outside = free & ((wanted < p.lower) | (wanted > p.upper))
             if not outside.any():
                 break
+            limit = np.clip(wanted, p.lower, p.upper)
+            change[outside] = ((limit - self.theta) / p.scale)[outside]
             free &= ~outside
+        self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
         return np.clip(self.theta + change * p.scale, p.lower, p.upper)
 
     def descend(self, relative: float, limit: int, tolerance: float) -> None:
@@ -237,7 +242,7 @@ class Descent:
         damping = 1e-9
         for _ in range(limit):
             whole = self.step(normal, damping)
-            if 0.5 * float(normal.gradient @ ((whole - self.theta) / self.problem.scale)) < SETTLED:
+            if abs(self.promised) < SETTLED:
                 return True
             # a limit or a threshold is passed: the direction is right, but not so far
             if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
