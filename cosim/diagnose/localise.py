@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.parts import Channel, Parameter, Run
 from ..calibrate.problem import Problem
-from ..errors import CosimError
+from ..errors import CosimError, VariantError
 from .candidates import Candidate, Catalogue, balances, element_of
 from .linear import Absorber, Layout
 from .search import Fitted, Search
@@ -133,6 +133,8 @@ def localise(
         try:
             found += _Bench(search, base, runs, instance, port).places()
             probed += 1
+        except VariantError:
+            continue  # a mass centre or the direction of gravity: nothing can enter there
         except CosimError as error:
             say(f"{instance}.{port} could not be probed: {error}")
     found.sort(key=lambda p: -p.evidence)

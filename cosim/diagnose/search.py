@@ -40,7 +40,8 @@ REFITS = 6
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
-REFINED = 3
+REFINED, CLOSE = 3, 0.95
+"""So many quick fits are made thorough, if they gain this share of what the best one gains."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -459,7 +460,9 @@ class Search:
         self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
     ) -> None:
         """Replace the first few quick fits by thorough ones; `done` gets these."""
-        better = {id(f): self.refined(base, self.sharpened(f, base)) for f in chosen[:REFINED]}
+        least = CLOSE * max((self.total(base, f) for f in current.fitted), default=0.0)
+        near = [f for f in chosen if self.total(base, f) > least][:REFINED]
+        better = {id(f): self.refined(base, self.sharpened(f, base)) for f in near}
         done += better.values()
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))

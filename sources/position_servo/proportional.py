@@ -80,6 +80,6 @@ def equations(m: Model) -> None:
     m.output(I, current)
     m.port(SHAFT, torque, speed)
     m.supply(on * held * current)
-    # effects book their power at the current that flows without them; without an inductance there is
-    # no other before they act. What they change of it is the winding's.
+    # effects book their power at the current that flows without them: with no inductance there is
+    # no other before they act; what they change of it is the winding's
     m.loss("winding", resistance * current**2 - on * winding.effort * (current - plain))
