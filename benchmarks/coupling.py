@@ -11,7 +11,8 @@ of one core). The line with an arrow is the scenario's own algorithm and step.
 The reference is the monolithic solution: the variants' equations composed, outputs in the order of
 direct feedthrough, solved with SciPy's Radau at a relative tolerance of 1e-9. Runs of a scenario
 are long; there it is the system's own solution at 50 us, and the first line says how far that is
-from the monolithic one over the first two seconds.
+from the monolithic one over the first two seconds (over the whole run with --whole, which takes a
+minute for some runs and hours for others).
 """
 
 from __future__ import annotations
@@ -36,16 +37,13 @@ from cosim.session import Session
 from cosim.signals import Constant
 from cosim.system import System
 from cosim.system_file import read_system
+from cosim.units import conversion, parse
 from cosim.variants import apply
 from sources.variant import build_model
 
 ROOT = Path(__file__).resolve().parents[1]
-RASTER = 2e-3
-"""Instants at which errors are taken [s]."""
 FINE = 5e-5
 """Step of the system's own reference [s]."""
-CHECKED = 2.0
-"""Time over which that is compared with the monolithic solution [s]."""
 Vector = NDArray[np.float64]
 
 
@@ -78,6 +76,9 @@ class Case:
         usual: algorithm, options and step of the scenario.
         steps: communication steps [s].
         long: the reference is the system's own solution.
+        checked: time over which that is compared with the monolithic one [s].
+
+    Errors are taken at the communication points of the longest step.
     """
 
     system: System
@@ -87,6 +88,12 @@ class Case:
     usual: tuple[str, Mapping[str, Any], float] | None = None
     steps: tuple[float, ...] = (2e-3, 1e-3, 5e-4, 2.5e-4)
     long: bool = False
+    checked: float = 2.0
+
+    @property
+    def raster(self) -> float:
+        """Instants at which errors are taken [s]."""
+        return max(self.steps)
 
 
 ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -101,6 +108,8 @@ RUNS = tuple(
     ["ur5_bench/UR5e"]
     + [f"mir250/{run}" for run in ("IN1", "IN2", "CN1", "CN2")]
     + [f"mobile_manipulator/{run}" for run in ("IN1", "IN2", "CN1", "CN2", "IY", "CY")]
+    + [f"omni_base/{run}" for run in ("open", "closed", "closed_scrub", "eight")]
+    + [f"crawler/SET{n}_1" for n in range(1, 6)]
 )
 
 
@@ -127,20 +136,40 @@ def of_scenario(name: str) -> Case:
     for key, value in {**item.system.parameters, **item.parameters}.items():
         system.set(key, value)
     system = unsampled(system)
-    columns = []
-    if "base" in system.members:
+    usual = (item.algorithm, item.options, item.step)
+    case = Case(system, item.duration, columns_of(system), item.inputs, usual)
+    if "drive" in system.members or "wheels" in system.members:
+        return replace(case, long="omni" not in name)
+    return replace(case, steps=tuple(item.step * factor for factor in (2.0, 1.0, 0.5, 0.25)))
+
+
+def columns_of(system: System) -> tuple[Column, ...]:
+    """What is compared, by the components that the system has."""
+    columns: list[Column] = []
+    names = ("base", "constant", "law", "skid", "contact")  # the last four are crawlers
+    poses = [pose(system, name) for name in names if name in system.members]
+    if poses:
+        positions = tuple(signal for x, y, _ in poses for signal in (x, y))
         columns = [
-            Column("x, y [mm]", ("base.x", "base.y"), 1e3, 0.03),
-            Column("heading [mrad]", ("base.phi",), 1e3, 0.05),
-            Column("motors [mA]", ("motor_left.i", "motor_right.i"), 1e3, 6.0),
+            Column("x, y [mm]", positions, 1e3, 0.03),
+            Column("heading [mrad]", tuple(angle for _, _, angle in poses), 1e3, 0.05),
         ]
-    if "drive" in system.members:
+    if "motor_left" in system.members:
+        columns.append(Column("motors [mA]", ("motor_left.i", "motor_right.i"), 1e3, 6.0))
+    if "arm" in system.members:
         tool = tuple(f"arm.tool_position[{i}]" for i in range(1, 4))
         columns.append(Column("tool [mm]", tool, 1e3, 0.03))
         arm = tuple(f"drive.i[{i}]" for i in range(1, 7))
         columns.append(Column("arm [mA]", arm, 1e3, 6.0))
-    usual = (item.algorithm, item.options, item.step)
-    return Case(system, item.duration, tuple(columns), item.inputs, usual, long=True)
+    return tuple(columns)
+
+
+def pose(system: System, name: str) -> tuple[str, str, str]:
+    """Names of the outputs that are a base's position and heading."""
+    have = system.members[name].description.variables
+    names = (("x", "x_S"), ("y", "y_S"), ("phi", "theta", "beta"))
+    x, y, angle = (next(f"{name}.{n}" for n in choice if n in have) for choice in names)
+    return x, y, angle
 
 
 def unsampled(system: System) -> System:
@@ -163,34 +192,40 @@ def unsampled(system: System) -> System:
     return found
 
 
-def constants(inputs: Mapping[str, Driver]) -> dict[str, float]:
-    """Inputs as numbers, for the monolithic solution."""
+def constants(system: System, inputs: Mapping[str, Driver]) -> dict[str, float]:
+    """Inputs as numbers in the units of the FMUs, for the monolithic solution."""
     found = {}
     for name, driver in inputs.items():
-        value = driver.value if isinstance(driver, Constant) else driver
-        if not isinstance(value, int | float):
+        signal = Constant(float(driver)) if isinstance(driver, int | float) else driver
+        if not isinstance(signal, Constant):
             raise ValueError(f"{name} is not constant")
-        found[name] = float(value)
+        gain, offset = 1.0, 0.0
+        if signal.unit:
+            gain, offset = conversion(parse(signal.unit), parse(system.unit(name)))
+        found[name] = signal.value * gain + offset
     return found
 
 
 def reference(case: Case, signals: list[str]) -> tuple[Vector, str]:
     """Signals on the raster, and how they were found."""
     begin = time.process_time()
-    times = RASTER * np.arange(round(case.duration / RASTER) + 1, dtype=np.float64)
+    raster = case.raster
+    times = raster * np.arange(round(case.duration / raster) + 1, dtype=np.float64)
     if not case.long:
-        exact = Monolith(case.system, constants(case.inputs)).solve(times, signals)
+        exact = Monolith(case.system, constants(case.system, case.inputs)).solve(times, signals)
         return exact, f"the monolithic solution ({time.process_time() - begin:.0f} s)"
     fine = run(case, "gauss_seidel", {"extrapolation": 2}, FINE, signals)[0].values
-    count = round(CHECKED / RASTER) + 1
+    checked = min(case.checked, case.duration)
+    count = round(checked / raster) + 1
     text = "its own solution at 50 us"
     try:
-        exact = Monolith(case.system, constants(case.inputs)).solve(times[:count], signals)
+        monolith = Monolith(case.system, constants(case.system, case.inputs))
+        exact = monolith.solve(times[:count], signals)
     except ValueError as error:
         return fine, f"{text}; no monolithic one: {error}"
     apart = errors(case, signals, fine[:count], exact)
     told = ", ".join(f"{e:.1e} {c.title}" for e, c in zip(apart, case.columns, strict=True))
-    return fine, f"{text}, which is {told} from the monolithic one over {CHECKED:g} s"
+    return fine, f"{text}, which is {told} from the monolithic one over {checked:g} s"
 
 
 def errors(case: Case, signals: list[str], values: Vector, exact: Vector) -> Vector:
@@ -206,7 +241,7 @@ def run(
 ) -> tuple[Recording, float]:
     """Recording on the raster, and processor time without set-up [s]."""
     master = Master(case.system, algorithm, step, options=options)
-    every = round(RASTER / step)
+    every = round(case.raster / step)
     recording = master.run(case.duration, inputs=case.inputs, record=signals, every=every)
     with Session(master, case.duration, inputs=case.inputs, record=signals, every=every) as session:
         session.run()
@@ -260,12 +295,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cases", nargs="*", help=f"of motor_bench, {', '.join(RUNS)}")
     parser.add_argument("--quick", action="store_true", help="without iterated coupling")
+    parser.add_argument("--whole", action="store_true", help="check references to their ends")
     parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
     arguments = parser.parse_args()
     for name in arguments.cases or ("motor_bench", *RUNS):
         case = motor_bench() if name == "motor_bench" else of_scenario(name)
         if arguments.steps:
             case = replace(case, steps=tuple(arguments.steps))
+        if arguments.whole:
+            case = replace(case, checked=case.duration)
         table(name, case, arguments.quick)
 
 
