@@ -30,6 +30,9 @@ from .start import find_past
 Vector = NDArray[np.float64]
 LOOK = 100
 """Communication steps after which a limited run looks at the clock."""
+RUNAWAY = 1e30
+"""Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
+and solvers crawl long before squares overflow."""
 
 
 class Session:
@@ -129,6 +132,12 @@ class Session:
                 raise FmuCallError(
                     f"it took more than {limit:.3g} s of processor time: with these values a "
                     "solver takes very small steps"
+                )
+            newest = np.abs(self._run.rows[max(self._run.row - 1, 0)])
+            if np.max(newest, initial=0.0) > RUNAWAY:
+                raise FmuCallError(
+                    f"{self.names[int(np.argmax(newest))]} passed {RUNAWAY:g}: with these values "
+                    "the system is unstable"
                 )
 
     def record(self, progress: Callable[[float], None] | None = None) -> Recording:

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
 from .estimate import BOUNDS, KNOWN, Estimate, estimated
@@ -165,28 +166,25 @@ class Descent:
     def step(self, normal: Normal, damping: float) -> Vector:
         """Damped Gauss-Newton step inside the bounds; `promised` says what it should gain.
 
-        Parameters that would leave their bounds go there, and the others go where that leaves the
-        minimum: cutting them off would spoil the step along collinear ones.
+        It goes to the minimum of the quadratic within the bounds: cutting off parameters that would
+        leave them spoils the step along collinear ones.
         """
         p = self.problem
-        free = np.ones(self.theta.size, dtype=bool)
-        change = np.zeros(self.theta.size)
+        size = self.theta.size
         whole = normal.matrix + np.diag(BOUNDS * self.drawn)
         gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
-        while free.any():
-            matrix = whole[np.ix_(free, free)]
-            ridge = damping * np.trace(matrix) / self.theta.size + 1e-9
-            rest = gradient[free] - whole[np.ix_(free, ~free)] @ change[~free]
-            change[free] = np.linalg.solve(matrix + ridge * np.eye(matrix.shape[0]), rest)
-            wanted = self.theta + change * p.scale
-            outside = free & ((wanted < p.lower) | (wanted > p.upper))
-            if not outside.any():
-                break
-            limit = np.clip(wanted, p.lower, p.upper)
-            change[outside] = ((limit - self.theta) / p.scale)[outside]
-            free &= ~outside
+        ridge = damping * np.trace(whole) / size + 1e-9
+        values, vectors = np.linalg.eigh(whole)
+        # information taken off for jumps may leave a direction with none at all
+        root = np.sqrt(np.maximum(values, 0.0) + ridge)
+        along = (vectors.T @ gradient) / root
+        change = vectors @ (along / root)
+        low, high = (p.lower - self.theta) / p.scale, (p.upper - self.theta) / p.scale
+        if np.any(change < low) or np.any(change > high):
+            matrix = root[:, None] * vectors.T
+            change = lsq_linear(matrix, along, (low, high), method="bvls").x
         self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
-        return np.clip(self.theta + change * p.scale, p.lower, p.upper)
+        return np.asarray(np.clip(self.theta + change * p.scale, p.lower, p.upper))
 
     def descend(self, relative: float, limit: int, tolerance: float) -> None:
         """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
@@ -307,7 +305,7 @@ def fit(
         limit: iterations at each size of difference steps.
         polish: end with a search without derivatives.
         robust: begin with large residuals counted linearly; off when `theta` is close.
-        rough: end without derivatives at the solution; only the values count.
+        rough: end near the solution and without derivatives there: another fit goes on.
         near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
@@ -332,7 +330,7 @@ def fit(
         run.set_cap(3.0)
         run.descend(STEPS[1], 4, 0.01)
         run.set_cap(math.inf)
-    run.descend(STEPS[1], limit, 1e-4)
+    run.descend(STEPS[1], limit, 5e-3 if rough else 1e-4)
     if polish and not rough:
         run.polish()
     elif not rough:

@@ -254,10 +254,12 @@ class Search:
         if exact:
             return self.judged(first)
         near = corrected(raw, first.theta, raw)
-        second = fit(near, first.theta, limit=6, robust=False, polish=False, rough=True)
+        second = fit(near, first.theta, known=Known(first))
+        near.close()
         self.evaluations += second.evaluations
+        self.say("errors of the exchange removed")
         self.declared = corrected(raw, second.theta, raw)
-        return self.fitted(self.declared, second.theta)
+        return self.judged(fit(self.declared, second.theta, limit=0, robust=False))
 
     def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""

@@ -1,0 +1,40 @@
+"""Places that a run comes by."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.calibrate import Problem, read_problem
+from cosim.diagnose.visits import visited
+
+DATA = Path(__file__).resolve().parents[2] / "scenarios" / "motor_bench" / "data" / "MB-12"
+
+
+@pytest.fixture(scope="module")
+def bench() -> Problem:
+    """The committed data set."""
+    problem = read_problem(DATA, workers=1)
+    return problem._with(step=problem.search_step)
+
+
+def test_the_first_points_span_the_path(bench: Problem) -> None:
+    run = bench.runs[0]
+    names = ("load.angle", "load.w")
+    points = visited(bench, bench.nominal, [run], names, 6)
+    many = visited(bench, bench.nominal, [run], names, 200)
+    assert points.shape == (6, 2)
+    assert np.array_equal(many[:6], points)
+    # each one is farther from those before it than any later one is from all of them
+    gaps = [
+        float(np.min(np.linalg.norm(many[:k] - many[k], axis=1))) for k in range(1, many.shape[0])
+    ]
+    assert all(a >= b for a, b in pairwise(gaps))
+
+
+def test_a_system_without_the_variable_has_no_such_places(bench: Problem) -> None:
+    found = visited(bench, bench.nominal, [bench.runs[0]], ("load.angle", "load.nowhere"), 6)
+    assert found.shape == (0, 2)
