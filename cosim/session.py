@@ -28,8 +28,8 @@ from .recording import Recording
 from .start import find_past
 
 Vector = NDArray[np.float64]
-LOOK = 100
-"""Communication steps after which a limited run looks at the clock."""
+LOOK, CHECK = 10, 100
+"""Communication steps after which a limited run looks at the clock, and at what it has recorded."""
 RUNAWAY = 1e30
 """Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
 and solvers crawl long before squares overflow."""
@@ -133,6 +133,8 @@ class Session:
                     f"it took more than {limit:.3g} s of processor time: with these values a "
                     "solver takes very small steps"
                 )
+            if last % CHECK:
+                continue
             newest = np.abs(self._run.rows[max(self._run.row - 1, 0)])
             if np.max(newest, initial=0.0) > RUNAWAY:
                 raise FmuCallError(

@@ -43,7 +43,7 @@ FLOOR = 1e-3
 only cost time."""
 RUNAWAY = 1e15
 """Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
-PATIENCE = 20.0
+PATIENCE = 10.0
 """Times as long as without the effect: a fidelity with more states takes a few times as long, and
 what takes longer is an instability that a solver tries to resolve."""
 STRETCH, COARSE = 64, 0.03

@@ -1,10 +1,10 @@
 """Viscous friction that differs between the two directions.
 
-    f = b_d |v|,   P_loss = -b_d v |v|
+    f = b_d |v| - |b_d| v,   P_loss = |b_d| v^2 - b_d v |v|
 
-It adds b_d to the viscous friction of backward motion and takes it off that of forward motion: with
-a component's b the coefficients are b - b_d forward and b + b_d backward. Alone it would give power
-in one direction; it is passive as long as |b_d| is below the viscous friction of the shaft.
+It adds 2 |b_d| to the viscous friction of one direction: of backward motion if b_d is positive, of
+forward motion if it is negative. With a component's b the coefficients are b and b + 2 |b_d|; it never
+drives, whatever b is.
 
 Not modelled: the asymmetry of dry friction (`asymmetric_coulomb`).
 
@@ -40,6 +40,7 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
     velocity = e.signal("velocity")
-    torque = e.parameter(DIFFERENCE) * ca.fabs(velocity)
+    difference = e.parameter(DIFFERENCE)
+    torque = difference * ca.fabs(velocity) - ca.fabs(difference) * velocity
     e.add(torque)
     e.loss(-torque * velocity)

@@ -43,7 +43,7 @@ SHAFT_LAWS: dict[str, tuple[Point, Callable[[float, float, float], float]]] = {
         {"tau_c": 0.5, "a": 0.6, "w_0": 1e-3},
         lambda w, phi, tau: -0.8 if w > 0 else 0.2,
     ),
-    "asymmetric_viscous": ({"b_d": 0.03}, lambda w, phi, tau: 0.03 * abs(w)),
+    "asymmetric_viscous": ({"b_d": 0.03}, lambda w, phi, tau: 0.03 * (abs(w) - w)),
     "cogging": (
         {"tau_c": 0.1, "n": 7.0, "psi": 0.3},
         lambda w, phi, tau: -0.1 * math.sin(7 * phi + 0.3),
