@@ -106,4 +106,10 @@ def misfit(effect: Effect, balance: Balance) -> str:
             f"effect {effect.name!r} needs {', '.join(lacking)}, which balance "
             f"{balance.name!r} does not offer"
         )
+    odd = [signal for signal in effect.unless if signal in balance.signals]
+    if odd:
+        return (
+            f"effect {effect.name!r} has no place at balance {balance.name!r}, "
+            f"which has {', '.join(odd)}"
+        )
     return ""

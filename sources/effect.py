@@ -140,6 +140,7 @@ class Effect:
         kinds: kinds of balances that it can be attached to, in order of preference.
         strength: the quantity whose value 0 is the effect's exact absence.
         needs: signals beyond the obligatory ones of the kind that the law reads.
+        unless: signals of balances at which it has no place (wheels that roll have no magnets).
         source: book or paper.
         unit: unit of what it adds, where the kind leaves it open: the effect fits only balances
             with this unit ("" fits any).
@@ -152,6 +153,7 @@ class Effect:
     kinds: tuple[str, ...]
     strength: Quantity
     needs: tuple[str, ...] = ()
+    unless: tuple[str, ...] = ()
     source: str = ""
     unit: str = ""
     general: str = ""

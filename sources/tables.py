@@ -296,6 +296,7 @@ def effects_page() -> str:
             _docstring(module),
             f"Kinds: {', '.join(effect.kinds)}."
             + (f" Needs: {', '.join(effect.needs)}." if effect.needs else "")
+            + (f" Not where there is: {', '.join(effect.unless)}." if effect.unless else "")
             + f" Strength: `{effect.strength.name}`.\n",
             _table(_SYMBOL_HEAD, _effect_symbols(name, places[name])),
             f"Fits: {fits or 'no balance yet'}.\n",

@@ -3,7 +3,8 @@
     f = -f_c sin(n theta + psi),   E = f_c (1 - cos(n theta + psi)) / n
 
 Conservative; n counts cycles per revolution of the shaft it is attached to, so it need not be
-an integer when that is the slow side of a gearbox.
+an integer when that is the slow side of a gearbox. Axles and swivels of wheels have no magnets:
+it acts on the shafts of what drives them.
 
 Not modelled: harmonics of the ripple.
 
@@ -33,6 +34,7 @@ EFFECT = Effect(
     "Torque of a shaft that repeats with its angle.",
     ("rotation",),
     AMPLITUDE,
+    unless=("normal", "radius"),
     source="Hanselman 2006",
 )
 

@@ -268,3 +268,9 @@ def test_unbalance_wherever_it_sits_is_the_same() -> None:
         )
         results.append(run.y[drive.states.index("load.speed"), -1])
     assert results[0] == pytest.approx(results[1], rel=1e-6)  # a hundred times the solver's
+
+
+def test_wheels_that_roll_have_no_magnets() -> None:
+    with pytest.raises(ModelError, match=r"'cogging' has no place at balance 'axle', .* normal"):
+        build_model("caster/swivel+cogging@axle")
+    build_model("inertia/disc+cogging@flange")  # a rotor's may have
