@@ -3,8 +3,8 @@
     f = b_d |v| - |b_d| v,   P_loss = |b_d| v^2 - b_d v |v|
 
 It adds 2 |b_d| to the viscous friction of one direction: of backward motion if b_d is positive, of
-forward motion if it is negative. With a component's b the coefficients are b and b + 2 |b_d|; it never
-drives, whatever b is.
+forward motion if it is negative. With a component's b the coefficients are b and b + 2 |b_d|; it
+never drives, whatever b is.
 
 Not modelled: the asymmetry of dry friction (`asymmetric_coulomb`).
 
