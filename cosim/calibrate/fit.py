@@ -40,6 +40,8 @@ SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
+EVEN = 2e-5
+"""Share of the cost below which a fall is none: the model is that far from the data."""
 PURPOSE = "identification"
 
 
@@ -150,7 +152,8 @@ class Descent:
         return Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
     def attempt(self, theta: Vector) -> bool:
-        """Go there if it is better."""
+        """Go there, inside the bounds, if it is better."""
+        theta = np.clip(theta, self.problem.lower, self.problem.upper)  # sums round past them
         if np.array_equal(theta, self.theta):
             return False
         try:
@@ -254,12 +257,13 @@ class Descent:
             normal.gradient = self.gradient()
         return False
 
-    def correct(self) -> Normal:
+    def correct(self, *, central: bool = True) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far."""
         for _ in range(RENEWALS):
             before = self.cost
-            normal = self.normal(STEPS[-1], central=True)
-            if self.settle(normal, CORRECTIONS) or before - self.cost < SETTLED:
+            normal = self.normal(STEPS[-1], central=central)
+            enough = max(SETTLED, EVEN * self.cost)
+            if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
                 break
         return normal
 
@@ -294,6 +298,7 @@ def fit(
     robust: bool = True,
     rough: bool = False,
     near: bool = False,
+    draft: bool = False,
     known: Known | None = None,
 ) -> Estimate:
     """Estimate the parameters of a problem.
@@ -309,11 +314,15 @@ def fit(
         near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
+        draft: as `near`, but the Jacobian is one-sided: the minimum counts and not its intervals.
     """
     begun = problem.evaluations
     run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
     if known is not None:
         run.follow(known, limit)
+        return estimated(run)
+    if draft:
+        run.correct(central=False)
         return estimated(run)
     if near:
         run.correct()

@@ -319,8 +319,8 @@ class Problem:
         def simulate(task: tuple[Run, int, float]) -> Vector:
             run, index, change = task
             moved = theta.copy()
-            if index >= 0:
-                moved[index] += change
+            if index >= 0:  # sums round past bounds
+                moved[index] = np.clip(moved[index] + change, self.lower[index], self.upper[index])
             return self.simulate(moved, run)
 
         results = self._map(simulate, tasks)

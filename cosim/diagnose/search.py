@@ -268,10 +268,17 @@ class Search:
             fit(problem, theta, limit=6, robust=False, polish=known is None, known=known)
         )
 
-    def sharpened(self, quick: Fitted, base: Fitted) -> Fitted:
-        """A quickly fitted model fitted again with derivatives of its own."""
+    def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
+        """A quickly fitted model fitted again with derivatives of its own.
+
+        Args:
+            quick: what to fit.
+            base: what its gain counts from.
+            draft: only to be compared; its intervals are not needed.
+        """
         theta = quick.estimate.theta
-        result = self.judged(fit(corrected(quick.problem, theta, self.raw), theta, near=True))
+        problem = corrected(quick.problem, theta, self.raw)
+        result = self.judged(fit(problem, theta, near=not draft, draft=draft))
         result.effects, result.signature = quick.effects, quick.signature
         result.p_value = quick.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)
@@ -448,6 +455,9 @@ class Search:
                 self.finish(base, current, rest, done)
                 current.winner = self.chosen(base, current)
         if current.winner is not None:
+            drafted = current.winner
+            current.winner = self.sharpened(drafted, base)
+            current.fitted = [current.winner if f is drafted else f for f in current.fitted]
             if self.whole:
                 self.prepare(current.winner.problem)
             current.rivals = [
@@ -464,7 +474,7 @@ class Search:
         """Replace the first few quick fits by thorough ones; `done` gets these."""
         least = CLOSE * max((self.total(base, f) for f in current.fitted), default=0.0)
         near = [f for f in chosen if self.total(base, f) > least][:REFINED]
-        better = {id(f): self.refined(base, self.sharpened(f, base)) for f in near}
+        better = {id(f): self.refined(base, self.sharpened(f, base, draft=True)) for f in near}
         done += better.values()
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
@@ -519,7 +529,7 @@ class Search:
         ):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
-        return self.sharpened(result, base)
+        return self.sharpened(result, base, draft=True)
 
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""

@@ -77,3 +77,14 @@ def test_what_a_long_step_shows_stays() -> None:
     found = _confirmed(run, np.array([100.0, 4e8]), np.eye(2))
     # exact in a linear model, but for rounding
     assert found[0] == pytest.approx(100.0, rel=1e-9)
+
+
+def test_a_point_that_rounds_past_a_bound_is_tried_at_the_bound() -> None:
+    run = Descent.__new__(Descent)
+    run.problem = SimpleNamespace(  # type: ignore[assignment]
+        lower=np.zeros(1), upper=np.array([0.3]), residuals=lambda theta, purpose: [theta]
+    )
+    run.purpose, run.theta, run.cost = "identification", np.array([0.1]), 1.0
+    run.total = lambda theta, residuals: 0.0  # type: ignore[method-assign]
+    assert run.attempt(np.nextafter(run.problem.upper, 1.0))
+    assert run.theta[0] == 0.3
