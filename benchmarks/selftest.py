@@ -59,16 +59,18 @@ def judged(
     named = [e["effect"] for e in table["effects"]]
     same = {label.partition(" at ")[0] for e in table["effects"][:1] for label in e["other_places"]}
     rivals = [e.partition(" at ")[0] for a in table["alternatives"] for e in a["effects"][-1:]]
-    covered = {}
+    covered, away = {}, {}
     for name, entry in table["parameters"].items():
         last = entry.get("after") or entry["before"]
         if name in truth and last["identifiable"]:
             low, high = last["ci95"]
             covered[name] = bool(low <= truth[name] <= high)
+            away[name] = round((last["value"] - truth[name]) / max(0.5 * (high - low), 1e-300), 3)
     return {
         "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
         "right": bool(named) and bool(set(names) & {named[0], *same}),
         "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
+        "half_intervals_off": away,
         "wall_s": table["wall_s"],
     }  # fmt: skip
 

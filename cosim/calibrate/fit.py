@@ -40,8 +40,8 @@ SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
-EVEN = 2e-5
-"""Share of the cost below which a fall is none: the model is that far from the data."""
+EVEN = 1e-3
+"""Share of the cost beyond the noise's below which a fall is none: the model is that far off."""
 PURPOSE = "identification"
 
 
@@ -259,10 +259,11 @@ class Descent:
 
     def correct(self, *, central: bool = True) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far."""
+        noise = 0.5 * sum(np.isfinite(r).sum() for _, r in self.residuals)
         for _ in range(RENEWALS):
             before = self.cost
             normal = self.normal(STEPS[-1], central=central)
-            enough = max(SETTLED, EVEN * self.cost)
+            enough = max(SETTLED, EVEN * (self.cost - noise))
             if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
                 break
         return normal
