@@ -20,7 +20,12 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 MU = Quantity(
-    "mu", "1", "friction torque per transmitted torque, 0 = absent", start=0.05, strength=True
+    "mu",
+    "1",
+    "friction torque per transmitted torque, 0 = absent",
+    start=0.05,
+    minimum=0.0,
+    strength=True,
 )
 W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 

@@ -16,7 +16,12 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 DRAG = Quantity(
-    "c", "N.m.s2/rad2", "drag torque per speed squared, 0 = absent", start=0.005, strength=True
+    "c",
+    "N.m.s2/rad2",
+    "drag torque per speed squared, 0 = absent",
+    start=0.005,
+    minimum=0.0,
+    strength=True,
 )
 
 EFFECT = Effect(

@@ -16,7 +16,12 @@ from ..laws.contact import rolling_resistance
 from ..quantity import Quantity
 
 COEFFICIENT = Quantity(
-    "c", "1", "additional rolling resistance coefficient, 0 = absent", start=0.01, strength=True
+    "c",
+    "1",
+    "additional rolling resistance coefficient, 0 = absent",
+    start=0.01,
+    minimum=0.0,
+    strength=True,
 )
 W_0 = Quantity("w_0", "rad/s", "wheel speed over which it changes sign", start=0.1, minimum=1e-6)
 

@@ -3,7 +3,7 @@
     f = -b (1 - h) v,   t_w h' = v^2 / (v^2 + v_n^2) - h,   P_loss = b (1 - h) v^2
 
 h is 0 cold and 1 warm. It rises with the time constant t_w at speeds above v_n and falls again at
-rest. A negative b is friction that rises.
+rest. A negative b is friction that rises, f = -|b| h v; neither ever drives.
 
 Not modelled: heat balance, ambient temperature.
 
@@ -12,6 +12,8 @@ load and temperature effects in robot joints, IROS 2010, reduced to one state.
 """
 
 from __future__ import annotations
+
+import casadi as ca
 
 from ..effect import Effect
 from ..effect_model import EffectModel
@@ -43,6 +45,7 @@ def law(e: EffectModel) -> None:
     velocity, warmth = e.signal("velocity"), e.state(sized(e, WARMTH))
     target = velocity**2 / (velocity**2 + e.parameter(W_N) ** 2)
     e.derivative(warmth, (target - warmth) / e.parameter(WARM_UP))
-    torque = -e.parameter(COLD) * (1 - warmth) * velocity
+    cold = e.parameter(COLD)
+    torque = -(ca.fmax(cold, 0) * (1 - warmth) + ca.fmax(-cold, 0) * warmth) * velocity
     e.add(torque)
     e.loss(-torque * velocity)

@@ -14,7 +14,12 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 DAMPING = Quantity(
-    "b", "N.m.s/rad", "additional viscous friction, 0 = absent", start=0.05, strength=True
+    "b",
+    "N.m.s/rad",
+    "additional viscous friction, 0 = absent",
+    start=0.05,
+    minimum=0.0,
+    strength=True,
 )
 
 EFFECT = Effect(
