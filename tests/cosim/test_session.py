@@ -21,7 +21,7 @@ DURATION = 0.3
 def parts():
     scenario = find("motor_bench")[0].scenario("ST1")
     system = scenario.system.build(default_provider())
-    return Master(system, "gauss_seidel", 1e-4), scenario.inputs
+    return Master(system, "gauss_seidel", 1e-4), {"motor.w_ref": 20.0}
 
 
 @pytest.mark.parametrize("executor", ["c", "python"])
