@@ -18,7 +18,7 @@ from ..calibrate.problem import Problem
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
-from .candidates import Candidate, candidates, new_parameters
+from .candidates import Candidate, balances, candidates, new_parameters
 from .linear import MATERIAL, Absorber, Layout, Score, holm, score
 from .probes import batches
 from .secant import FLOOR, Bench, Signature, merge, model_values, patience, worthy
@@ -40,6 +40,9 @@ REFITS = 6
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
+SHARED, WHOLES = 0.5, 3
+"""What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
+this share of what the best one gains, and at most so many: members must not crowd it out."""
 REFINED, CLOSE = 3, 0.95
 """So many quick fits are made thorough, if they gain this share of what the best one gains."""
 ROUNDS = 4
@@ -383,7 +386,16 @@ class Search:
             and self.fitting.largest(s.asked) > NEARLY * MATERIAL
         ]
         best = max((s.score.gain for s in good), default=0.0)
-        return [s for s in good if s.score.gain > PART * best][:REFITS]
+        good = [s for s in good if s.score.gain > PART * best]
+        single = balances(current.base.problem)
+        shared = [
+            s
+            for s in good[REFITS:]
+            if s.score.gain > SHARED * best
+            and s.candidate.port
+            and (s.candidate.instance, s.candidate.port) not in single
+        ]
+        return good[:REFITS] + shared[:WHOLES]
 
     def refit(self, base: Fitted, item: Signature, *, secondary: bool = False) -> Fitted | None:
         """Fit declared parameters and the effect's strength (or all its parameters) together."""

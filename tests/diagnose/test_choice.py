@@ -1,0 +1,51 @@
+"""Which scored candidates are refitted."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from cosim.diagnose.search import REFITS, Search
+
+MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
+
+
+def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Labels that are refitted, of `effect at instance.port` -> gain, all of them significant."""
+    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: MEMBERS)
+    signatures = []
+    for label, gain in sorted(gains.items(), key=lambda item: -item[1]):
+        instance, port = label.partition(" at ")[2].split(".", 1)
+        candidate = SimpleNamespace(label=label, instance=instance, port=port)
+        score = SimpleNamespace(gain=gain)
+        signatures.append(
+            SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
+        )
+    round_: Any = SimpleNamespace(
+        signatures=signatures, corrected=dict.fromkeys(gains, 0.0), base=SimpleNamespace(problem=0)
+    )
+    search: Any = SimpleNamespace(fitting=SimpleNamespace(largest=lambda change: 1.0))
+    return [s.candidate.label for s in Search.promising(search, round_)]
+
+
+def test_members_that_look_alike_do_not_crowd_out_their_group(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gains = {
+        f"{effect} at {instance}.{port}": 100.0 + len(port) + len(effect)
+        for effect in ("coulomb", "bristle")
+        for instance, port in MEMBERS
+    }
+    found = chosen({**gains, "coulomb at base.caster.swivel": 60.0}, monkeypatch)
+    assert len(found) == REFITS + 1
+    assert found[-1] == "coulomb at base.caster.swivel"
+
+
+def test_a_group_that_gains_little_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    gains = {f"coulomb at {i}.{port}": 100.0 for i, port in MEMBERS}
+    gains |= {f"bristle at {i}.{port}": 90.0 for i, port in MEMBERS}
+    found = chosen({**gains, "coulomb at base.caster.swivel": 40.0}, monkeypatch)
+    assert len(found) == REFITS
+    assert "coulomb at base.caster.swivel" not in found
