@@ -38,7 +38,7 @@ def test_members_that_look_alike_do_not_crowd_out_their_group(
         for effect in ("coulomb", "bristle")
         for instance, port in MEMBERS
     }
-    found = chosen({**gains, "coulomb at base.caster.swivel": 60.0}, monkeypatch)
+    found = chosen({**gains, "coulomb at base.caster.swivel": 80.0}, monkeypatch)
     assert len(found) == REFITS + 1
     assert found[-1] == "coulomb at base.caster.swivel"
 
