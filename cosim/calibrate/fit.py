@@ -315,19 +315,16 @@ def fit(
         near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
-        draft: as `near`, but the Jacobian is one-sided: the minimum counts and not its intervals.
+        draft: with `near`, a one-sided Jacobian: the minimum counts and not its intervals.
     """
     begun = problem.evaluations
     run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
     if known is not None:
         run.follow(known, limit)
         return estimated(run)
-    if draft:
-        run.correct(central=False)
-        return estimated(run)
     if near:
-        run.correct()
-        return estimated(run, confirm=True)
+        run.correct(central=not draft)
+        return estimated(run, confirm=not draft)
     if robust and _uneven(run):
         run = Descent(problem, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])

@@ -281,7 +281,7 @@ class Search:
         """
         theta = quick.estimate.theta
         problem = corrected(quick.problem, theta, self.raw)
-        result = self.judged(fit(problem, theta, near=not draft, draft=draft))
+        result = self.judged(fit(problem, theta, near=True, draft=draft))
         result.effects, result.signature = quick.effects, quick.signature
         result.p_value = quick.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)

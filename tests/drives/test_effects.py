@@ -274,3 +274,24 @@ def test_wheels_that_roll_have_no_magnets() -> None:
     with pytest.raises(ModelError, match=r"'cogging' has no place at balance 'axle', .* normal"):
         build_model("caster/swivel+cogging@axle")
     build_model("inertia/disc+cogging@flange")  # a rotor's may have
+
+
+@pytest.mark.parametrize("speed", [1.5, -2.5])
+@pytest.mark.parametrize("strength", [0.3, -0.3])
+@pytest.mark.parametrize(
+    ("effect", "name", "law"),
+    [
+        ("asymmetric_viscous", "b_d", lambda s, w: s * abs(w) - abs(s) * w),
+        ("temperature_drift", "b", lambda s, w: -(0.75 * s if s > 0 else -0.25 * s) * w),
+    ],
+)
+def test_friction_of_either_sign_never_drives(
+    effect: str, name: str, law: Callable[[float, float], float], strength: float, speed: float
+) -> None:
+    values = {"speed": speed, f"{effect}.{name}": strength}
+    if effect == "temperature_drift":
+        values[f"{effect}.h"] = 0.25
+    torque = torque_of(effect, values)
+    # rounding of accelerations near 50 rad/s2
+    assert torque == pytest.approx(law(strength, speed), rel=1e-9, abs=1e-12)
+    assert torque * speed <= 1e-12
