@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates, new_parameters
 
+Vector = NDArray[np.float64]
 INSIDE = 0.2
 """Share of a parameter's range, on both sides, from which no truth is drawn."""
 
@@ -28,14 +30,14 @@ class Made:
         effect: label of the undeclared effect, "none" without.
         size: of its strength.
         parameters: true values of the declared parameters.
-        visible: largest change that the effect makes in a channel of a run, over its noise.
+        change: run -> channel -> what the effect changes, without noise.
     """
 
     problem: Problem
     effect: str
     size: float
     parameters: dict[str, float]
-    visible: float
+    change: dict[str, dict[str, Vector]]
 
 
 def example(folder: Path, seconds: float, workers: int) -> Problem:
@@ -85,15 +87,13 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         noise = problem.sigma * random.standard_normal(run.data.shape)
         data[run.name] = np.where(np.isfinite(run.data), values[run.name] + noise, np.nan)
     problem.close()
-    visible = max(
-        float(np.max(np.sqrt(np.mean(((values[n] - plain[n]) / problem.sigma) ** 2, axis=0))))
-        for n in plain
-    )
+    channels = [c.name for c in problem.channels]
+    change = {n: dict(zip(channels, (values[n] - plain[n]).T, strict=True)) for n in plain}
     names = [p.name for p in problem.parameters]
     truth = {n: float(v) for n, v, p in zip(names, theta, problem.parameters, strict=True)
              if p.role == "declared"}  # fmt: skip
     label = "none" if candidate is None else candidate.label
-    return Made(problem.with_data(data), label, size, truth, visible)
+    return Made(problem.with_data(data), label, size, truth, change)
 
 
 def catalogue(problem: Problem) -> list[Candidate]:

@@ -17,11 +17,13 @@ from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
+from .deferred import step_error
 from .experiment import propose
 from .linear import Layout
 from .localise import Place, localise
+from .models import Fitted
 from .power import power
-from .search import ROUNDS, Fitted, Round, Search, step_error
+from .search import ROUNDS, Round, Search
 from .structure import Structure, structures
 
 Vector = NDArray[np.float64]

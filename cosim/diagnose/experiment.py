@@ -13,7 +13,7 @@ from ..calibrate.problem import Problem
 from ..errors import CosimError
 from ..signals import Table
 from .linear import Layout
-from .search import Fitted
+from .models import Fitted
 from .secant import model_values
 
 Vector = NDArray[np.float64]

@@ -107,14 +107,16 @@ class Absorber:
     Args:
         jacobian: columns in units of the parameters' scales.
         problem: gives priors and scales.
+        held: parameters that absorb nothing: a fit that ended at a bound wants to go beyond it.
     """
 
-    def __init__(self, jacobian: Vector, problem: Problem) -> None:
+    def __init__(self, jacobian: Vector, problem: Problem, held: Sequence[str] = ()) -> None:
         rows = [
             np.eye(len(problem.parameters))[i] * problem.scale[i] / p.prior
             for i, p in enumerate(problem.parameters)
             if p.prior
         ]
+        jacobian = jacobian * ~np.isin(problem.names, held)
         extra = np.array(rows).reshape(-1, jacobian.shape[1])
         values, vectors = np.linalg.eigh(jacobian.T @ jacobian + extra.T @ extra)
         # a direction along which the whole span changes less than the noise absorbs nothing

@@ -27,7 +27,8 @@ from ..calibrate.problem import Problem
 from ..errors import CosimError, VariantError
 from .candidates import Candidate, Catalogue, balances, element_of
 from .linear import Absorber, Layout
-from .search import Fitted, Search
+from .models import Fitted
+from .search import Search
 from .secant import model_values
 
 Vector = NDArray[np.float64]

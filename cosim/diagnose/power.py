@@ -9,7 +9,8 @@ import numpy as np
 from scipy.stats import norm
 
 from .linear import MATERIAL, Layout
-from .search import LEVEL, Round
+from .models import LEVEL
+from .search import Round
 
 POWER = 0.9
 """Probability with which an effect of the given strength is found."""

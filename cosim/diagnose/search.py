@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -19,19 +18,14 @@ from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates, new_parameters
+from .deferred import corrected, step_error
 from .linear import MATERIAL, Absorber, Layout, Score, holm, score
+from .models import GATE, LEVEL, Fitted, compare, more_general
 from .probes import batches
 from .secant import FLOOR, Bench, Signature, merge, model_values, patience, worthy
 from .structure import structures
 
 Vector = NDArray[np.float64]
-LEVEL = 0.01
-"""Family-wise probability of naming an effect on data that lack none."""
-GATE = math.log(1.0 / LEVEL)
-"""Log likelihood that unused data must gain [nats]. The likelihood ratio of two fixed models has
-mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
-GATE_Z = 2.0
-"""Standard deviations by which it must differ from 0, residuals correlated within blocks."""
 NEARLY = 0.7
 """Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
 RIVAL_Z = 2.0
@@ -43,90 +37,15 @@ refitted: it is no rival, and another round will ask again."""
 SHARED, WHOLES = 0.5, 3
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most so many: members must not crowd it out."""
-REFINED, CLOSE = 3, 0.95
-"""So many quick fits are made thorough, if they gain this share of what the best one gains."""
+REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
+"""So many quick fits are made thorough, if they gain this share of what the best one gains; the
+second share counts where the model before was far off."""
+FAR = 4.0
+"""Mean square over the noise's from which a model is far off: its parameters then stand where they
+made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
-
-
-@dataclass
-class Fitted:
-    """A model fitted to the identification runs.
-
-    Attributes:
-        effects: what was added to the declared system.
-        estimate: parameters.
-        fit, check: model values over sigma in identification and validation runs.
-        signature: score of the effect that was added last.
-        gate: gain on unused runs against the model of the round before.
-        p_value: of the score test, corrected for the number of candidates.
-    """
-
-    effects: tuple[Candidate, ...]
-    estimate: Estimate
-    fit: Vector
-    check: Vector
-    signature: Signature | None = None
-    gate: Gate | None = None
-    p_value: float = 1.0
-
-    @property
-    def problem(self) -> Problem:
-        """What was fitted."""
-        return self.estimate.problem
-
-    @property
-    def free(self) -> int:
-        """Number of parameters that were fitted."""
-        return int(self.estimate.theta.size)
-
-
-@dataclass(frozen=True)
-class Gate:
-    """Two models on the same runs.
-
-    Attributes:
-        gain: log likelihood of the second less that of the first [nats].
-        z: in robust standard deviations.
-    """
-
-    gain: float
-    z: float
-
-    @property
-    def passed(self) -> bool:
-        """Whether the second is better."""
-        return self.gain > GATE and self.z > GATE_Z
-
-
-def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
-    """Compare two sets of model values against data (all over sigma).
-
-    z tests whether the data move from the first towards the second: both are fixed beforehand.
-    """
-    direction, residual = second - first, data - first
-    rest = data - second
-    gain = 0.5 * float(residual @ residual - rest @ rest)
-    square = float(direction @ direction)
-    if square <= 0.0:
-        return Gate(0.0, 0.0)
-    # middle of the two: positive where the second is nearer
-    middle = residual - 0.5 * direction
-    amplitude = float(direction @ middle)
-    sums = layout.sums(direction * (residual - direction * float(direction @ residual) / square))
-    return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
-
-
-def more_general(first: Fitted, second: Fitted) -> bool:
-    """Whether a model has more parameters for what it adds at the same place.
-
-    Places where an effect does the same are one place.
-    """
-    item = second.signature
-    same = {label.partition(" at ")[2] for label in (item.same if item is not None else ())}
-    places = {second.effects[-1].place, *same}
-    return first.effects[-1].place in places and first.free > second.free
 
 
 @dataclass
@@ -150,51 +69,6 @@ class Round:
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
-
-
-def step_error(problem: Problem, theta: Vector, step: float) -> dict[str, Vector]:
-    """What the exchange at communication points adds to the model values, by run.
-
-    Where the rig exchanges in ticks of the problem's step, that is the difference to this step.
-    Otherwise the exchange is of first order: twice the change that halving the step makes
-    (Richardson). In the units of the channels.
-
-    Args:
-        problem: its step is the rig's, or fine enough for two of them to tell the order.
-        theta: where.
-        step: at which the model values are taken.
-    """
-    if problem.ticks and step == problem.step:
-        return {run.name: np.zeros(run.data.shape) for run in problem.runs}
-    factor, fine = (1.0, problem.step) if problem.ticks else (2.0, step / 2.0)
-    first, second = problem._with(step=step), problem._with(step=fine)
-    try:
-        coarse, exact = first.residuals(theta, None), second.residuals(theta, None)
-    finally:
-        first.close()
-        second.close()
-    return {
-        name: factor * (b - a) * problem.sigma
-        for (name, a), (_, b) in zip(coarse, exact, strict=True)
-    }
-
-
-def corrected(problem: Problem, theta: Vector, exact: Problem) -> Problem:
-    """A problem at its search step, with what that adds to the model taken from the data instead.
-
-    It varies little with the parameters, so thousands of cheap simulations can be compared with
-    the data as if they were exact (deferred correction).
-
-    Args:
-        problem: with its system and parameters.
-        theta: where the correction is taken.
-        exact: holds the data and the step that count.
-    """
-    real = problem.with_data({run.name: run.data for run in exact.runs})._with(step=exact.step)
-    step = exact.search_step
-    errors = step_error(real, theta, step)
-    data = {run.name: run.data + errors[run.name] for run in exact.runs}
-    return real.with_data(data)._with(step=step)
 
 
 class Search:
@@ -322,7 +196,7 @@ class Search:
         """What the parameters of a fitted model can do in some of the identification runs."""
         slopes = {item.run: item for item in fitted.estimate.jacobian}
         matrix = layout.matrix([slopes[n] for n in layout.names], fitted.problem.scale)
-        return Absorber(matrix, fitted.problem)
+        return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
 
     def bench(self, base: Fitted, layout: Layout) -> Bench:
         """A bench for candidates around a fitted model."""
@@ -418,6 +292,7 @@ class Search:
         absorber = self.absorber(base, self.fitting)
         residual = self.fit_data - base.fit - item.score.amplitude * item.change
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
+        own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
         for factor, part in ((1.0, 1.0), (0.0, 1.0), (0.0, 0.1)):
             theta = problem.nominal
@@ -430,12 +305,36 @@ class Search:
         try:
             costs = [self._cost(problem, theta) for theta in starts]
             result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
+            if self.far(base):
+                anew = self.anew(problem, base, {n: starts[0][problem.index(n)] for n in own})
+                result = min(result, anew, key=lambda f: f.estimate.cost)
         except CosimError as error:
             self.say(f"{item.candidate.label} could not be refitted: {error}")
             return None
         result.effects = (*base.effects, item.candidate)
         result.signature = item
         return result
+
+    def far(self, base: Fitted) -> bool:
+        """Whether a model is far off the data, with parameters driven to their bounds."""
+        estimate = base.estimate
+        return 2.0 * estimate.cost > FAR * estimate.count and bool(estimate.at_bound)
+
+    def anew(self, problem: Problem, base: Fitted, values: dict[str, float]) -> Fitted:
+        """A fit from nominal values, roughly: one Jacobian.
+
+        Args:
+            problem: to fit.
+            base: gives the values that concern single runs.
+            values: other than nominal.
+        """
+        theta = problem.nominal
+        for i, p in enumerate(base.problem.parameters):
+            if p.run or p.role == "effect":
+                theta[i] = base.estimate.theta[i]
+        for name, value in values.items():
+            theta[problem.index(name)] = value
+        return self.judged(fit(problem, theta, limit=1, robust=False, rough=True))
 
     def _cost(self, problem: Problem, theta: Vector) -> float:
         return sum(float(np.nansum(r**2)) for _, r in problem.residuals(theta, self.fitting.names))
@@ -484,7 +383,8 @@ class Search:
         self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
     ) -> None:
         """Replace the first few quick fits by thorough ones; `done` gets these."""
-        least = CLOSE * max((self.total(base, f) for f in current.fitted), default=0.0)
+        share = LOOSE if self.far(base) else CLOSE
+        least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         near = [f for f in chosen if self.total(base, f) > least][:REFINED]
         better = {id(f): self.refined(base, self.sharpened(f, base, draft=True)) for f in near}
         done += better.values()

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnose.linear import Layout, holm, score
-from cosim.diagnose.search import GATE, Search, compare, more_general
+from cosim.diagnose.linear import Absorber, Layout, holm, score
+from cosim.diagnose.models import GATE, compare, more_general
+from cosim.diagnose.search import Search
 
 RATE, SECONDS = 100, 40
 
@@ -97,3 +98,19 @@ def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
     assert not more_general(simple, best)
     assert not more_general(best, elsewhere)
     assert more_general(best, law(10, "gearbox.flange_a", ("coulomb at load.flange",)))
+
+
+def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
+    random = np.random.default_rng(2)
+    columns = 10.0 * random.standard_normal((50, 2))
+    parameters = [SimpleNamespace(name=n, prior=None) for n in "ab"]
+    problem: Any = SimpleNamespace(parameters=parameters, names=["a", "b"], scale=np.ones(2))
+    first = columns[:, 0]
+    assert np.linalg.norm(Absorber(columns, problem).rest(first)) < 1e-5 * np.linalg.norm(first)
+    held = Absorber(columns, problem, ("a",))
+    across = first - columns[:, 1] * float(columns[:, 1] @ first) / float(
+        columns[:, 1] @ columns[:, 1]
+    )
+    # rounding of the float32 basis
+    assert held.rest(first) == pytest.approx(across, abs=1e-4)
+    assert held.change(first)[0] == 0.0

@@ -1,0 +1,103 @@
+"""Fitted models, and which of two is better on the same data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.estimate import Estimate
+from ..calibrate.problem import Problem
+from .candidates import Candidate
+from .linear import Layout
+from .secant import Signature
+
+Vector = NDArray[np.float64]
+LEVEL = 0.01
+"""Family-wise probability of naming an effect on data that lack none."""
+GATE = math.log(1.0 / LEVEL)
+"""Log likelihood that unused data must gain [nats]. The likelihood ratio of two fixed models has
+mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
+GATE_Z = 2.0
+"""Standard deviations by which it must differ from 0, residuals correlated within blocks."""
+
+
+@dataclass
+class Fitted:
+    """A model fitted to the identification runs.
+
+    Attributes:
+        effects: what was added to the declared system.
+        estimate: parameters.
+        fit, check: model values over sigma in identification and validation runs.
+        signature: score of the effect that was added last.
+        gate: gain on unused runs against the model of the round before.
+        p_value: of the score test, corrected for the number of candidates.
+    """
+
+    effects: tuple[Candidate, ...]
+    estimate: Estimate
+    fit: Vector
+    check: Vector
+    signature: Signature | None = None
+    gate: Gate | None = None
+    p_value: float = 1.0
+
+    @property
+    def problem(self) -> Problem:
+        """What was fitted."""
+        return self.estimate.problem
+
+    @property
+    def free(self) -> int:
+        """Number of parameters that were fitted."""
+        return int(self.estimate.theta.size)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Two models on the same runs.
+
+    Attributes:
+        gain: log likelihood of the second less that of the first [nats].
+        z: in robust standard deviations.
+    """
+
+    gain: float
+    z: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the second is better."""
+        return self.gain > GATE and self.z > GATE_Z
+
+
+def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
+    """Compare two sets of model values against data (all over sigma).
+
+    z tests whether the data move from the first towards the second: both are fixed beforehand.
+    """
+    direction, residual = second - first, data - first
+    rest = data - second
+    gain = 0.5 * float(residual @ residual - rest @ rest)
+    square = float(direction @ direction)
+    if square <= 0.0:
+        return Gate(0.0, 0.0)
+    # middle of the two: positive where the second is nearer
+    middle = residual - 0.5 * direction
+    amplitude = float(direction @ middle)
+    sums = layout.sums(direction * (residual - direction * float(direction @ residual) / square))
+    return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
+
+
+def more_general(first: Fitted, second: Fitted) -> bool:
+    """Whether a model has more parameters for what it adds at the same place.
+
+    Places where an effect does the same are one place.
+    """
+    item = second.signature
+    same = {label.partition(" at ")[2] for label in (item.same if item is not None else ())}
+    places = {second.effects[-1].place, *same}
+    return first.effects[-1].place in places and first.free > second.free
