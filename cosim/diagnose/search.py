@@ -43,6 +43,9 @@ second share counts where the model before was far off."""
 FAR = 4.0
 """Mean square over the noise's from which a model is far off: its parameters then stand where they
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
+WHOLE = 0.98
+"""Share of what a model leaves beyond noise: where a candidate explains that much, those that gain
+half as much to first order are no rivals."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -271,8 +274,20 @@ class Search:
         ]
         return good[:REFITS] + shared[:WHOLES]
 
-    def refit(self, base: Fitted, item: Signature, *, secondary: bool = False) -> Fitted | None:
-        """Fit declared parameters and the effect's strength (or all its parameters) together."""
+    def explained(self, base: Fitted, fitted: list[Fitted]) -> bool:
+        """Whether one of these models explains nearly all that the base leaves beyond noise."""
+        beyond = base.estimate.cost - 0.5 * base.estimate.count
+        gains = [self.gain(base, f) for f in fitted]
+        return beyond > GATE and max(gains, default=0.0) > WHOLE * beyond
+
+    def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
+        """Fit the declared parameters and the effect's strength together.
+
+        Args:
+            base: model without the effect.
+            item: the effect.
+            again: from nominal values, too, where the base and a quick fit are far off.
+        """
         problem = item.candidate.added_to(base.problem)
         _, others = new_parameters(base.problem, problem)
         value = item.value * (item.score.amplitude or 1.0)
@@ -286,7 +301,7 @@ class Search:
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
         held = [p for p in others if p.name != item.probe.second]
-        if not secondary and held:
+        if held:
             problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
         problem.limits = patience(base.problem)
         absorber = self.absorber(base, self.fitting)
@@ -305,7 +320,7 @@ class Search:
         try:
             costs = [self._cost(problem, theta) for theta in starts]
             result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
-            if self.far(base):
+            if again and self.far(base) and self.far(result):
                 anew = self.anew(problem, base, {n: starts[0][problem.index(n)] for n in own})
                 result = min(result, anew, key=lambda f: f.estimate.cost)
         except CosimError as error:
@@ -342,8 +357,13 @@ class Search:
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose."""
         current = self.scored(base)
-        for item in self.promising(current):
-            fitted = self.refit(base, item)
+        chosen = self.promising(current)
+        most = max((s.score.gain for s in chosen), default=0.0)
+        for item in chosen:
+            explained = self.explained(base, current.fitted)
+            if explained and item.score.gain < SHARED * most:
+                continue
+            fitted = self.refit(base, item, again=not explained)
             if fitted is None:
                 continue
             fitted.p_value = current.corrected[item.candidate.label]
