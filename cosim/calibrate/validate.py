@@ -172,8 +172,10 @@ def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
         return [Finding("error", "simulation", "", "", f"the model does not run: {error}")]
     for index in range(len(problem.channels)):
         found += _check_scale(problem, models, index)
-    named = {f.column for f in found}
-    found += _check_swaps(problem, models, named)
+    swaps = list(_check_swaps(problem, models, {f.column for f in found if not f.run}))
+    # exchanged columns of two sides have the other sign where the sides move against each other
+    pairs = {name for f in swaps for name in f.column.split(" and ")}
+    found = [f for f in found if not f.run or f.column not in pairs] + swaps
     found += _check_clocks(problem, models, evident)
     found += _check_inputs(problem, models, theta)
     return found
@@ -236,12 +238,32 @@ def _check_swaps(problem: Problem, models: dict[str, Vector], named: set[str]) -
                 continue
             straight = _misfit(problem, models, a, a) + _misfit(problem, models, b, b)
             crossed = _misfit(problem, models, a, b) + _misfit(problem, models, b, a)
-            if crossed < 0.1 * straight:
+            if crossed < 0.1 * straight or (crossed < straight and _differs(problem, models, a, b)):
                 text = (
-                    f"fits the signal of {second.name} and that one fits {first.signal}: "
+                    f"each fits the other's signal ({second.signal}, {first.signal}) far better: "
                     "the two columns look swapped"
                 )
-                yield Finding("error", "swapped", "", first.name, text)
+                yield Finding("error", "swapped", "", f"{first.name} and {second.name}", text)
+
+
+def _differs(problem: Problem, models: dict[str, Vector], a: int, b: int) -> bool:
+    """Whether what two columns differ by follows the model with the sign turned round.
+
+    What is common to both (the currents of two wheels that carry one base) hides an exchange.
+    """
+    signs = []
+    for run in problem.runs:
+        measured = run.data[:, a] - run.data[:, b]
+        simulated = models[run.name][:, a] - models[run.name][:, b]
+        good = np.isfinite(measured) & np.isfinite(simulated)
+        measured, simulated = measured[good], simulated[good]
+        if measured.size < 2 or np.std(simulated) < 5.0 * problem.channels[a].sigma:
+            continue
+        if np.std(measured) > 0.0:
+            correlation = float(np.corrcoef(measured, simulated)[0, 1])
+            if abs(correlation) > FOLLOWS:
+                signs.append(correlation)
+    return sum(c < 0.0 for c in signs) > 0.5 * max(len(signs), 1)
 
 
 def _misfit(problem: Problem, models: dict[str, Vector], data: int, model: int) -> float:

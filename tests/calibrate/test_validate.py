@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.calibrate import Problem
-from cosim.calibrate.validate import Finding, check_data, check_model
+from cosim.calibrate.validate import Finding, _check_swaps, check_data, check_model
 from cosim.signals import Table
 
 
@@ -75,7 +77,28 @@ def test_swapped_columns(noisy) -> None:
     order = [0, 2, 1, 3]
     data = {run.name: run.data[:, order] for run in problem.runs}
     found = findings(problem._with(channels=channels).with_data(data))
-    assert any(f.kind in ("swapped", "unit") and f.column in ("current", "voltage") for f in found)
+    columns = {"current", "voltage"}
+    assert any(
+        f.kind in ("swapped", "unit") and set(f.column.split(" and ")) & columns for f in found
+    )
+
+
+@pytest.mark.parametrize("crossed", [True, False])
+def test_two_sides_that_carry_one_load(crossed: bool) -> None:
+    """What is common to both sides, and wrong in the model, hides an exchange from the misfit."""
+    times = np.linspace(0.0, 10.0, 500)
+    common, apart = 3.0 * np.sin(times), 0.5 * np.sin(3.0 * times)
+    left, right = common + apart, common - apart
+    data = np.column_stack([right, left] if crossed else [left, right])
+    run: Any = SimpleNamespace(name="A", data=data)
+    channels = [
+        SimpleNamespace(name=n, unit="A", sigma=0.05, signal=f"{n}.i") for n in ("left", "right")
+    ]
+    problem: Any = SimpleNamespace(runs=[run], channels=channels)
+    model = 0.5 * np.column_stack([left, right])
+    found = list(_check_swaps(problem, {"A": model}, set()))
+    assert [f.column for f in found] == (["left and right"] if crossed else [])
+    assert not crossed or "look swapped" in found[0].text
 
 
 def test_short_run_and_clock_that_goes_back(noisy) -> None:
