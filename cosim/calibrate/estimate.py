@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
-from .normal import Normal, cost_of
+from .normal import Normal, cost_of, gradient
 from .parts import Sensitivity
 from .problem import Problem
 
@@ -28,6 +28,9 @@ WEAK = 1e-4
 """Share of the best known direction's information up to which a direction is measured again."""
 LONG, SHORT = 0.1, 0.01
 """Spans of the step with which that is done, and the least that the bounds must leave."""
+
+CLEAR = 10.0
+"""Times as much information as on a direction that others must have to be kept apart from it."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,8 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
 
     Differences over small steps of a model with friction are rounded by the ticks at which it
     sticks, and that looks like information on combinations that change nothing (all torques and
-    inertias by the same factor).
+    inertias by the same factor). The same rounding turns the direction a little, towards others
+    that change a lot; what those could undo does not count.
 
     Args:
         run: its residuals are those at theta.
@@ -109,10 +113,16 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
     common = np.array([not item.run for item in p.parameters])
     found = np.full(values.size, np.inf)
     base = run.residuals
+
+    def along(residuals: list[tuple[str, Vector]]) -> Vector:
+        return np.asarray(vectors.T @ gradient(p, run.theta, run.jacobian, residuals))
+
+    here = along(base)
     for i in np.flatnonzero((values >= 1.0 / KNOWN**2) & (values < WEAK * values.max())):
         direction = vectors[:, i]
         if float(np.sum(direction[common] ** 2)) < 0.5:
             continue
+        better = values > CLEAR * values[i]
         seen = []
         for sign in (1.0, -1.0):
             way = sign * direction * p.scale
@@ -128,11 +138,13 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
                 continue
             pairs = zip(moved, base, strict=True)
             square = sum(float(np.nansum((a - b) ** 2)) for (_, a), (_, b) in pairs)
+            undone = along(moved) - here
+            square -= float(np.sum(undone[better] ** 2 / values[better]))
             drawn = sum(
                 (length * way[k] / item.prior) ** 2
                 for k, item in enumerate(p.parameters) if item.prior
             )  # fmt: skip
-            seen.append((square + drawn) / length**2)
+            seen.append((max(square, 0.0) + drawn) / length**2)
         if seen:
             found[i] = min(seen)
     return found

@@ -216,9 +216,9 @@ class Search:
 
     def telling(self, base: Fitted) -> Layout:
         """The run with most of what the model lacks; all, if no channel exceeds its noise."""
-        residual = self.fit_data - base.fit
-        if not any(s.structured for s in structures(residual, self.fitting)):
+        if not self.lacking(base):
             return self.fitting
+        residual = self.fit_data - base.fit
         rows = self.fitting.by_run(residual)
         excess = [float(np.nansum(r**2)) - np.count_nonzero(np.isfinite(r)) for r in rows]
         return Layout(self.raw, [self.fitting.runs[int(np.argmax(excess))]])
@@ -387,7 +387,7 @@ class Search:
                 current.winner = self.chosen(base, current)
         if current.winner is not None:
             drafted = current.winner
-            current.winner = self.sharpened(drafted, base)
+            current.winner = self.sharpened(self.retried(drafted, base), base)
             current.fitted = [current.winner if f is drafted else f for f in current.fitted]
             if self.whole:
                 self.prepare(current.winner.problem)
@@ -399,6 +399,34 @@ class Search:
         self.rounds.append(current)
         return current
 
+    def retried(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model fitted from nominal values, as the first one was, if that leads farther.
+
+        Parameters that had made up for an effect may hold its model in a poor minimum; with the
+        effect in the model, nominal values are near again.
+        """
+        if not self.far(base) or not self.lacking(winner):
+            return winner
+        problem = corrected(winner.problem, winner.estimate.theta, self.raw)
+        theta = problem.nominal
+        for i, p in enumerate(problem.parameters):
+            if p.role == "effect":
+                theta[i] = winner.estimate.theta[i]
+        try:
+            found = self.judged(fit(problem, theta, limit=6, robust=True, rough=True))
+        except CosimError:
+            return winner
+        if not found.estimate.cost < winner.estimate.cost - GATE:
+            return winner
+        self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
+        found.effects, found.signature = winner.effects, winner.signature
+        found.p_value = winner.p_value
+        return found
+
+    def lacking(self, fitted: Fitted) -> bool:
+        """Whether a channel still exceeds its noise."""
+        return any(s.structured for s in structures(self.fit_data - fitted.fit, self.fitting))
+
     def finish(
         self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
     ) -> None:
@@ -406,7 +434,11 @@ class Search:
         share = LOOSE if self.far(base) else CLOSE
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         near = [f for f in chosen if self.total(base, f) > least][:REFINED]
-        better = {id(f): self.refined(base, self.sharpened(f, base, draft=True)) for f in near}
+        rivals = len(near) + len(done) > 1
+        better = {
+            id(f): self.refined(base, self.sharpened(f, base, draft=True) if rivals else f)
+            for f in near
+        }
         done += better.values()
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))

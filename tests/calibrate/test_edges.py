@@ -53,13 +53,15 @@ def linear(matrix: np.ndarray) -> SimpleNamespace:
     """A fit at 0 of a model that is linear with this matrix."""
     size = matrix.shape[1]
     item = SimpleNamespace(run="", prior=None)
+    slopes = SimpleNamespace(columns=np.arange(size), values=matrix[:, None, :])
     problem = SimpleNamespace(
         lower=np.full(size, -1.0), upper=np.full(size, 1.0), scale=np.ones(size),
-        parameters=[item] * size, residuals=lambda theta, purpose: [("run", -(matrix @ theta))],
+        parameters=[item] * size,
+        residuals=lambda theta, purpose: [("run", -(matrix @ theta)[:, None])],
     )  # fmt: skip
     return SimpleNamespace(
-        problem=problem, theta=np.zeros(size), residuals=[("run", np.zeros(matrix.shape[0]))],
-        purpose="identification",
+        problem=problem, theta=np.zeros(size), residuals=[("run", np.zeros((len(matrix), 1)))],
+        purpose="identification", jacobian=[slopes],
     )  # fmt: skip
 
 
@@ -77,6 +79,16 @@ def test_what_a_long_step_shows_stays() -> None:
     found = _confirmed(run, np.array([100.0, 4e8]), np.eye(2))
     # exact in a linear model, but for rounding
     assert found[0] == pytest.approx(100.0, rel=1e-9)
+
+
+def test_a_direction_that_rounding_has_turned_is_judged_by_what_no_other_can_undo() -> None:
+    run = linear(np.array([[1e4, 1e4], [1e4, 1e4]]))
+    turn = 1e-3  # towards the direction with information 4e8: it would count as 400
+    vectors = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
+    turned = vectors @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    found = _confirmed(run, np.array([100.0, 4e8]), turned)
+    # 1 % of the contamination: Jacobian and information differ by the turn's square
+    assert found[0] < 4.0
 
 
 def test_a_point_that_rounds_past_a_bound_is_tried_at_the_bound() -> None:
