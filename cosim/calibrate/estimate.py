@@ -94,7 +94,7 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
 
-def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
+def _confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Vector]:
     """Information on the weak directions, from steps large enough to be seen if they change much.
 
     Differences over small steps of a model with friction are rounded by the ticks at which it
@@ -107,11 +107,12 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
         values, vectors: of the normal matrix.
 
     Returns:
-        one per direction; infinite where none was measured.
+        one per direction, infinite where none was measured; and the directions, turned back to
+        where the others undo nothing.
     """
     p = run.problem
     common = np.array([not item.run for item in p.parameters])
-    found = np.full(values.size, np.inf)
+    found, turned = np.full(values.size, np.inf), vectors.copy()
     base = run.residuals
 
     def along(residuals: list[tuple[str, Vector]]) -> Vector:
@@ -123,7 +124,7 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
         if float(np.sum(direction[common] ** 2)) < 0.5:
             continue
         better = values > CLEAR * values[i]
-        seen = []
+        seen: list[tuple[float, Vector]] = []
         for sign in (1.0, -1.0):
             way = sign * direction * p.scale
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -144,10 +145,11 @@ def _confirmed(run: Descent, values: Vector, vectors: Vector) -> Vector:
                 (length * way[k] / item.prior) ** 2
                 for k, item in enumerate(p.parameters) if item.prior
             )  # fmt: skip
-            seen.append((max(square, 0.0) + drawn) / length**2)
+            back = vectors[:, better] @ (undone[better] / values[better]) / (sign * length)
+            seen.append(((max(square, 0.0) + drawn) / length**2, direction + back))
         if seen:
-            found[i] = min(seen)
-    return found
+            found[i], turned[:, i] = min(seen, key=lambda item: item[0])
+    return found, turned
 
 
 def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
@@ -163,8 +165,10 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
+    turned = vectors
     if confirm:
-        values = np.minimum(values, _confirmed(run, values, vectors))
+        seen, turned = _confirmed(run, values, vectors)
+        values = np.minimum(values, seen)
     poor = values < 1.0 / KNOWN**2
     fitted = {name for name, _ in run.residuals}
     concerned = np.array([not p.run or p.run in fitted for p in problem.parameters])
@@ -181,7 +185,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     white, robust = np.diag(inverse) * spread, np.diag(sandwich)
     factor = np.sqrt(np.maximum(white, robust) / np.maximum(robust, 1e-300))
     known = sandwich * np.outer(factor, factor)
-    unknown = (vectors[:, poor] * (spread / (values[poor] + BOUNDS))) @ vectors[:, poor].T
+    unknown = (turned[:, poor] * (spread / (values[poor] + BOUNDS))) @ turned[:, poor].T
     scaled = known + unknown
     covariance = scaled * np.outer(scale, scale)
     variances, directions = np.linalg.eigh(scaled)
