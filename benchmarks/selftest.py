@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.motor_plant import EFFECTS, Bench, changes, draw, write_sets
 from benchmarks.own_plant import Made, catalogue, example, made
@@ -32,6 +33,8 @@ from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis
 from cosim.diagnose.linear import MATERIAL, Absorber, Layout
 
+Vector = NDArray[np.float64]
+Change = dict[str, dict[str, Vector]]
 SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml"
 EXTREME = 300.0
 """RMS over the noise from which an effect is made smaller: a machine that oscillates is no test."""
@@ -48,7 +51,16 @@ def benches(repeats: int, clean: int, seed: int) -> list[Bench]:
     return found
 
 
-def shown(problem: Problem, truth: dict[str, float], change: dict[str, dict[str, Any]]) -> float:
+def over_noise(problem: Problem, change: Change, layout: Layout) -> Vector:
+    """Changes of the channels of the layout's runs, over the noise, as one vector."""
+    rows = [
+        np.column_stack([change[name][c.name] / c.sigma for c in problem.channels])
+        for name in layout.names
+    ]
+    return layout.vector(rows)
+
+
+def shown(problem: Problem, truth: dict[str, float], change: Change) -> float:
     """Largest RMS over the noise, in a channel of a run, that calibration cannot absorb.
 
     Args:
@@ -61,23 +73,15 @@ def shown(problem: Problem, truth: dict[str, float], change: dict[str, dict[str,
         theta[problem.index(name)] = value
     layout = Layout(problem, problem.chosen("identification"))
     slopes = problem.jacobian(theta, layout.names)
-    absorber = Absorber(layout.matrix(slopes, problem.scale), problem)
-    rows = [
-        np.column_stack([change[name][c.name] / c.sigma for c in problem.channels])
-        for name in layout.names
-    ]
     problem.close()
-    return round(layout.largest(absorber.rest(layout.vector(rows))), 4)
+    absorber = Absorber(layout.matrix(slopes, problem.scale), problem)
+    return round(layout.largest(absorber.rest(over_noise(problem, change, layout))), 4)
 
 
-def largest(one: Made) -> float:
-    """Largest RMS over the noise, in a channel of a run, of what the effect changes."""
-    sigma = {c.name: c.sigma for c in one.problem.channels}
-    return max(
-        float(np.sqrt(np.mean((values / sigma[name]) ** 2)))
-        for run in one.change.values()
-        for name, values in run.items()
-    )
+def extreme(one: Made) -> bool:
+    """Whether an effect changes a channel of a run by more than a machine that still works does."""
+    layout = Layout(one.problem, one.problem.runs)
+    return not layout.largest(over_noise(one.problem, one.change, layout)) < EXTREME
 
 
 def judged(
@@ -135,7 +139,7 @@ def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[
     for number, (item, factor) in enumerate(jobs):
         seed = 1000 * arguments.seed + number
         one = made(rig, item, factor, seed)
-        while largest(one) > EXTREME:
+        while extreme(one):
             factor *= 0.1
             one = made(rig, item, factor, seed)
         effect = "none" if item is None else item.effect

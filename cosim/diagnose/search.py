@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +44,9 @@ second share counts where the model before was far off."""
 FAR = 4.0
 """Mean square over the noise's from which a model is far off: its parameters then stand where they
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
-WHOLE = 0.98
-"""Share of what a model leaves beyond noise: where a candidate explains that much, those that gain
-half as much to first order are no rivals."""
+EXPLAINED, RIVAL = 0.98, 0.5
+"""Where a candidate explains this share of what a model leaves beyond noise, those that gain less
+than the second share of the best gain to first order are no rivals."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -158,9 +159,12 @@ class Search:
         """
         theta = quick.estimate.theta
         problem = corrected(quick.problem, theta, self.raw)
-        result = self.judged(fit(problem, theta, near=True, draft=draft))
-        result.effects, result.signature = quick.effects, quick.signature
-        result.p_value = quick.p_value
+        return self.again(self.judged(fit(problem, theta, near=True, draft=draft)), quick, base)
+
+    def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
+        """Mark a fit as another one of the same model, judged against the same base."""
+        result.effects, result.signature = first.effects, first.signature
+        result.p_value = first.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)
         return result
 
@@ -278,7 +282,7 @@ class Search:
         """Whether one of these models explains nearly all that the base leaves beyond noise."""
         beyond = base.estimate.cost - 0.5 * base.estimate.count
         gains = [self.gain(base, f) for f in fitted]
-        return beyond > GATE and max(gains, default=0.0) > WHOLE * beyond
+        return beyond > GATE and max(gains, default=0.0) > EXPLAINED * beyond
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.
@@ -321,8 +325,12 @@ class Search:
             costs = [self._cost(problem, theta) for theta in starts]
             result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
             if again and self.far(base) and self.far(result):
-                anew = self.anew(problem, base, {n: starts[0][problem.index(n)] for n in own})
-                result = min(result, anew, key=lambda f: f.estimate.cost)
+                kept = {p.name: base.estimate.values[p.name] for p in base.problem.parameters
+                        if p.run or p.role == "effect"}  # fmt: skip
+                kept |= {name: float(starts[0][problem.index(name)]) for name in own}
+                anew = self.anew(problem, kept, limit=1, robust=False)
+                if anew is not None and anew.estimate.cost < result.estimate.cost:
+                    result = anew
         except CosimError as error:
             self.say(f"{item.candidate.label} could not be refitted: {error}")
             return None
@@ -335,21 +343,22 @@ class Search:
         estimate = base.estimate
         return 2.0 * estimate.cost > FAR * estimate.count and bool(estimate.at_bound)
 
-    def anew(self, problem: Problem, base: Fitted, values: dict[str, float]) -> Fitted:
-        """A fit from nominal values, roughly: one Jacobian.
+    def anew(self, problem: Problem, kept: Mapping[str, float], **how: Any) -> Fitted | None:
+        """A rough fit from nominal values; None if that cannot be simulated.
 
         Args:
             problem: to fit.
-            base: gives the values that concern single runs.
-            values: other than nominal.
+            kept: parameters that begin elsewhere.
+            how: arguments of `fit`.
         """
         theta = problem.nominal
-        for i, p in enumerate(base.problem.parameters):
-            if p.run or p.role == "effect":
-                theta[i] = base.estimate.theta[i]
-        for name, value in values.items():
+        for name, value in kept.items():
             theta[problem.index(name)] = value
-        return self.judged(fit(problem, theta, limit=1, robust=False, rough=True))
+        try:
+            return self.judged(fit(problem, theta, rough=True, **how))
+        except CosimError as error:
+            self.say(f"no fit from nominal values: {error}")
+            return None
 
     def _cost(self, problem: Problem, theta: Vector) -> float:
         return sum(float(np.nansum(r**2)) for _, r in problem.residuals(theta, self.fitting.names))
@@ -357,11 +366,11 @@ class Search:
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose."""
         current = self.scored(base)
-        chosen = self.promising(current)
-        most = max((s.score.gain for s in chosen), default=0.0)
-        for item in chosen:
+        promising = self.promising(current)
+        most = max((s.score.gain for s in promising), default=0.0)
+        for item in promising:
             explained = self.explained(base, current.fitted)
-            if explained and item.score.gain < SHARED * most:
+            if explained and item.score.gain < RIVAL * most:
                 continue
             fitted = self.refit(base, item, again=not explained)
             if fitted is None:
@@ -408,20 +417,13 @@ class Search:
         if not self.far(base) or not self.lacking(winner):
             return winner
         problem = corrected(winner.problem, winner.estimate.theta, self.raw)
-        theta = problem.nominal
-        for i, p in enumerate(problem.parameters):
-            if p.role == "effect":
-                theta[i] = winner.estimate.theta[i]
-        try:
-            found = self.judged(fit(problem, theta, limit=6, robust=True, rough=True))
-        except CosimError:
-            return winner
-        if not found.estimate.cost < winner.estimate.cost - GATE:
+        effects = {p.name for p in problem.parameters if p.role == "effect"}
+        kept = {n: v for n, v in winner.estimate.values.items() if n in effects}
+        found = self.anew(problem, kept, limit=6, robust=True)
+        if found is None or not found.estimate.cost < winner.estimate.cost - GATE:
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
-        found.effects, found.signature = winner.effects, winner.signature
-        found.p_value = winner.p_value
-        return found
+        return self.again(found, winner, base)
 
     def lacking(self, fitted: Fitted) -> bool:
         """Whether a channel still exceeds its noise."""
@@ -481,11 +483,10 @@ class Search:
             theta[problem.index(name)] = value
         try:
             result = self.fitted(problem, theta, fitted.estimate)
-        except CosimError:
+        except CosimError as error:
+            self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
-        result.effects, result.signature = fitted.effects, item
-        result.p_value = fitted.p_value
-        result.gate = compare(self.check_data, base.check, result.check, self.checking)
+        result = self.again(result, fitted, base)
         better = self.gain(fitted, result) > GATE
         if (
             not better
