@@ -253,6 +253,7 @@ class Search:
         signatures = merge(sorted(signatures, key=lambda s: s.tuned))
         corrected = holm([s.score.p_value for s in signatures], len(signatures) + len(aside))
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
+        named |= {label: named[s.candidate.label] for s in signatures for label in s.same}
         signatures.sort(key=lambda s: -s.score.gain)
         return Round(base, signatures, named, aside)
 
@@ -370,28 +371,22 @@ class Search:
         most = max((s.score.gain for s in promising), default=0.0)
         for item in promising:
             explained = self.explained(base, current.fitted)
-            if explained and item.score.gain < RIVAL * most:
-                continue
-            fitted = self.refit(base, item, again=not explained)
-            if fitted is None:
-                continue
-            fitted.p_value = current.corrected[item.candidate.label]
-            fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
-            current.fitted.append(fitted)
-            self.say(
-                f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
-                f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
-            )
+            if not explained or item.score.gain >= RIVAL * most:
+                self.tried(base, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         # quick fits are too far from their minima to be told apart
         done: list[Fitted] = []
         self.finish(base, current, [f for f in current.fitted if self.accepted(base, f)], done)
         current.winner = self.chosen(base, current)
         if current.winner is not None:
-            name = current.winner.effects[-1].effect
+            for item in self.kin(current):
+                self.tried(base, current, item, again=False)
+            name, place = current.winner.effects[-1].effect, current.winner.effects[-1].place
             rest = [f for f in current.fitted if all(f is not d for d in done)]
-            rest = [f for f in rest if f.effects[-1].effect == name and self.accepted(base, f)]
-            if rest:  # the same elsewhere: thoroughly, too, before a place is named
+            rest = [f for f in rest if self.accepted(base, f) and (
+                f.effects[-1].effect == name
+                or f.effects[-1].place == place and more_general(current.winner, f))]  # fmt: skip
+            if rest:  # the same elsewhere and simpler ones: thoroughly, too, before one is named
                 self.finish(base, current, rest, done)
                 current.winner = self.chosen(base, current)
         if current.winner is not None:
@@ -407,6 +402,36 @@ class Search:
             ]  # fmt: skip
         self.rounds.append(current)
         return current
+
+    def tried(self, base: Fitted, current: Round, item: Signature, *, again: bool) -> None:
+        """Refit a candidate and note what that gains."""
+        fitted = self.refit(base, item, again=again)
+        if fitted is None:
+            return
+        fitted.p_value = current.corrected[item.candidate.label]
+        fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
+        current.fitted.append(fitted)
+        self.say(
+            f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
+            f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
+        )
+
+    def kin(self, current: Round) -> list[Signature]:
+        """Twins of what was fitted that the winner must be compared with: they have not been.
+
+        To first order they are one, but where an effect explains millions of nats, what differs in
+        the sixth digit tells its place, and a simpler law there from the winner.
+        """
+        winner = current.winner
+        if winner is None or winner.signature is None:
+            return []
+        last, tuned = winner.effects[-1], winner.signature.tuned
+        twins = [t for f in current.fitted if f.signature is not None for t in f.signature.twins]
+        return [
+            t for t in twins
+            if t.candidate.effect == last.effect
+            or (t.candidate.place == last.place and t.tuned < tuned)
+        ]  # fmt: skip
 
     def retried(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model fitted from nominal values, as the first one was, if that leads farther.

@@ -72,7 +72,7 @@ class Signature:
         absorbed: share of the signature's energy that calibration absorbs.
         second: value of the effect's second parameter (see `Parameter.mix`).
         fixed: its parameters that have another value than its FMU's.
-        same: labels of candidates with the same signature.
+        twins: candidates with the same signature; fits may still tell them apart.
     """
 
     probe: Probe
@@ -83,7 +83,12 @@ class Signature:
     absorbed: float
     second: float = 0.0
     fixed: dict[str, float] = field(default_factory=dict)
-    same: tuple[str, ...] = ()
+    twins: tuple[Signature, ...] = ()
+
+    @property
+    def same(self) -> tuple[str, ...]:
+        """Labels of the twins."""
+        return tuple(item.candidate.label for item in self.twins)
 
     @property
     def candidate(self) -> Candidate:
@@ -511,7 +516,7 @@ def merge(signatures: list[Signature]) -> list[Signature]:
                 continue
             # 1e-6: cosine between float32 signatures of the same simulation
             if abs(float(item.change @ other.change)) / (size * norm) > 1.0 - 1e-6:
-                other.same = (*other.same, item.candidate.label)
+                other.twins = (*other.twins, item)
                 break
         else:
             kept.append((item, coarse, size))

@@ -29,7 +29,9 @@ TAU_C = Quantity(
 EXCESS = Quantity("r", "1", "breakaway torque over the sliding one, less 1", start=0.3, minimum=0.0)
 W_S = Quantity("w_s", "rad/s", "speed over which that excess decays", start=0.1, minimum=1e-6)
 LENGTH = Quantity("x_0", "rad", "deflection at the sliding torque", start=5e-4, minimum=1e-9)
-DAMPING = Quantity("t_d", "s", "damping of the stuck bristle over its stiffness", start=2e-3)
+DAMPING = Quantity(
+    "t_d", "s", "damping of the stuck bristle over its stiffness", start=2e-3, minimum=0.0
+)
 DEFLECTION = Quantity("z", "1", "deflection of the bristle over x_0")
 
 EFFECT = Effect(

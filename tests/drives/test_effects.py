@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sources.function import Oracle
-from sources.model import ModelError
+from sources.model import ModelError, Role
 from sources.variant import build_model
 from tests.drives.closed_drive import ClosedDrive
 
@@ -295,3 +295,42 @@ def test_friction_of_either_sign_never_drives(
     # rounding of accelerations near 50 rad/s2
     assert torque == pytest.approx(law(strength, speed), rel=1e-9, abs=1e-12)
     assert torque * speed <= 1e-12
+
+
+DISSIPATIVE = {
+    "asymmetric_coulomb": "inertia/disc",
+    "asymmetric_viscous": "inertia/disc",
+    "battery_sag": "dc_motor/electrical",
+    "bearing_drag": "inertia/disc",
+    "bristle": "inertia/disc",
+    "coulomb": "inertia/disc",
+    "load_friction": "inertia/disc",
+    "quadratic_drag": "inertia/disc",
+    "stribeck": "inertia/disc",
+    "temperature_drift": "inertia/disc",
+    "viscous": "inertia/disc",
+}
+
+
+@pytest.mark.parametrize("effect", DISSIPATIVE)
+def test_no_permitted_parameter_makes_a_loss_a_gain(effect: str) -> None:
+    """A fit may go anywhere between the bounds: a source of energy makes a limit cycle there."""
+    random = np.random.default_rng(5)
+    plain = build_model(DISSIPATIVE[effect])
+    model = build_model(f"{DISSIPATIVE[effect]}+{effect}")
+    with_effect, without = Oracle(model), Oracle(plain)
+    roles: tuple[Role, ...] = ("state", "discrete", "input", "parameter")
+    known = {v.name for role in roles for v in plain.of_role(role)}
+    lost = []
+    for _ in range(200):
+        point = {}
+        for v in (v for role in roles for v in model.of_role(role)):
+            span = 3.0 * (abs(v.start) or 1.0)
+            low, high = v.quantity.minimum, v.quantity.maximum
+            low = -span if low is None else low
+            point[v.name] = random.uniform(low, low + 2.0 * span if high is None else high)
+        if f"{effect}.h" in point:  # the share of warmth
+            point[f"{effect}.h"] = random.uniform()
+        shared = {k: v for k, v in point.items() if k in known}
+        lost.append(with_effect.outputs(point)["P_loss"] - without.outputs(shared)["P_loss"])
+    assert min(lost) > -1e-9 * max(lost) and max(lost) > 0.0  # rounding
