@@ -26,7 +26,8 @@ from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 
 Vector = NDArray[np.float64]
-SHEET = Path(__file__).parents[1] / "scenarios/mobile_manipulator_bench/data/mobile_manipulator.toml"
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SHEET = SCENARIOS / "mobile_manipulator_bench/data/mobile_manipulator.toml"
 PERIOD = 0.01
 SWIVEL, FLOOR = "base.caster.swivel.coulomb.tau_c", "base.caster.floor.pivot_torque.M_pa"
 EFFECTS = (("coulomb", "base.caster.swivel"), ("pivot_torque", "base.caster.floor"))

@@ -20,17 +20,15 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates, new_parameters
 from .deferred import corrected, step_error
-from .linear import MATERIAL, Absorber, Layout, Score, holm, score
+from .judge import Judge
+from .linear import MATERIAL, Absorber, Layout, holm
 from .models import GATE, LEVEL, Fitted, compare, more_general
 from .probes import batches
 from .secant import FLOOR, Bench, Signature, merge, model_values, patience, worthy
-from .structure import structures
 
 Vector = NDArray[np.float64]
 NEARLY = 0.7
 """Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
-RIVAL_Z = 2.0
-"""Below this many standard deviations two explanations count as equal."""
 REFITS = 6
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
@@ -41,12 +39,9 @@ this share of what the best one gains, and at most so many: members must not cro
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
-FAR = 4.0
-"""Mean square over the noise's from which a model is far off: its parameters then stand where they
-made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
-EXPLAINED, RIVAL = 0.98, 0.5
-"""Where a candidate explains this share of what a model leaves beyond noise, those that gain less
-than the second share of the best gain to first order are no rivals."""
+RIVAL = 0.5
+"""Where a candidate explains nearly all, those that gain less than this share of what the best one
+gains to first order are no rivals."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -75,7 +70,7 @@ class Round:
     rivals: list[Fitted] = field(default_factory=list)
 
 
-class Search:
+class Search(Judge):
     """Attribution on one problem.
 
     Args:
@@ -88,21 +83,14 @@ class Search:
         self, problem: Problem, say: Say = lambda text: None, only: list[Candidate] | None = None
     ) -> None:
         self.say = say
-        self.declared = self.raw = problem
+        super().__init__(problem, CHECK)
+        self.declared = problem
         self.whole = only is None
         self.known = candidates(problem) if only is None else only
         self.evaluations = 0
         self.rounds: list[Round] = []
         self.own: dict[str, Sensitivity] | None = None
         self._builder = ThreadPoolExecutor(1)
-        self.fitting = Layout(problem, problem.chosen("identification"))
-        checks = problem.chosen(CHECK) or problem.chosen("identification")
-        self.checking = Layout(problem, checks)
-        self.fit_data = self._data(self.fitting)
-        self.check_data = self._data(self.checking)
-
-    def _data(self, layout: Layout) -> Vector:
-        return layout.vector([run.data / self.declared.sigma for run in layout.runs])
 
     def prepare(self, problem: Problem | None = None) -> None:
         """Have the candidates' FMUs built in the background, while something else is computed.
@@ -279,12 +267,6 @@ class Search:
         ]
         return good[:REFITS] + shared[:WHOLES]
 
-    def explained(self, base: Fitted, fitted: list[Fitted]) -> bool:
-        """Whether one of these models explains nearly all that the base leaves beyond noise."""
-        beyond = base.estimate.cost - 0.5 * base.estimate.count
-        gains = [self.gain(base, f) for f in fitted]
-        return beyond > GATE and max(gains, default=0.0) > EXPLAINED * beyond
-
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.
 
@@ -339,11 +321,6 @@ class Search:
         result.signature = item
         return result
 
-    def far(self, base: Fitted) -> bool:
-        """Whether a model is far off the data, with parameters driven to their bounds."""
-        estimate = base.estimate
-        return 2.0 * estimate.cost > FAR * estimate.count and bool(estimate.at_bound)
-
     def anew(self, problem: Problem, kept: Mapping[str, float], **how: Any) -> Fitted | None:
         """A rough fit from nominal values; None if that cannot be simulated.
 
@@ -377,7 +354,7 @@ class Search:
         # quick fits are too far from their minima to be told apart
         done: list[Fitted] = []
         self.finish(base, current, [f for f in current.fitted if self.accepted(base, f)], done)
-        current.winner = self.chosen(base, current)
+        current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
             for item in self.kin(current):
                 self.tried(base, current, item, again=False)
@@ -385,10 +362,10 @@ class Search:
             rest = [f for f in current.fitted if all(f is not d for d in done)]
             rest = [f for f in rest if self.accepted(base, f) and (
                 f.effects[-1].effect == name
-                or f.effects[-1].place == place and more_general(current.winner, f))]  # fmt: skip
+                or (f.effects[-1].place == place and more_general(current.winner, f)))]  # fmt: skip
             if rest:  # the same elsewhere and simpler ones: thoroughly, too, before one is named
                 self.finish(base, current, rest, done)
-                current.winner = self.chosen(base, current)
+                current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
             drafted = current.winner
             current.winner = self.sharpened(self.retried(drafted, base), base)
@@ -450,10 +427,6 @@ class Search:
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
         return self.again(found, winner, base)
 
-    def lacking(self, fitted: Fitted) -> bool:
-        """Whether a channel still exceeds its noise."""
-        return any(s.structured for s in structures(self.fit_data - fitted.fit, self.fitting))
-
     def finish(
         self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
     ) -> None:
@@ -469,26 +442,6 @@ class Search:
         done += better.values()
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
-
-    def chosen(self, base: Fitted, current: Round) -> Fitted | None:
-        """The best model of a round that unused runs want, None if there is none."""
-        best = next((f for f in current.fitted if self.accepted(base, f)), None)
-        return None if best is None else self.simplest(base, best, current.fitted)
-
-    def accepted(self, base: Fitted, fitted: Fitted) -> bool:
-        """Whether unused runs want it, and it is worth a cause."""
-        return fitted.gate is not None and fitted.gate.passed and self.material(base, fitted)
-
-    def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
-        """What explains the data as well as the best one, at the same place, by fewer parameters.
-
-        A law with a parameter more often does better by a hair where the simpler one is true.
-        """
-        simpler = [
-            f for f in fitted
-            if self.accepted(base, f) and more_general(best, f) and not self.apart(f, best)
-        ]  # fmt: skip
-        return min(simpler, key=lambda f: f.free, default=best)
 
     def refined(self, base: Fitted, fitted: Fitted) -> Fitted:
         """The fit with all parameters of its last effect free, if unused runs want that."""
@@ -545,38 +498,3 @@ class Search:
                 self.say(f"dropped again: {effect.label}")
                 return self.eliminated(less)
         return fitted
-
-    def material(self, base: Fitted, other: Fitted) -> bool:
-        """Whether the step between two models is large enough to be worth a cause.
-
-        On a rig that acts in ticks, a time shorter than a tick says when within the tick something
-        is read, and not that anything is missing.
-        """
-        last = other.signature.strength if other.signature is not None else None
-        tick = self.raw.step if self.raw.ticks else 0.0
-        if last is not None and last.unit == "s" and other.estimate.values[last.name] < tick:
-            return False
-        return any(
-            layout.largest(second - first) > MATERIAL
-            for first, second, layout in (
-                (base.fit, other.fit, self.fitting), (base.check, other.check, self.checking)
-            )
-        )  # fmt: skip
-
-    def gain(self, base: Fitted, other: Fitted) -> float:
-        """Log likelihood gained on the identification runs, less one per additional parameter."""
-        return base.estimate.cost - other.estimate.cost - (other.free - base.free)
-
-    def total(self, base: Fitted, other: Fitted) -> float:
-        """Log likelihood gained on all runs."""
-        return self.gain(base, other) + (other.gate.gain if other.gate is not None else 0.0)
-
-    def apart(self, first: Fitted, second: Fitted) -> bool:
-        """Whether the runs tell two models apart."""
-        checked = compare(self.check_data, first.check, second.check, self.checking)
-        fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
-        return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
-
-    def test(self, first: Fitted, second: Fitted) -> Score:
-        """Score of the step between two models on unused runs."""
-        return score(second.check - first.check, self.check_data - first.check, self.checking, 0)

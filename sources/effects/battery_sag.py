@@ -17,7 +17,12 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 R_B = Quantity(
-    "r_b", "ohm", "inner resistance of the supply, 0 = absent", start=0.1, minimum=0.0, strength=True
+    "r_b",
+    "ohm",
+    "inner resistance of the supply, 0 = absent",
+    start=0.1,
+    minimum=0.0,
+    strength=True,
 )
 U_0 = Quantity("u_0", "V", "supply voltage without load", start=48.0, minimum=1e-3)
 
