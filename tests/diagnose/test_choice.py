@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -49,3 +49,23 @@ def test_a_group_that_gains_little_is_no_rival(monkeypatch: pytest.MonkeyPatch) 
     found = chosen({**gains, "coulomb at base.caster.swivel": 40.0}, monkeypatch)
     assert len(found) == REFITS
     assert "coulomb at base.caster.swivel" not in found
+
+
+def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> None:
+    def signature(effect: str, place: str, tuned: int, *twins: Any) -> Any:
+        candidate = SimpleNamespace(effect=effect, place=place)
+        return SimpleNamespace(candidate=candidate, tuned=tuned, twins=twins)
+
+    def model(item: Any) -> Any:
+        return SimpleNamespace(effects=(item.candidate,), signature=item)
+
+    simpler = signature("coulomb", "load.flange", 0)
+    general = signature("asymmetric_coulomb", "load.flange", 1)
+    same = signature("asymmetric_coulomb", "gearbox.flange_b", 1)
+    others = [signature("stribeck", "gearbox.flange_b", 0), signature("hose", "load.flange", 1)]
+    winner = model(signature("asymmetric_coulomb", "load.flange", 1, same, *others))
+    elsewhere = model(signature("coulomb", "gearbox.flange_a", 0, simpler, general))
+    found: Any = SimpleNamespace(winner=winner, fitted=[winner, elsewhere])
+    assert Search.kin(cast(Any, None), found) == [same, simpler, general]
+    found.winner = elsewhere
+    assert Search.kin(cast(Any, None), found) == [simpler]
