@@ -219,8 +219,9 @@ class _Mapping:
         ]
         present = [c for c in channels if any(self._column(c) in log.columns
                                               for log in self.logs.values())]  # fmt: skip
-        parameters = [*self.declared(), *self.others()]
-        check_parameters(parameters)
+        stated = [*self.declared(), *self.others()]
+        check_parameters(stated)
+        parameters = [p for p in stated if not p.late]
         return Problem(
             self.data.name,
             file,
@@ -236,6 +237,7 @@ class _Mapping:
             ticks=bool(table.get("ticks", False)),
             search=self.search(),
             relative=[tuple(names) for names in self.table.get("relative", [])],
+            late=[p for p in stated if p.late],
         )
 
     def search(self) -> Coarse | None:
@@ -317,6 +319,7 @@ class _Mapping:
                         Parameter(
                             name, entry.get("unit", ""), nominal, low, high, targets,
                             role, run, prior, text=entry.get("description", ""),  # type: ignore[arg-type]
+                            late=bool(entry.get("late", False)),
                         )
                     )  # fmt: skip
         return found

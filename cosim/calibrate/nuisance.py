@@ -22,7 +22,12 @@ from .problem import Problem
 Vector = NDArray[np.float64]
 STEP = 5e-3
 """Step of the differences over the span."""
-STEPS = 4
+STEPS = 8
+SHORTER, SHORTEST = 0.3, 0.05
+"""A step that makes a run worse is tried again with this share of its length, down to the last."""
+RELEASES, RELEASED = 3, 0.01
+"""Times at most that late values are estimated with new derivatives, and the share of the cost that
+each must remove to be followed by another one."""
 ENOUGH = 0.1
 """Fall of the cost [nats] below which a run is settled: far below anything that is decided."""
 
@@ -64,6 +69,7 @@ def settled(
         known = slopes(problem, theta, names)
     own = {name: [i for i in columns if problem.parameters[i].run == name] for name in names}
     costs: dict[str, float] = {}
+    length = dict.fromkeys(names, 1.0)
     best, open_runs = theta.copy(), [name for name in names if own[name]]
     for _ in range(STEPS):
         going: list[str] = []
@@ -74,12 +80,55 @@ def settled(
                 costs[name], best[own[name]] = cost, theta[own[name]]
             if fallen > ENOUGH:
                 going.append(name)
-                theta[own[name]] += _step(problem, theta, residual, known[name], own[name])
+                step = _step(problem, theta, residual, known[name], own[name])
+                theta[own[name]] += length[name] * step
+            elif fallen < -ENOUGH and length[name] > SHORTEST:
+                going.append(name)
+                length[name] *= SHORTER
+                theta[own[name]] = best[own[name]] + SHORTER * (theta - best)[own[name]]
         theta = np.clip(theta, problem.lower, problem.upper)
         open_runs = going
         if not going:
             break
     return best
+
+
+def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
+    """Estimate the late parameters of every run, with its other own values.
+
+    Such values may move the model far from linearly, start angles of casters for instance, which
+    turn over after an unstable moment. In a joint fit one such run would hold up all parameters;
+    run by run, with steps that are shortened until they help, it harms none.
+
+    Returns:
+        The problem with these parameters held at what was found, all its values, and the fall of
+        the cost [nats].
+    """
+    known = {run.name: run.starts for run in problem.runs}
+    start = [
+        next((known[p.run][n] / f for n, f in p.targets if n in known[p.run]), p.nominal)
+        for p in problem.late
+    ]
+    whole = problem.with_parameters([*problem.parameters, *problem.late])
+    names = [run.name for run in problem.runs]
+    first = np.clip(np.concatenate([theta, start]), whole.lower, whole.upper)
+    values = first
+    before = _costs(whole, first, names)
+    cost = before
+    for _ in range(RELEASES):
+        values = settled(whole, values, names)
+        after = _costs(whole, values, names)
+        if not after < cost - RELEASED * before:
+            break
+        cost = after
+    whole.close()
+    kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
+    return whole.hold(kept), values[: theta.size], before - after
+
+
+def _costs(problem: Problem, theta: Vector, names: list[str]) -> float:
+    own = {name: concerned(problem, [name]) for name in names}
+    return sum(_cost(problem, theta, r, own[name]) for name, r in problem.residuals(theta, names))
 
 
 def _cost(problem: Problem, theta: Vector, residual: Vector, own: list[int]) -> float:

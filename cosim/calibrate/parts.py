@@ -53,6 +53,7 @@ class Parameter:
         tries: values that a search should try.
         visits: variable of the system among whose values along a run the right one is.
         mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
+        late: held, and estimated run by run once a model explains the data (`nuisance.released`).
     """
 
     name: str
@@ -71,6 +72,7 @@ class Parameter:
     mix: str = ""
     tries: tuple[float, ...] = ()
     visits: str = ""
+    late: bool = False
 
     def set(self, value: float) -> dict[str, float]:
         """Full variable name -> value."""

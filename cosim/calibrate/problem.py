@@ -68,6 +68,7 @@ class Problem:
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
+        late: parameters of single runs that are held until `nuisance.released` estimates them.
 
     Attributes:
         evaluations: simulated runs so far.
@@ -93,13 +94,14 @@ class Problem:
         ticks: bool = False,
         search: Coarse | None = None,
         relative: Sequence[Sequence[str]] = (),
+        late: Sequence[Parameter] = (),
     ) -> None:
         self.ticks, self.search = ticks, search or Coarse(step)
         self.search_step = self.search.step
         self.name, self.file, self.provider = name, file, provider
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
-        self.relative = tuple(relative)
+        self.relative, self.late = tuple(relative), tuple(late)
         self.constants = dict(constants or {})
         self.step, self.algorithm, self.period = step, algorithm, period
         self.instances = dict(instances or file.instances)
@@ -414,6 +416,7 @@ class Problem:
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
             "ticks": self.ticks, "search": self.search, "relative": self.relative,
+            "late": self.late,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)

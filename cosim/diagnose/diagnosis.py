@@ -306,7 +306,8 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
                 elif other not in after.effects:
                     different.append(rival)
             if stage.winner.signature is not None:
-                for label in stage.winner.signature.same:
+                tried = {f.effects[-1].label for f in stage.fitted}
+                for label in set(stage.winner.signature.same) - tried:
                     result.places.setdefault(added.label, []).append(label)
         result.rivals = different
         names = " and ".join(c.label for c in after.effects)

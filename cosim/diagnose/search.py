@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import Known, fit
-from ..calibrate.nuisance import settled, slopes
+from ..calibrate.nuisance import released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
 from ..errors import CosimError
@@ -42,6 +42,8 @@ second share counts where the model before was far off."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
 gains to first order are no rivals."""
+WORTH = 0.05
+"""Late values are kept if they remove this share of what a model leaves beyond noise."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -368,7 +370,7 @@ class Search(Judge):
                 current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
             drafted = current.winner
-            current.winner = self.sharpened(self.retried(drafted, base), base)
+            current.winner = self.sharpened(self.released(self.retried(drafted, base), base), base)
             current.fitted = [current.winner if f is drafted else f for f in current.fitted]
             if self.whole:
                 self.prepare(current.winner.problem)
@@ -425,6 +427,21 @@ class Search(Judge):
         if found is None or not found.estimate.cost < winner.estimate.cost - GATE:
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
+        return self.again(found, winner, base)
+
+    def released(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model with late values of the runs (start angles of casters) estimated, if it helps.
+
+        The effect may be what makes them matter: dry friction keeps casters where they were.
+        """
+        if not self.raw.late or not self.lacking(winner):
+            return winner
+        problem = corrected(winner.problem, winner.estimate.theta, self.raw)
+        problem, theta, fall = released(problem, winner.estimate.theta)
+        if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
+            return winner
+        self.say(f"start values of the runs estimated: {fall:.0f} nats")
+        found = self.judged(fit(problem, theta, rough=True, limit=6, robust=True))
         return self.again(found, winner, base)
 
     def finish(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.calibrate.nuisance import settled
+from cosim.calibrate.nuisance import released, settled, slopes
 from cosim.calibrate.parts import Parameter
 from cosim.calibrate.problem import Problem
 
@@ -45,3 +45,38 @@ def test_a_prior_holds_it_back(short: Problem, truth: np.ndarray) -> None:
 def test_runs_without_such_values_are_left_alone(short: Problem, truth: np.ndarray) -> None:
     problem, theta = shifted(short, truth, None)
     assert np.array_equal(settled(problem, theta, ["sines"]), theta)
+
+
+def test_late_values_are_held_at_what_each_run_says(short: Problem, truth: np.ndarray) -> None:
+    problem, theta = shifted(short, truth, 0.1)
+    own = problem.parameters[-1]
+    runs = [replace(r, starts={**r.starts, "encoder.theta": 0.0}) for r in problem.runs]
+    waiting = problem.with_parameters(problem.parameters[:-1])._with(late=[own], runs=runs)
+    result, values, fall = released(waiting, theta[:-1])
+    assert np.array_equal(values, theta[:-1]) and result.names == waiting.names
+    # relative: the prior of five times the shift pulls a little
+    assert result.run("check").starts["encoder.theta"] == pytest.approx(SHIFT, rel=1e-3)
+    assert result.run("sines").starts == waiting.run("sines").starts
+    before, after = (
+        sum(float(np.nansum(r**2)) for _, r in p.residuals(values, ["check"]))
+        for p in (waiting, result)
+    )
+    assert after < 1e-6 * before
+    assert fall == pytest.approx(0.5 * before, rel=1e-3)  # the prior's own 0.02 nats
+    again, _, more = released(result, values)
+    assert again.run("check").starts["encoder.theta"] == pytest.approx(SHIFT, rel=1e-3)
+    assert abs(more) < 1e-3 * fall
+
+
+def test_a_step_that_makes_a_run_worse_is_shortened(short: Problem, truth: np.ndarray) -> None:
+    """Derivatives that are ten times too small ask for ten times the step."""
+    problem, theta = shifted(short, truth, None)
+    known = slopes(problem, theta, ["check"])
+    wrong = {n: item._replace(values=0.1 * item.values) for n, item in known.items()}
+    run = problem.run("check")
+
+    def square(values: np.ndarray) -> float:
+        return float(np.nansum((run.data - problem.simulate(values, run)) ** 2))
+
+    found = settled(problem, theta, ["check"], wrong)
+    assert square(found) < 0.1 * square(theta)  # a tenth of a full step is shorter than 0.3^2

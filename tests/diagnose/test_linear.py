@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosim.diagnose.judge import OUTLYING, outlying
 from cosim.diagnose.linear import Absorber, Layout, holm, score
 from cosim.diagnose.models import GATE, compare, more_general
 from cosim.diagnose.search import Search
@@ -114,3 +115,11 @@ def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
     # rounding of the float32 basis
     assert held.rest(first) == pytest.approx(across, abs=1e-4)
     assert held.change(first)[0] == 0.0
+
+
+def test_outlying_residuals_count_linearly() -> None:
+    residual = np.array([0.0, -9.0, OUTLYING, -12.0, 500.0])
+    huber = 0.5 * float(residual @ residual) - outlying(residual)
+    linear = OUTLYING * (12.0 + 500.0) - OUTLYING**2
+    assert huber == pytest.approx(0.5 * (81.0 + OUTLYING**2) + linear, rel=1e-12)
+    assert outlying(np.array([9.9, -9.9])) == 0.0

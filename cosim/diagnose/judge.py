@@ -1,0 +1,124 @@
+"""Judgement of fitted models on the runs of one problem: which is better, and by enough."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.problem import Problem
+from .linear import MATERIAL, Layout, Score, score
+from .models import GATE, Fitted, compare, more_general
+from .structure import structures
+
+Vector = NDArray[np.float64]
+RIVAL_Z = 2.0
+"""Below this many standard deviations two explanations count as equal."""
+FAR = 4.0
+"""Mean square over the noise's from which a model is far off: its parameters then stand where they
+made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
+OUTLYING = 10.0
+"""Residuals over sigma that count linearly in a comparison: no noise is that large."""
+EXPLAINED = 0.98
+"""Share of what a model leaves beyond noise from which a candidate explains nearly all of it."""
+
+
+def outlying(residual: Vector) -> float:
+    """What squares count more than Huber's function does, beyond `OUTLYING` sigma [nats]."""
+    over = np.maximum(np.abs(residual) - OUTLYING, 0.0)
+    return 0.5 * float(over @ over)
+
+
+class Judge:
+    """Measured data over sigma, and what they say about models.
+
+    Args:
+        problem: the data as measured.
+        check: purpose of the runs that are not used for fitting.
+    """
+
+    def __init__(self, problem: Problem, check: str) -> None:
+        self.raw = problem
+        self.fitting = Layout(problem, problem.chosen("identification"))
+        checks = problem.chosen(check) or problem.chosen("identification")
+        self.checking = Layout(problem, checks)
+        self.fit_data = self._data(self.fitting)
+        self.check_data = self._data(self.checking)
+
+    def _data(self, layout: Layout) -> Vector:
+        return layout.vector([run.data / self.raw.sigma for run in layout.runs])
+
+    def lacking(self, fitted: Fitted) -> bool:
+        """Whether a channel still exceeds its noise."""
+        return any(s.structured for s in structures(self.fit_data - fitted.fit, self.fitting))
+
+    def accepted(self, base: Fitted, fitted: Fitted) -> bool:
+        """Whether unused runs want it, and it is worth a cause."""
+        return fitted.gate is not None and fitted.gate.passed and self.material(base, fitted)
+
+    def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
+        """What explains the data as well as the best one, at the same place, by fewer parameters.
+
+        A law with a parameter more often does better by a hair where the simpler one is true.
+        """
+        simpler = [
+            f for f in fitted
+            if self.accepted(base, f) and more_general(best, f) and not self.apart(f, best)
+        ]  # fmt: skip
+        return min(simpler, key=lambda f: f.free, default=best)
+
+    def material(self, base: Fitted, other: Fitted) -> bool:
+        """Whether the step between two models is large enough to be worth a cause.
+
+        On a rig that acts in ticks, a time shorter than a tick says when within the tick something
+        is read, and not that anything is missing.
+        """
+        last = other.signature.strength if other.signature is not None else None
+        tick = self.raw.step if self.raw.ticks else 0.0
+        if last is not None and last.unit == "s" and other.estimate.values[last.name] < tick:
+            return False
+        return any(
+            layout.largest(second - first) > MATERIAL
+            for first, second, layout in (
+                (base.fit, other.fit, self.fitting), (base.check, other.check, self.checking)
+            )
+        )  # fmt: skip
+
+    def gain(self, base: Fitted, other: Fitted) -> float:
+        """Log likelihood gained on the identification runs, less one per additional parameter.
+
+        Residuals beyond `OUTLYING` sigma count linearly (Huber): where a run turns unstable,
+        squares of hundreds of sigma would decide, and not the rest of all runs.
+        """
+        costs = [f.estimate.cost - outlying(self.fit_data - f.fit) + f.free for f in (base, other)]
+        return costs[0] - costs[1]
+
+    def total(self, base: Fitted, other: Fitted) -> float:
+        """Log likelihood gained on all runs."""
+        return self.gain(base, other) + (other.gate.gain if other.gate is not None else 0.0)
+
+    def apart(self, first: Fitted, second: Fitted) -> bool:
+        """Whether the runs tell two models apart."""
+        checked = compare(self.check_data, first.check, second.check, self.checking)
+        fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
+        return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
+
+    def test(self, first: Fitted, second: Fitted) -> Score:
+        """Score of the step between two models on unused runs."""
+        return score(second.check - first.check, self.check_data - first.check, self.checking, 0)
+
+    def far(self, base: Fitted) -> bool:
+        """Whether a model is far off the data, with parameters driven to their bounds."""
+        estimate = base.estimate
+        return 2.0 * estimate.cost > FAR * estimate.count and bool(estimate.at_bound)
+
+    def explained(self, base: Fitted, fitted: list[Fitted]) -> bool:
+        """Whether one of these models explains nearly all that the base leaves beyond noise."""
+        noise = 0.5 * base.estimate.count
+        beyond = base.estimate.cost - outlying(self.fit_data - base.fit) - noise
+        gains = [self.gain(base, f) for f in fitted]
+        return beyond > GATE and max(gains, default=0.0) > EXPLAINED * beyond
+
+    def chosen(self, base: Fitted, fitted: list[Fitted]) -> Fitted | None:
+        """The first of some models, best first, that unused runs want; None if there is none."""
+        best = next((f for f in fitted if self.accepted(base, f)), None)
+        return None if best is None else self.simplest(base, best, fitted)
