@@ -355,7 +355,9 @@ class Search(Judge):
         current.fitted.sort(key=lambda f: -self.total(base, f))
         # quick fits are too far from their minima to be told apart
         done: list[Fitted] = []
-        self.finish(base, current, [f for f in current.fitted if self.accepted(base, f)], done)
+        share = LOOSE if self.far(base) else CLOSE
+        good = [f for f in current.fitted if self.accepted(base, f)]
+        self.finish(base, current, good, done, share)
         current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
             for item in self.kin(current):
@@ -366,7 +368,7 @@ class Search(Judge):
                 f.effects[-1].effect == name
                 or (f.effects[-1].place == place and more_general(current.winner, f)))]  # fmt: skip
             if rest:  # the same elsewhere and simpler ones: thoroughly, too, before one is named
-                self.finish(base, current, rest, done)
+                self.finish(base, current, rest, done, CLOSE)
                 current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
             drafted = current.winner
@@ -445,10 +447,17 @@ class Search(Judge):
         return self.again(found, winner, base)
 
     def finish(
-        self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted]
+        self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted], share: float
     ) -> None:
-        """Replace the first few quick fits by thorough ones; `done` gets these."""
-        share = LOOSE if self.far(base) else CLOSE
+        """Replace the first few quick fits by thorough ones; `done` gets these.
+
+        Args:
+            base: model without the effects.
+            current: round whose fits are replaced.
+            chosen: quick fits, best first.
+            done: thorough ones so far.
+            share: of the best gain, below which a quick fit stays one.
+        """
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         near = [f for f in chosen if self.total(base, f) > least][:REFINED]
         rivals = len(near) + len(done) > 1
