@@ -104,6 +104,7 @@ class Diagnosis:
             "proposed_experiment": self.experiment,
             "channels": {},
             "parameters": self.parameters(),
+            "start_values": self.start_values(),
             "structure": {
                 f"{which} {purpose}": [s.to_dict() for s in tests]
                 for (which, purpose), tests in self.structure.items()
@@ -143,6 +144,18 @@ class Diagnosis:
                     "identifiable": bool(estimate.identifiable[i]),
                 }
         return table
+
+    def start_values(self) -> dict[str, dict[str, float]]:
+        """Late values that were estimated, by run."""
+        found: dict[str, dict[str, float]] = {}
+        if self.after is not None:
+            for p in self.after.problem.late:
+                starts = self.after.problem.run(p.run).starts
+                for name, factor in p.targets[:1]:
+                    if name in starts:
+                        short = p.name.partition("@")[0]
+                        found.setdefault(p.run, {})[short] = starts[name] / factor
+        return found
 
     def effects(self) -> list[dict[str, Any]]:
         """The effects that were found."""

@@ -64,6 +64,7 @@ def page(result: Diagnosis) -> str:
         _effects(table["effects"]),
         _errors(result, table),
         _parameters(table["parameters"]),
+        _starts(table["start_values"]),
         _measured(result),
         _residuals(result),
         _located(result),
@@ -183,6 +184,16 @@ def _parameters(parameters: dict[str, Any]) -> str:
         rows.append(cells)
     return "<h2>Parameters</h2>" + _table(
         ["parameter", "unit", "before", "95 % interval", "after", "95 % interval"], rows
+    )
+
+
+def _starts(values: dict[str, dict[str, float]]) -> str:
+    if not values:
+        return ""
+    names = list(next(iter(values.values())))
+    return "<p>Start values, estimated run by run:</p>" + _table(
+        ["run", *names],
+        [[_td(run), *(_td(_number(own[n])) for n in names)] for run, own in values.items()],
     )
 
 

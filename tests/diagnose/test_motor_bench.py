@@ -6,16 +6,19 @@ import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.motor_plant import Bench, draw, write_sets
 from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.parts import Parameter
 from cosim.diagnose.candidates import Candidate, candidates
-from cosim.diagnose.diagnosis import _searched
+from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.search import Round, Search
-from cosim.report.page import page
+from cosim.report.page import _starts, page
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 SIZE = 0.15
@@ -99,3 +102,18 @@ def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, P
     stage = search.scored(search.calibrated())
     assert [s.unseen for s in stage.signatures] == [True]
     assert isinstance(viscous[0], Candidate)
+
+
+def test_start_values_that_were_estimated_are_reported(sets: dict[str, Path]) -> None:
+    problem = read_problem(sets["clean"], workers=2)
+    late = [
+        Parameter(f"theta_0@{run.name}", "rad", 0.0, -1.0, 1.0, (("encoder.theta", 2.0),),
+                  "nuisance", run.name, late=True)
+        for run in problem.runs
+    ]  # fmt: skip
+    own = problem.with_parameters([*problem.parameters, late[0]])
+    after: Any = SimpleNamespace(problem=own.hold({late[0].name: 0.125})._with(late=late[:1]))
+    found = Diagnosis(problem, "effect_found", "", after=after).start_values()
+    assert found == {problem.runs[0].name: {"theta_0": 0.125}}
+    assert "theta_0" in _starts(found) and "0.125" in _starts(found)
+    assert _starts({}) == ""
