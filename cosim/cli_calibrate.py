@@ -40,7 +40,7 @@ def calibrate_command(
 ) -> None:
     """Estimate the declared parameters of a system from measured runs.
 
-    Example: `cosim calibrate data/MB-12 --out out/MB-12`
+    Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)

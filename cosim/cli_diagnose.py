@@ -33,7 +33,7 @@ def diagnose_command(
 ) -> None:
     """Find what a model lacks: calibrate, test, attribute, add the effect, judge on unused runs.
 
-    Example: `cosim diagnose data/MB-12 --out out/MB-12`
+    Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
     folder = out or Path("out") / problem.name
