@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -26,10 +27,12 @@ def environment() -> dict[str, str]:
 
 def run(client: str, path: Path, step: float, count: int, names: list[str]) -> np.ndarray:
     """One row per step, one column per name."""
-    done = subprocess.run(
-        [sys.executable, __file__, client, str(path), repr(step), str(count), *names],
-        capture_output=True, text=True, timeout=120, env=environment(),
-    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:  # what ecos unpacks and leaves
+        done = subprocess.run(
+            [sys.executable, __file__, client, str(path), repr(step), str(count), *names],
+            capture_output=True, text=True, timeout=120,
+            env={**environment(), "TMPDIR": folder},
+        )  # fmt: skip
     if done.returncode:
         raise RuntimeError(f"{client}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
     return np.array(json.loads(done.stdout.splitlines()[-1]))
