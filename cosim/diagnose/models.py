@@ -12,7 +12,7 @@ from ..calibrate.estimate import Estimate
 from ..calibrate.problem import Problem
 from .candidates import Candidate
 from .linear import Layout
-from .secant import Signature
+from .signature import Signature
 
 Vector = NDArray[np.float64]
 LEVEL = 0.01

@@ -24,7 +24,8 @@ from .judge import Judge
 from .linear import MATERIAL, Absorber, Layout, holm
 from .models import GATE, LEVEL, Fitted, compare, more_general
 from .probes import batches
-from .secant import FLOOR, Bench, Signature, merge, model_values, patience, worthy
+from .secant import FLOOR, Bench, model_values, patience
+from .signature import Signature, merge, worthy
 
 Vector = NDArray[np.float64]
 NEARLY = 0.7

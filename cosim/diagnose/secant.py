@@ -15,27 +15,20 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate
-from .linear import ABSORBED, MATERIAL, Absorber, Layout, Score, score
+from .linear import MATERIAL, Absorber, Layout, score
 from .probes import Batch, Probe, batches
+from .signature import EVIDENT, SHARE, Signature
 from .visits import visited
 
 Vector = NDArray[np.float64]
 Item = TypeVar("Item")
 VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
-EVIDENT, SHARE = 3.0, 0.02
-"""A candidate whose first simulation gains less than 3 nats (noise does, in one of a hundred),
-or less than 1/50 of what the best one gains, is not simulated again."""
 WORTH = 0.5
 """Share of `MATERIAL` that a candidate must promise, to first order, for another simulation."""
-KEPT = 40
-"""Candidates that go from one run to all of them at most."""
-HIDDEN = 0.98
-"""Share of a signature beyond which one run cannot tell it from other parameters."""
 TRIALS, NEAR = 3, 0.3
 """Trials at most; a strength this close to one that was tried is not tried again."""
 FLOOR = 1e-3
@@ -46,9 +39,6 @@ RUNAWAY = 1e15
 PATIENCE = 10.0
 """Times as long as without the effect: a fidelity with more states takes a few times as long, and
 what takes longer is an instability that a solver tries to resolve."""
-STRETCH, COARSE = 64, 0.03
-"""Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
-8 times that, and rounding."""
 SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
 """Values of a second parameter between which all others are mixed, by its kind."""
 PLACES = 24
@@ -57,63 +47,6 @@ FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
-
-
-@dataclass
-class Signature:
-    """What a candidate does to the model values.
-
-    Attributes:
-        probe: the candidate in the system that was simulated.
-        value: strength at which the secant was taken.
-        change: model values over sigma with the effect less those without (float32).
-        rest: what of it calibration cannot absorb.
-        score: of `rest` against the residual.
-        absorbed: share of the signature's energy that calibration absorbs.
-        second: value of the effect's second parameter (see `Parameter.mix`).
-        fixed: its parameters that have another value than its FMU's.
-        twins: candidates with the same signature; fits may still tell them apart.
-    """
-
-    probe: Probe
-    value: float
-    change: NDArray[np.float32]
-    rest: NDArray[np.float32]
-    score: Score
-    absorbed: float
-    second: float = 0.0
-    fixed: dict[str, float] = field(default_factory=dict)
-    twins: tuple[Signature, ...] = ()
-
-    @property
-    def same(self) -> tuple[str, ...]:
-        """Labels of the twins."""
-        return tuple(item.candidate.label for item in self.twins)
-
-    @property
-    def candidate(self) -> Candidate:
-        """Which."""
-        return self.probe.candidate
-
-    @property
-    def tuned(self) -> int:
-        """How many of its parameters were chosen besides the strength."""
-        return len(self.fixed) + bool(self.probe.mix)
-
-    @property
-    def strength(self) -> Parameter:
-        """Its strength parameter."""
-        return self.probe.strength
-
-    @property
-    def asked(self) -> Vector:
-        """What calibration cannot absorb, at the strength that the residual asks for."""
-        return np.asarray(self.score.amplitude * self.rest, dtype=np.float64)
-
-    @property
-    def unseen(self) -> bool:
-        """Whether calibration absorbs it, or the runs do not show it at all."""
-        return self.absorbed > 1.0 - ABSORBED or self.score.size == 0.0
 
 
 class Bench:
@@ -460,21 +393,6 @@ def _shared(trials: list[Trials]) -> list[Trials]:
     return [t for t in trials if t.rough]
 
 
-def worthy(found: Sequence[Signature]) -> list[Signature]:
-    """Of candidates seen in one run, those worth a simulation of all runs, the best first.
-
-    What calibration absorbs in this run alone may still tell something in all of them together.
-    """
-    best = max((s.score.gain for s in found), default=0.0)
-    kept = [
-        s
-        for s in found
-        if s.score.gain > max(EVIDENT, SHARE * best) or (s.score.size > 0.0 and s.absorbed > HIDDEN)
-    ]
-    kept.sort(key=lambda s: -s.score.gain)
-    return kept[:KEPT]
-
-
 def _mismatch(item: Signature) -> float:
     """How far the strength of the trial is from the one that the residual asks for."""
     return abs(float(np.log(max(item.score.amplitude, 1e-6))))
@@ -493,31 +411,3 @@ def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:
         run.data / problem.sigma - r for run, (_, r) in zip(layout.runs, residuals, strict=True)
     ]
     return layout.vector(rows)
-
-
-def merge(signatures: list[Signature]) -> list[Signature]:
-    """Leave one of those whose signatures are the same up to a factor, the first one.
-
-    Args:
-        signatures: simpler ones first, lest one turn of a ripple stand for an unbalance.
-    """
-    kept: list[tuple[Signature, NDArray[np.float32], float]] = []
-    for item in signatures:
-        # sums over stretches are quick to compare, and differ where signatures do
-        coarse = np.add.reduceat(item.change, np.arange(0, item.change.size, STRETCH))
-        size = float(np.linalg.norm(item.change))
-        if size > 0.0:
-            coarse /= np.float32(size)
-        for other, rough, norm in kept:
-            if size * norm == 0.0 or (
-                float(np.linalg.norm(coarse - rough)) > COARSE
-                and float(np.linalg.norm(coarse + rough)) > COARSE
-            ):
-                continue
-            # 1e-6: cosine between float32 signatures of the same simulation
-            if abs(float(item.change @ other.change)) / (size * norm) > 1.0 - 1e-6:
-                other.twins = (*other.twins, item)
-                break
-        else:
-            kept.append((item, coarse, size))
-    return [item for item, _, _ in kept]

@@ -1,0 +1,126 @@
+"""What candidates do to the model values, and which of them are worth a closer look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.parts import Parameter
+from .candidates import Candidate
+from .linear import ABSORBED, Score
+from .probes import Probe
+
+Vector = NDArray[np.float64]
+EVIDENT, SHARE = 3.0, 0.02
+"""A candidate whose first simulation gains less than 3 nats (noise does, in one of a hundred),
+or less than 1/50 of what the best one gains, is not simulated again."""
+KEPT = 40
+"""Candidates that go from one run to all of them at most."""
+HIDDEN = 0.98
+"""Share of a signature beyond which one run cannot tell it from other parameters."""
+STRETCH, COARSE = 64, 0.03
+"""Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
+8 times that, and rounding."""
+
+
+@dataclass
+class Signature:
+    """What a candidate does to the model values.
+
+    Attributes:
+        probe: the candidate in the system that was simulated.
+        value: strength at which the secant was taken.
+        change: model values over sigma with the effect less those without (float32).
+        rest: what of it calibration cannot absorb.
+        score: of `rest` against the residual.
+        absorbed: share of the signature's energy that calibration absorbs.
+        second: value of the effect's second parameter (see `Parameter.mix`).
+        fixed: its parameters that have another value than its FMU's.
+        twins: candidates with the same signature; fits may still tell them apart.
+    """
+
+    probe: Probe
+    value: float
+    change: NDArray[np.float32]
+    rest: NDArray[np.float32]
+    score: Score
+    absorbed: float
+    second: float = 0.0
+    fixed: dict[str, float] = field(default_factory=dict)
+    twins: tuple[Signature, ...] = ()
+
+    @property
+    def same(self) -> tuple[str, ...]:
+        """Labels of the twins."""
+        return tuple(item.candidate.label for item in self.twins)
+
+    @property
+    def candidate(self) -> Candidate:
+        """Which."""
+        return self.probe.candidate
+
+    @property
+    def tuned(self) -> int:
+        """How many of its parameters were chosen besides the strength."""
+        return len(self.fixed) + bool(self.probe.mix)
+
+    @property
+    def strength(self) -> Parameter:
+        """Its strength parameter."""
+        return self.probe.strength
+
+    @property
+    def asked(self) -> Vector:
+        """What calibration cannot absorb, at the strength that the residual asks for."""
+        return np.asarray(self.score.amplitude * self.rest, dtype=np.float64)
+
+    @property
+    def unseen(self) -> bool:
+        """Whether calibration absorbs it, or the runs do not show it at all."""
+        return self.absorbed > 1.0 - ABSORBED or self.score.size == 0.0
+
+
+def worthy(found: Sequence[Signature]) -> list[Signature]:
+    """Of candidates seen in one run, those worth a simulation of all runs, the best first.
+
+    What calibration absorbs in this run alone may still tell something in all of them together.
+    """
+    best = max((s.score.gain for s in found), default=0.0)
+    kept = [
+        s
+        for s in found
+        if s.score.gain > max(EVIDENT, SHARE * best) or (s.score.size > 0.0 and s.absorbed > HIDDEN)
+    ]
+    kept.sort(key=lambda s: -s.score.gain)
+    return kept[:KEPT]
+
+
+def merge(signatures: list[Signature]) -> list[Signature]:
+    """Leave one of those whose signatures are the same up to a factor, the first one.
+
+    Args:
+        signatures: simpler ones first, lest one turn of a ripple stand for an unbalance.
+    """
+    kept: list[tuple[Signature, NDArray[np.float32], float]] = []
+    for item in signatures:
+        # sums over stretches are quick to compare, and differ where signatures do
+        coarse = np.add.reduceat(item.change, np.arange(0, item.change.size, STRETCH))
+        size = float(np.linalg.norm(item.change))
+        if size > 0.0:
+            coarse /= np.float32(size)
+        for other, rough, norm in kept:
+            if size * norm == 0.0 or (
+                float(np.linalg.norm(coarse - rough)) > COARSE
+                and float(np.linalg.norm(coarse + rough)) > COARSE
+            ):
+                continue
+            # 1e-6: cosine between float32 signatures of the same simulation
+            if abs(float(item.change @ other.change)) / (size * norm) > 1.0 - 1e-6:
+                other.twins = (*other.twins, item)
+                break
+        else:
+            kept.append((item, coarse, size))
+    return [item for item, _, _ in kept]
