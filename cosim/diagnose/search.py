@@ -45,6 +45,8 @@ RIVAL = 0.5
 gains to first order are no rivals."""
 WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
+ALIKE = 1e-5
+"""Share of what they explain by which candidates may differ that are one to first order."""
 ROUNDS = 4
 CHECK = "validation"
 Say = Callable[[str], None]
@@ -361,7 +363,7 @@ class Search(Judge):
         self.finish(base, current, good, done, share)
         current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
-            for item in self.kin(current):
+            for item in self.kin(base, current):
                 self.tried(base, current, item, again=False)
             name, place = current.winner.effects[-1].effect, current.winner.effects[-1].place
             rest = [f for f in current.fitted if all(f is not d for d in done)]
@@ -398,7 +400,7 @@ class Search(Judge):
             f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
         )
 
-    def kin(self, current: Round) -> list[Signature]:
+    def kin(self, base: Fitted, current: Round) -> list[Signature]:
         """Twins of what was fitted that the winner must be compared with: they have not been.
 
         To first order they are one, but where an effect explains millions of nats, what differs in
@@ -406,6 +408,8 @@ class Search(Judge):
         """
         winner = current.winner
         if winner is None or winner.signature is None:
+            return []
+        if ALIKE * self.total(base, winner) < GATE:
             return []
         last, tuned = winner.effects[-1], winner.signature.tuned
         twins = [t for f in current.fitted if f.signature is not None for t in f.signature.twins]

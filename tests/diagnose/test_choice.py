@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
@@ -66,6 +66,9 @@ def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> N
     winner = model(signature("asymmetric_coulomb", "load.flange", 1, same, *others))
     elsewhere = model(signature("coulomb", "gearbox.flange_a", 0, simpler, general))
     found: Any = SimpleNamespace(winner=winner, fitted=[winner, elsewhere])
-    assert Search.kin(cast(Any, None), found) == [same, simpler, general]
-    found.winner = elsewhere
-    assert Search.kin(cast(Any, None), found) == [simpler]
+    search: Any = SimpleNamespace(total=lambda *_: 1e6)  # nats, of which the data see 1e-5
+    assert Search.kin(search, winner, found) == [same, simpler, general]
+    search.total = lambda *_: 1e5  # of these they do not
+    assert Search.kin(search, winner, found) == []
+    search.total, found.winner = lambda *_: 1e6, elsewhere
+    assert Search.kin(search, winner, found) == [simpler]
