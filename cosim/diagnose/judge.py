@@ -64,7 +64,7 @@ class Judge:
             f for f in fitted
             if self.accepted(base, f) and more_general(best, f) and not self.apart(f, best)
         ]  # fmt: skip
-        return min(simpler, key=lambda f: f.free, default=best)
+        return min(simpler, key=lambda f: f.complexity, default=best)
 
     def material(self, base: Fitted, other: Fitted) -> bool:
         """Whether the step between two models is large enough to be worth a cause.

@@ -55,6 +55,14 @@ class Fitted:
         """Number of parameters that were fitted."""
         return int(self.estimate.theta.size)
 
+    @property
+    def complexity(self) -> int:
+        """Number of parameters that were fitted or tried from a list: cogging with one cycle per
+        turn is an unbalance that had its number of cycles chosen.
+        """
+        fixed = self.signature.fixed if self.signature is not None else {}
+        return self.free + len(set(fixed) - set(self.problem.names))
+
 
 @dataclass(frozen=True)
 class Gate:
@@ -100,4 +108,4 @@ def more_general(first: Fitted, second: Fitted) -> bool:
     item = second.signature
     same = {label.partition(" at ")[2] for label in (item.same if item is not None else ())}
     places = {second.effects[-1].place, *same}
-    return first.effects[-1].place in places and first.free > second.free
+    return first.effects[-1].place in places and first.complexity > second.complexity

@@ -10,7 +10,7 @@ import pytest
 
 from cosim.diagnose.judge import OUTLYING, outlying
 from cosim.diagnose.linear import Absorber, Layout, holm, score
-from cosim.diagnose.models import GATE, compare, more_general
+from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
 
 RATE, SECONDS = 100, 40
@@ -89,7 +89,7 @@ def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
     def law(free: int, place: str = "load.flange", same: tuple[str, ...] = ()) -> Any:
         gate, item = SimpleNamespace(passed=True), SimpleNamespace(same=same)
         effects = [SimpleNamespace(place=place)]
-        return SimpleNamespace(free=free, effects=effects, gate=gate, signature=item)
+        return SimpleNamespace(complexity=free, effects=effects, gate=gate, signature=item)
 
     rig: Any = SimpleNamespace(accepted=lambda *_: True, apart=lambda *_: told_apart)
     best, simple, elsewhere = law(12), law(11), law(10, "gearbox.flange_a")
@@ -123,3 +123,19 @@ def test_outlying_residuals_count_linearly() -> None:
     linear = OUTLYING * (12.0 + 500.0) - OUTLYING**2
     assert huber == pytest.approx(0.5 * (81.0 + OUTLYING**2) + linear, rel=1e-12)
     assert outlying(np.array([9.9, -9.9])) == 0.0
+
+
+def test_a_value_that_was_tried_from_a_list_counts() -> None:
+    def law(fixed: dict[str, float], *names: str) -> Fitted:
+        estimate: Any = SimpleNamespace(
+            theta=np.zeros(len(names)), problem=SimpleNamespace(names=names)
+        )
+        item: Any = SimpleNamespace(fixed=fixed, same=())
+        effects: Any = (SimpleNamespace(place="load.flange"),)
+        return Fitted(effects, estimate, np.zeros(0), np.zeros(0), item)
+
+    unbalance = law({}, "m_u", "psi")
+    cogging = law({"n": 1.0}, "tau_c", "psi")
+    assert cogging.free == unbalance.free and cogging.complexity == unbalance.complexity + 1
+    assert more_general(cogging, unbalance) and not more_general(unbalance, cogging)
+    assert law({"n": 1.0}, "tau_c", "psi", "n").complexity == cogging.complexity
