@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.own_plant import INSIDE
+from benchmarks.own_plant import individual
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 
@@ -82,10 +82,7 @@ def write(folder: Path, friction: float, scrub: float, seed: int) -> dict[str, f
         known = [c for c in candidates(problem) if (c.effect, c.place) == (effect, place)]
         problem = known[0].added_to(problem)
     theta = problem.nominal
-    for i, p in enumerate(declared.parameters):
-        if p.role == "declared":
-            margin = INSIDE * (p.maximum - p.minimum)
-            theta[i] = random.uniform(p.minimum + margin, p.maximum - margin)
+    theta[: len(declared.parameters)] = individual(declared, random)
     theta[problem.index(SWIVEL)], theta[problem.index(FLOOR)] = friction, scrub
     for run in problem.runs:
         values = problem.simulate(theta, run)

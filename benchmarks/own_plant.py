@@ -50,6 +50,16 @@ def example(folder: Path, seconds: float, workers: int) -> Problem:
     return problem._with(runs=runs)
 
 
+def individual(problem: Problem, random: np.random.Generator) -> Vector:
+    """Parameters of one individual: the declared ones drawn away from their bounds."""
+    theta = problem.nominal
+    for i, p in enumerate(problem.parameters):
+        if p.role == "declared":
+            margin = INSIDE * (p.maximum - p.minimum)
+            theta[i] = random.uniform(p.minimum + margin, p.maximum - margin)
+    return theta
+
+
 def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int) -> Made:
     """Simulate one individual of a rig.
 
@@ -60,13 +70,7 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         seed: of parameters and noise.
     """
     random = np.random.default_rng(seed)
-    theta = problem.nominal
-    for i, p in enumerate(problem.parameters):
-        if p.role == "declared":
-            theta[i] = random.uniform(
-                p.minimum + INSIDE * (p.maximum - p.minimum),
-                p.maximum - INSIDE * (p.maximum - p.minimum),
-            )
+    theta = individual(problem, random)
     plain = {run.name: problem.simulate(theta, run) for run in problem.runs}
     values, size = plain, 0.0
     if candidate is not None:

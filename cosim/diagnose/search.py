@@ -444,12 +444,16 @@ class Search(Judge):
         if not self.raw.late or not self.lacking(winner):
             return winner
         problem = corrected(winner.problem, winner.estimate.theta, self.raw)
-        problem, theta, fall = released(problem, winner.estimate.theta)
-        if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
+        try:
+            problem, theta, fall = released(problem, winner.estimate.theta)
+            if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
+                return winner
+            self.say(f"start values of the runs estimated: {fall:.0f} nats")
+            found = self.judged(fit(problem, theta, rough=True, limit=6, robust=True))
+        except CosimError as error:
+            self.say(f"start values of the runs could not be estimated: {error}")
             return winner
-        self.say(f"start values of the runs estimated: {fall:.0f} nats")
-        found = self.judged(fit(problem, theta, rough=True, limit=6, robust=True))
-        return self.again(found, winner, base)
+        return self.again(found, winner, base) if self.gain(winner, found) > 0.0 else winner
 
     def finish(
         self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted], share: float
