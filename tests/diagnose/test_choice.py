@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from cosim.diagnose.search import REFITS, Search
+from cosim.errors import CosimError
 
 MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
 
@@ -72,3 +73,22 @@ def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> N
     assert Search.kin(search, winner, found) == []
     search.total, found.winner = lambda *_: 1e6, elsewhere
     assert Search.kin(search, winner, found) == [simpler]
+
+
+def test_start_values_that_cannot_be_estimated_leave_the_winner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: Any) -> None:
+        raise CosimError("unstable")
+
+    monkeypatch.setattr("cosim.diagnose.search.corrected", lambda *_: None)
+    monkeypatch.setattr("cosim.diagnose.search.released", fail)
+    winner: Any = SimpleNamespace(problem=None, estimate=SimpleNamespace(theta=None))
+    said: list[str] = []
+    search: Any = SimpleNamespace(
+        raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append
+    )
+    assert Search.released(search, winner, winner) is winner
+    assert said == ["start values of the runs could not be estimated: unstable"]
+    search.raw.late = ()
+    assert Search.released(search, winner, winner) is winner and len(said) == 1
