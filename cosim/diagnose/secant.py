@@ -47,6 +47,10 @@ FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
+BEYOND, ASKED = 1e3, 1e-3
+"""A trial that changes a channel by so many times the noise where the residual asks for less than
+this share of it has left the regime in which shares mean anything: a loop that oscillates does so
+at its limits, whatever the delay. The geometric mean of both strengths is tried then."""
 
 
 class Bench:
@@ -135,8 +139,17 @@ class Bench:
     def _alone(self, trials: Trials) -> None:
         while trials.best is None and trials.open:
             self.more(trials)
-        if trials.best is not None and trials.open and not np.any(trials.best.change):
+        found = trials.best
+        if found is None or not trials.open:
+            return
+        if not np.any(found.change):
             trials.value = 10.0 * trials.tried[-1]  # a limit that does not bind yet
+            self.more(trials)
+        elif (
+            abs(trials.wish) < ASKED
+            and self.layout.largest(found.change.astype(np.float64)) > BEYOND
+        ):
+            trials.value = trials.tried[-1] * float(np.sqrt(max(abs(trials.wish), 1.0 / RUNAWAY)))
             self.more(trials)
 
     def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
