@@ -32,16 +32,17 @@ CORRECTIONS = 4
 """Steps at most with the Jacobian of a point that is close."""
 CALM = 0.8
 """Share of the information on a direction that runs without jumps give: then derivatives do."""
-RENEWALS = 5
-"""Jacobians that a fit from close by takes at most."""
+RENEWALS, DRAFTED = 5, 3
+"""Jacobians that a fit from close by takes at most, and that a draft takes."""
 PARTS = (1.0, 0.3, 0.1)
 """Shares of a step that are tried."""
 SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
-EVEN = 1e-3
-"""Share of the cost beyond the noise's below which a fall is none: the model is that far off."""
+EVEN, ROUGHLY = 1e-3, 1e-2
+"""Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
+second for drafts."""
 PURPOSE = "identification"
 
 
@@ -257,13 +258,17 @@ class Descent:
             normal.gradient = self.gradient()
         return False
 
-    def correct(self, *, central: bool = True) -> Normal:
-        """Steps with a Jacobian taken here, and with another one as long as they lead far."""
+    def correct(self, *, draft: bool = False) -> Normal:
+        """Steps with a Jacobian taken here, and with another one as long as they lead far.
+
+        Args:
+            draft: only to be compared: one-sided differences, and fewer of them.
+        """
         noise = 0.5 * sum(np.isfinite(r).sum() for _, r in self.residuals)
-        for _ in range(RENEWALS):
+        for _ in range(DRAFTED if draft else RENEWALS):
             before = self.cost
-            normal = self.normal(STEPS[-1], central=central)
-            enough = max(SETTLED, EVEN * (self.cost - noise))
+            normal = self.normal(STEPS[-1], central=not draft)
+            enough = max(SETTLED, (ROUGHLY if draft else EVEN) * (self.cost - noise))
             if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
                 break
         return normal
@@ -323,7 +328,7 @@ def fit(
         run.follow(known, limit)
         return estimated(run)
     if near:
-        run.correct(central=not draft)
+        run.correct(draft=draft)
         return estimated(run, confirm=not draft)
     if robust and _uneven(run):
         run = Descent(problem, _calmest(run), run.theta)

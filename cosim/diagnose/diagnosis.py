@@ -18,6 +18,7 @@ from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
 from .deferred import step_error
+from .exchange import reconsidered
 from .experiment import propose
 from .linear import Layout
 from .localise import Place, localise
@@ -246,7 +247,8 @@ def _searched(
     base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
     result.warnings = [str(f) for f in findings]
-    current, winners = base, []
+    current = base
+    winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
         stage = search.round(current)
@@ -259,12 +261,19 @@ def _searched(
                 ranked = [s.candidate for s in stage.signatures]
                 result.located = localise(search, base, ranked, say)
         if stage.winner is None:
-            break
+            found = reconsidered(search, current, winners)
+            if found is current:
+                break
+            current = found
+            continue
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
         if not any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
+            current = reconsidered(search, current, winners)
             break
+    else:
+        current = reconsidered(search, current, winners)
     if len(current.effects) > 1:
         current = search.eliminated(current)
         winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]

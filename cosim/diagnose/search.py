@@ -20,6 +20,7 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates, new_parameters
 from .deferred import corrected, step_error
+from .exchange import absent, is_open
 from .judge import Judge
 from .linear import MATERIAL, Absorber, Layout, holm
 from .models import GATE, LEVEL, Fitted, compare, more_general
@@ -64,6 +65,7 @@ class Round:
         fitted: refitted candidates, best first.
         winner: accepted one.
         rivals: fitted ones that the data cannot tell from it.
+        open: whether more was so evidently missing that the choice waits for it.
     """
 
     base: Fitted
@@ -73,6 +75,7 @@ class Round:
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
+    open: bool = False
 
 
 class Search(Judge):
@@ -356,6 +359,9 @@ class Search(Judge):
             if not explained or item.score.gain >= RIVAL * most:
                 self.tried(base, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
+        first = self.chosen(base, current.fitted)
+        if first is not None and is_open(first):
+            return self.opened(base, current, first)
         # quick fits are too far from their minima to be told apart
         done: list[Fitted] = []
         share = LOOSE if self.far(base) else CLOSE
@@ -384,6 +390,17 @@ class Search(Judge):
                 and f.gate.passed and not self.apart(f, current.winner)
                 and not more_general(f, current.winner)
             ]  # fmt: skip
+        self.rounds.append(current)
+        return current
+
+    def opened(self, base: Fitted, current: Round, first: Fitted) -> Round:
+        """End a round whose best model evidently lacks more: others are compared after that."""
+        found = self.refined(base, self.retried(first, base))
+        current.winner = self.sharpened(self.released(found, base), base)
+        current.fitted = [current.winner if f is first else f for f in current.fitted]
+        current.open = True
+        if self.whole:
+            self.prepare(current.winner.problem)
         self.rounds.append(current)
         return current
 
@@ -425,7 +442,7 @@ class Search(Judge):
         Parameters that had made up for an effect may hold its model in a poor minimum; with the
         effect in the model, nominal values are near again.
         """
-        if not self.far(base) or not self.lacking(winner):
+        if not self.far(base) or not is_open(winner):
             return winner
         problem = corrected(winner.problem, winner.estimate.theta, self.raw)
         effects = {p.name for p in problem.parameters if p.role == "effect"}
@@ -511,13 +528,8 @@ class Search(Judge):
 
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""
-        prefix = effect.prefix
         problem = fitted.problem
-        held = {
-            p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
-            for p, value in zip(problem.parameters, fitted.estimate.theta.tolist(), strict=True)
-            if p.name.startswith(prefix)
-        }
+        held = absent(fitted, effect)
         keep = [i for i, p in enumerate(problem.parameters) if p.name not in held]
         result = self.fitted(problem.hold(held), fitted.estimate.theta[keep], fitted.estimate)
         result.effects = tuple(e for e in fitted.effects if e != effect)

@@ -1,0 +1,141 @@
+"""Choices that were made early, reconsidered in the model with all effects.
+
+Where several effects are missing, a round ends far from the noise whichever of them it adds, and
+rivals of the added one are not told apart by models that lack the rest. With the rest added they
+are: each rival takes the effect's place in the last model, is refitted, and stays if it is better.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..errors import CosimError
+from .candidates import Candidate, new_parameters
+from .models import GATE, Fitted, compare, more_general
+from .signature import Signature
+
+if TYPE_CHECKING:
+    from .search import Round, Search
+
+OPEN = 4.0
+"""Mean square over the noise's from which the best model of a round evidently lacks more."""
+NEARLY = 0.8
+"""Rivals gained this share of what the best one did; their fits were rough."""
+MOST = 3
+"""Rivals that are tried at most, besides places where to first order the same happens."""
+
+
+def is_open(fitted: Fitted) -> bool:
+    """Whether a model evidently lacks more than its effects."""
+    return 2.0 * fitted.estimate.cost > OPEN * fitted.estimate.count
+
+
+def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
+    """The model with early choices exchanged where that is better.
+
+    Rounds get the winner and the rivals that the last model shows.
+
+    Args:
+        search: judges.
+        fitted: model with all effects.
+        rounds: those that found them.
+    """
+    for stage in rounds:
+        if not stage.open or stage.winner is None or stage.winner.effects[-1] not in fitted.effects:
+            continue
+        present = _seen_last(fitted, stage.winner)
+        rivals: list[Fitted] = []
+        for item, known in _others(search, stage):
+            if item.candidate in fitted.effects:
+                continue
+            try:
+                trial = exchanged(search, present, item, known)
+            except CosimError as error:
+                search.say(f"{item.candidate.label} instead: {error}")
+                continue
+            gate = compare(search.check_data, present.check, trial.check, search.checking)
+            gain = search.gain(present, trial) + gate.gain
+            search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")
+            alike = not search.apart(present, trial)
+            simpler = alike and more_general(present, trial)
+            if simpler or (not alike and gain > GATE and gate.gain > 0.0):
+                if alike or more_general(trial, present):
+                    rivals.append(present)
+                present, stage.winner = trial, known or trial
+            elif alike and not more_general(trial, present):
+                rivals.append(trial)
+        if present.estimate is not fitted.estimate:
+            fitted = search.sharpened(present, stage.base)
+        stage.rivals = [
+            f for f in rivals if not search.apart(f, present) and not more_general(f, present)
+        ]
+    return fitted
+
+
+def _seen_last(fitted: Fitted, winner: Fitted) -> Fitted:
+    """A model as if the effect of an earlier round had been added last."""
+    last = winner.effects[-1]
+    rest = [e for e in fitted.effects if e != last]
+    return replace(fitted, effects=(*rest, last), signature=winner.signature)
+
+
+def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None]]:
+    """Rivals of a round's winner with their quick fits, and its twins elsewhere."""
+    winner = stage.winner
+    assert winner is not None
+    least = NEARLY * max(search.total(stage.base, f) for f in stage.fitted)
+    near = [
+        f for f in stage.fitted
+        if f.effects[-1] != winner.effects[-1] and f.signature is not None
+        and search.accepted(stage.base, f) and search.total(stage.base, f) > least
+    ][:MOST]  # fmt: skip
+    found: list[tuple[Signature, Fitted | None]] = [
+        (f.signature, f) for f in near if f.signature is not None
+    ]
+    return found + [(twin, None) for twin in search.kin(stage.base, stage)]
+
+
+def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
+    """Values of an effect's parameters with which it does nothing."""
+    return {
+        p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
+        for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True)
+        if p.name.startswith(effect.prefix)
+    }
+
+
+def exchanged(search: Search, fitted: Fitted, item: Signature, known: Fitted | None) -> Fitted:
+    """A model with another effect instead of its last one, quickly refitted.
+
+    Args:
+        search: fits and judges.
+        fitted: the model.
+        item: what comes instead.
+        known: a fit of that, for the values to begin with.
+
+    Raises:
+        CosimError: it cannot be simulated.
+    """
+    less = fitted.problem.hold(absent(fitted, fitted.effects[-1]))
+    whole = item.candidate.added_to(less)
+    strengths, others = new_parameters(less, whole)
+    names = {p.name for p in (*strengths, *others)}
+    values = {item.strength.name: item.value * (item.score.amplitude or 1.0)}
+    if item.probe.second:
+        values[item.probe.second] = item.second
+    if known is not None:
+        values = {n: v for n, v in known.estimate.values.items() if n in names}
+    fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in others if p.name not in values}
+    problem = whole.with_parameters(
+        [replace(p, span=abs(values[p.name]) or p.span) if p.strength and p.name in values else p
+         for p in whole.parameters]
+    ).hold(fixed)  # fmt: skip
+    theta = problem.nominal
+    for name, value in {**fitted.estimate.values, **values}.items():
+        if name in problem.names:
+            theta[problem.index(name)] = value
+    result = search.fitted(problem, theta.clip(problem.lower, problem.upper), fitted.estimate)
+    result.effects = (*fitted.effects[:-1], item.candidate)
+    result.signature = item
+    return result
