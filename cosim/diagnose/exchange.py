@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ..calibrate.estimate import Estimate
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .models import GATE, Fitted, compare, more_general
@@ -26,9 +27,9 @@ MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
 
-def is_open(fitted: Fitted) -> bool:
-    """Whether a model evidently lacks more than its effects."""
-    return 2.0 * fitted.estimate.cost > OPEN * fitted.estimate.count
+def is_open(estimate: Estimate) -> bool:
+    """Whether a fitted model evidently lacks something."""
+    return 2.0 * estimate.cost > OPEN * estimate.count
 
 
 def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:

@@ -136,6 +136,8 @@ class Search(Judge):
         self.evaluations += second.evaluations
         self.say("errors of the exchange removed")
         self.declared = corrected(raw, second.theta, raw)
+        if is_open(second):  # far off, its parameters' intervals mean nothing
+            return self.judged(fit(self.declared, second.theta, near=True, draft=True))
         return self.judged(fit(self.declared, second.theta, limit=0, robust=False))
 
     def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
@@ -360,7 +362,7 @@ class Search(Judge):
                 self.tried(base, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         first = self.chosen(base, current.fitted)
-        if first is not None and is_open(first):
+        if first is not None and is_open(first.estimate):
             return self.opened(base, current, first)
         # quick fits are too far from their minima to be told apart
         done: list[Fitted] = []
@@ -442,7 +444,7 @@ class Search(Judge):
         Parameters that had made up for an effect may hold its model in a poor minimum; with the
         effect in the model, nominal values are near again.
         """
-        if not self.far(base) or not is_open(winner):
+        if not self.far(base) or not is_open(winner.estimate):
             return winner
         problem = corrected(winner.problem, winner.estimate.theta, self.raw)
         effects = {p.name for p in problem.parameters if p.role == "effect"}

@@ -12,6 +12,8 @@ from cosim.diagnose.judge import OUTLYING, outlying
 from cosim.diagnose.linear import Absorber, Layout, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
+from cosim.diagnose.structure import MATERIAL as MATERIAL_RMS
+from cosim.diagnose.structure import structures
 
 RATE, SECONDS = 100, 40
 
@@ -139,3 +141,16 @@ def test_a_value_that_was_tried_from_a_list_counts() -> None:
     assert cogging.free == unbalance.free and cogging.complexity == unbalance.complexity + 1
     assert more_general(cogging, unbalance) and not more_general(unbalance, cogging)
     assert law({"n": 1.0}, "tau_c", "psi", "n").complexity == cogging.complexity
+
+
+def test_a_burst_is_no_structure_and_what_lasts_is() -> None:
+    place = layout()
+    noise = np.random.default_rng(4).standard_normal(place.size)
+    burst, lasting = np.zeros(place.size), np.zeros(place.size)
+    burst[1000:1040] = 20.0  # 0.4 s of 40 s: 1 % of the windows
+    lasting[::10] = 20.0 * np.sqrt(40 / (place.size / 10))  # the same energy, all the time
+    for extra, expected in ((0.0, False), (burst, False), (lasting + 0.5, True)):
+        (found,) = structures(noise + extra, place)
+        assert found.structured is expected
+    (found,) = structures(noise + burst, place)
+    assert found.rms > 2.0 and found.lasting < MATERIAL_RMS

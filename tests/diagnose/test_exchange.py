@@ -1,0 +1,67 @@
+"""An early choice gives way to a rival that the last model shows to be better, and stays if not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import Bench, draw, write_sets
+from cosim.calibrate.mapping import read_problem
+from cosim.diagnose.candidates import candidates
+from cosim.diagnose.exchange import reconsidered
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.search import Round, Search
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+RIGHT, WRONG = "coulomb at load.flange", "bearing_drag at load.flange"
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Search, Round]]:
+    """A round over dry friction, which is there, and a bearing drag, which is not; both refitted."""
+    folder = tmp_path_factory.mktemp("benches")
+    bench = Bench(draw(np.random.default_rng(3)).parameters, "coulomb", 0.4)
+    (place,) = write_sets(folder, [bench], SHEET, 5, 2.0, ("ST", "MS", "LW"))
+    problem = read_problem(place, workers=2)
+    search = Search(problem, only=[c for c in candidates(problem) if c.label in (RIGHT, WRONG)])
+    base = search.calibrated()
+    found = search.scored(base)
+    for item in found.signatures:
+        search.tried(base, found, item, again=False)
+    found.open = True
+    yield search, found
+    search.close()
+
+
+def fitted(stage: Round, label: str) -> Fitted:
+    """The fit of a candidate."""
+    return next(f for f in stage.fitted if f.effects[-1].label == label)
+
+
+def test_a_wrong_choice_is_exchanged(stage: tuple[Search, Round]) -> None:
+    search, found = stage
+    found.winner = fitted(found, WRONG)
+    last = reconsidered(search, found.winner, [found])
+    assert [e.label for e in last.effects] == [RIGHT]
+    assert found.winner is not None and found.winner.effects[-1].label == RIGHT
+    assert last.estimate.values["load.flange.coulomb.tau_c"] == pytest.approx(0.4, rel=0.1)
+    assert not any(RIGHT in p for p in last.problem.constants)
+
+
+def test_the_right_choice_stays(stage: tuple[Search, Round]) -> None:
+    search, found = stage
+    found.winner = fitted(found, RIGHT)
+    assert reconsidered(search, found.winner, [found]) is found.winner
+    assert found.rivals == []
+
+
+def test_a_round_that_decided_is_not_reconsidered(stage: tuple[Search, Round]) -> None:
+    search, found = stage
+    found.winner, found.open = fitted(found, WRONG), False
+    try:
+        assert reconsidered(search, found.winner, [found]) is found.winner
+    finally:
+        found.open = True
