@@ -21,7 +21,7 @@ RIGHT, WRONG = "coulomb at load.flange", "bearing_drag at load.flange"
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Search, Round]]:
-    """A round over dry friction, which is there, and a bearing drag, which is not; both refitted."""
+    """A round over dry friction, which is there, and a bearing drag, which is not."""
     folder = tmp_path_factory.mktemp("benches")
     bench = Bench(draw(np.random.default_rng(3)).parameters, "coulomb", 0.4)
     (place,) = write_sets(folder, [bench], SHEET, 5, 2.0, ("ST", "MS", "LW"))
