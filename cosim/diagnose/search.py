@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -35,6 +36,8 @@ REFITS = 6
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
+MEMBERS = 2
+"""Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
 SHARED, WHOLES = 0.5, 3
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most so many: members must not crowd it out."""
@@ -266,16 +269,26 @@ class Search(Judge):
             and self.fitting.largest(s.asked) > NEARLY * MATERIAL
         ]
         best = max((s.score.gain for s in good), default=0.0)
-        good = [s for s in good if s.score.gain > PART * best]
         single = balances(current.base.problem)
+        alike: Counter[tuple[str, str, str]] = Counter()
+        few = []
+        for s in good:
+            instance, port = s.candidate.instance, s.candidate.port
+            if (instance, port) in single and "." in port:
+                key = (s.candidate.effect, instance, port.rpartition(".")[2])
+                alike[key] += 1
+                if alike[key] > MEMBERS:
+                    continue
+            if s.score.gain > PART * best:
+                few.append(s)
         shared = [
             s
-            for s in good[REFITS:]
+            for s in few[REFITS:]
             if s.score.gain > SHARED * best
             and s.candidate.port
             and (s.candidate.instance, s.candidate.port) not in single
         ]
-        return good[:REFITS] + shared[:WHOLES]
+        return few[:REFITS] + shared[:WHOLES]
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.

@@ -19,7 +19,8 @@ def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str
     signatures = []
     for label, gain in sorted(gains.items(), key=lambda item: -item[1]):
         instance, port = label.partition(" at ")[2].split(".", 1)
-        candidate = SimpleNamespace(label=label, instance=instance, port=port)
+        effect = label.partition(" at ")[0]
+        candidate = SimpleNamespace(label=label, effect=effect, instance=instance, port=port)
         score = SimpleNamespace(gain=gain)
         signatures.append(
             SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
@@ -36,7 +37,7 @@ def test_members_that_look_alike_do_not_crowd_out_their_group(
 ) -> None:
     gains = {
         f"{effect} at {instance}.{port}": 100.0 + len(port) + len(effect)
-        for effect in ("coulomb", "bristle")
+        for effect in ("coulomb", "bristle", "stribeck", "viscous")
         for instance, port in MEMBERS
     }
     found = chosen({**gains, "coulomb at base.caster.swivel": 80.0}, monkeypatch)
@@ -44,9 +45,19 @@ def test_members_that_look_alike_do_not_crowd_out_their_group(
     assert found[-1] == "coulomb at base.caster.swivel"
 
 
+def test_two_members_of_a_group_are_enough_for_one_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    gains = {f"coulomb at {i}.{port}": 100.0 + len(port) for i, port in MEMBERS}
+    gains |= {"coulomb at arm.joint_1": 99.0, "coulomb at arm.joint_2": 98.0}
+    gains |= {"coulomb at arm.joint_3": 97.0, "coulomb at base.caster.swivel": 90.0}
+    assert [label.partition(" at ")[2] for label in chosen(gains, monkeypatch)][2:] == [
+        "arm.joint_1", "arm.joint_2", "arm.joint_3", "base.caster.swivel"
+    ]  # fmt: skip
+
+
 def test_a_group_that_gains_little_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
     gains = {f"coulomb at {i}.{port}": 100.0 for i, port in MEMBERS}
     gains |= {f"bristle at {i}.{port}": 90.0 for i, port in MEMBERS}
+    gains |= {f"stribeck at {i}.{port}": 80.0 for i, port in MEMBERS}
     found = chosen({**gains, "coulomb at base.caster.swivel": 40.0}, monkeypatch)
     assert len(found) == REFITS
     assert "coulomb at base.caster.swivel" not in found
