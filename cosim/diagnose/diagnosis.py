@@ -18,7 +18,7 @@ from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
 from .deferred import step_error
-from .exchange import reconsidered
+from .exchange import is_open, reconsidered
 from .experiment import propose
 from .linear import Layout
 from .localise import Place, localise
@@ -274,6 +274,8 @@ def _searched(
             break
     else:
         current = reconsidered(search, current, winners)
+    if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
+        current = search.sharpened(current, winners[-1].base)
     if len(current.effects) > 1:
         current = search.eliminated(current)
         winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]

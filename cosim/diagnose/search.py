@@ -410,8 +410,10 @@ class Search(Judge):
 
     def opened(self, base: Fitted, current: Round, first: Fitted) -> Round:
         """End a round whose best model evidently lacks more: others are compared after that."""
-        found = self.refined(base, self.retried(first, base))
-        current.winner = self.sharpened(self.released(found, base), base)
+        found = self.released(self.refined(base, self.retried(first, base)), base)
+        current.winner = self.sharpened(found, base, draft=True)
+        if not is_open(current.winner.estimate):
+            current.winner = self.sharpened(current.winner, base)
         current.fitted = [current.winner if f is first else f for f in current.fitted]
         current.open = True
         if self.whole:
@@ -481,7 +483,7 @@ class Search(Judge):
             if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
                 return winner
             self.say(f"start values of the runs estimated: {fall:.0f} nats")
-            found = self.judged(fit(problem, theta, rough=True, limit=6, robust=True))
+            found = self.judged(fit(problem, theta, rough=True, limit=3, robust=False))
         except CosimError as error:
             self.say(f"start values of the runs could not be estimated: {error}")
             return winner
