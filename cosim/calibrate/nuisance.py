@@ -10,7 +10,9 @@ by Gauss-Newton steps with one Jacobian per run: these values move the model alm
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,9 @@ SHORTER, SHORTEST = 0.3, 0.05
 RELEASES, RELEASED = 3, 0.01
 """Times at most that late values are estimated with new derivatives, and the share of the cost that
 each must remove to be followed by another one."""
+HORIZONS = (0.1, 0.2, 0.4, 1.0)
+"""Shares of a run from its beginning over which late values are estimated, one after the other. The
+first metres tell a start angle; once casters have turned over, the error has many minima in it."""
 ENOUGH = 0.1
 """Fall of the cost [nats] below which a run is settled: far below anything that is decided."""
 
@@ -98,7 +103,8 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
 
     Such values may move the model far from linearly, start angles of casters for instance, which
     turn over after an unstable moment. In a joint fit one such run would hold up all parameters;
-    run by run, with steps that are shortened until they help, it harms none.
+    run by run, with steps that are shortened until they help, it harms none. The beginnings of the
+    runs come first (see `HORIZONS`).
 
     Returns:
         The problem with these parameters held at what was found, all its values, and the fall of
@@ -112,18 +118,29 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     whole = problem.with_parameters([*problem.parameters, *problem.late])
     names = [run.name for run in problem.runs]
     first = np.clip(np.concatenate([theta, start]), whole.lower, whole.upper)
-    values = first
     before = _costs(whole, first, names)
-    cost = before
-    for _ in range(RELEASES):
-        values = settled(whole, values, names)
-        after = _costs(whole, values, names)
-        if not after < cost - RELEASED * before:
-            break
-        cost = after
-    whole.close()
+    values = first
+    for share in HORIZONS:
+        part = _beginnings(whole, share)
+        begun = cost = _costs(part, values, names)
+        for _ in range(RELEASES):
+            values = settled(part, values, names)
+            after = _costs(part, values, names)
+            if not after < cost - RELEASED * begun:
+                break
+            cost = after
+        part.close()
     kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
     return whole.hold(kept), values[: theta.size], before - after
+
+
+def _beginnings(problem: Problem, share: float) -> Problem:
+    """The problem with only the first share of each run."""
+    runs = []
+    for run in problem.runs:
+        size = math.ceil(share * run.times.size)
+        runs.append(replace(run, times=run.times[:size], data=run.data[:size]))
+    return problem._with(runs=runs)
 
 
 def _costs(problem: Problem, theta: Vector, names: list[str]) -> float:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.calibrate.nuisance import released, settled, slopes
-from cosim.calibrate.parts import Parameter
+from cosim.calibrate.nuisance import HORIZONS, released, settled, slopes
+from cosim.calibrate.parts import Parameter, Run
 from cosim.calibrate.problem import Problem
 
 SHIFT = 0.02
@@ -80,3 +80,31 @@ def test_a_step_that_makes_a_run_worse_is_shortened(short: Problem, truth: np.nd
 
     found = settled(problem, theta, ["check"], wrong)
     assert square(found) < 0.1 * square(theta)  # a tenth of a full step is shorter than 0.3^2
+
+
+@pytest.mark.parametrize("horizons, found", [(HORIZONS, True), ((1.0,), False)])
+def test_beginnings_lead_to_the_right_minimum(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, horizons: tuple[float, ...], found: bool
+) -> None:
+    """A model that tells the angle at first, and later a wave of it with minima everywhere."""
+    turn = {run.name: run.times[run.times.size // 2] for run in short.runs}
+
+    def simulate(self: Problem, theta: np.ndarray, run: Run | str) -> np.ndarray:
+        run = self.run(run) if isinstance(run, str) else run
+        angle = self.values(theta, run)["encoder.theta"]
+        late = run.times > turn[run.name]
+        return np.tile(
+            np.where(late, 100.0 * np.sin(60.0 * angle), angle), (len(self.channels), 1)
+        ).T
+
+    monkeypatch.setattr(Problem, "simulate", simulate)
+    monkeypatch.setattr("cosim.calibrate.nuisance.HORIZONS", horizons)
+    problem, theta = shifted(short, short.nominal, 1.0)
+    runs = [
+        replace(r, starts={**r.starts, "encoder.theta": 10.0 * SHIFT}) for r in problem.runs
+    ]  # two periods of the wave away
+    own = problem.parameters[-1]
+    waiting = problem.with_parameters(problem.parameters[:-1])._with(late=[own], runs=runs)
+    result, _, _ = released(waiting, theta[:-1])
+    angle = result.run("check").starts["encoder.theta"]
+    assert (angle == pytest.approx(SHIFT, rel=1e-3)) is found
