@@ -26,6 +26,7 @@ from .models import Fitted
 from .power import power
 from .search import ROUNDS, Round, Search
 from .structure import Structure, structures
+from .trim import trimmed
 
 Vector = NDArray[np.float64]
 PURPOSES = ("identification", "validation")
@@ -48,6 +49,7 @@ class Diagnosis:
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
         experiment: proposed to separate rivals.
+        aside: times of bursts that were left out of the last fit, by run (see `trim`).
         files: written ones.
     """
 
@@ -64,6 +66,7 @@ class Diagnosis:
     structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     experiment: dict[str, Any] | None = None
+    aside: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -106,6 +109,7 @@ class Diagnosis:
             "channels": {},
             "parameters": self.parameters(),
             "start_values": self.start_values(),
+            "left_out": self.aside,
             "structure": {
                 f"{which} {purpose}": [s.to_dict() for s in tests]
                 for (which, purpose), tests in self.structure.items()
@@ -279,12 +283,20 @@ def _searched(
     if len(current.effects) > 1:
         current = search.eliminated(current)
         winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]
+    if current.effects and not any(stage.rivals for stage in winners):
+        current, result.aside = trimmed(search, current)
+        for name, spans in result.aside.items():
+            say(f"left out of the last fit: {name} {_text(spans)}")
     result.after = current
     _judge(result, winners)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)
     result.wall = time.perf_counter() - begun
     return result
+
+
+def _text(spans: list[tuple[float, float]]) -> str:
+    return ", ".join(f"{first:.2f} to {last:.2f} s" for first, last in spans)
 
 
 def _tests(search: Search, fitted: Fitted, purpose: str) -> list[Structure]:

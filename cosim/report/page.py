@@ -65,6 +65,7 @@ def page(result: Diagnosis) -> str:
         _errors(result, table),
         _parameters(table["parameters"]),
         _starts(table["start_values"]),
+        _aside(table["left_out"]),
         _measured(result),
         _residuals(result),
         _located(result),
@@ -194,6 +195,20 @@ def _starts(values: dict[str, dict[str, float]]) -> str:
     return "<p>Start values, estimated run by run:</p>" + _table(
         ["run", *names],
         [[_td(run), *(_td(_number(own[n])) for n in names)] for run, own in values.items()],
+    )
+
+
+def _aside(spans: dict[str, list[tuple[float, float]]]) -> str:
+    if not spans:
+        return ""
+    rows = [
+        [_td(run), _td(", ".join(f"{first:.2f} to {last:.2f} s" for first, last in parts))]
+        for run, parts in spans.items()
+    ]
+    return (
+        "<p>Left out of the last fit: bursts of residuals, where the smallest difference decides "
+        "when something happens (casters that turn over). They count in all other tables.</p>"
+        + _table(["run", "when"], rows)
     )
 
 

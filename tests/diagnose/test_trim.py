@@ -1,0 +1,67 @@
+"""A burst is left out of the last fit and pulls no parameter; without one nothing is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import draw, write_sets
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.linear import Layout
+from cosim.diagnose.search import Search
+from cosim.diagnose.trim import bursts, trimmed
+from cosim.report.page import _aside
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+FIRST, LAST = 700, 712
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
+    """A bench that lacks nothing."""
+    folder = tmp_path_factory.mktemp("benches")
+    (place,) = write_sets(folder, [draw(np.random.default_rng(3))], SHEET, 5, 2.0, ("ST", "MS"))
+    problem = read_problem(place, workers=2)
+    yield problem
+    problem.close()
+
+
+def test_windows_with_a_burst_and_their_neighbours_are_found() -> None:
+    run: Any = SimpleNamespace(name="A", times=np.arange(200) / 100, data=np.zeros((200, 2)))
+    layout = Layout(SimpleNamespace(channels=[0, 1]), [run])  # type: ignore[arg-type]
+    residual = np.random.default_rng(0).standard_normal((200, 2))
+    assert bursts(residual.ravel(), layout) == {}
+    residual[105:115, 1] = 20.0
+    where = np.flatnonzero(bursts(residual.ravel(), layout)["A"])
+    assert (where[0], where[-1], where.size) == (80, 139, 60)
+
+
+def test_a_burst_pulls_no_parameter(clean: Problem) -> None:
+    run = clean.chosen("identification")[0]
+    data = run.data.copy()
+    data[FIRST:LAST, 1] += 40.0 * clean.sigma[1]
+    values = []
+    for problem in (clean, clean.with_data({run.name: data})):
+        search = Search(problem, only=[])
+        fitted, aside = trimmed(search, search.calibrated())
+        values.append(fitted.estimate)
+        if problem is clean:
+            assert aside == {}
+        else:
+            assert list(aside) == [run.name]
+            ((first, last),) = aside[run.name]
+            assert first <= run.times[FIRST] and last >= run.times[LAST]
+            assert last - first < 0.15 * (run.times[-1] - run.times[0])
+            assert f"{first:.2f} to {last:.2f} s" in _aside(aside)
+        search.close()
+    assert _aside({}) == ""
+    one, other = values
+    known = one.identifiable & other.identifiable
+    # a quarter of the interval's half-width: 5 % fewer samples of one run change little
+    assert np.all(np.abs(one.theta - other.theta)[known] < 0.125 * (one.high - one.low)[known])
