@@ -61,16 +61,13 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
             alike = not search.apart(present, trial)
             simpler = alike and more_general(present, trial)
             if simpler or (not alike and gain > GATE and gate.gain > 0.0):
-                if alike or more_general(trial, present):
-                    rivals.append(present)
+                rivals.append(present)
                 present, stage.winner = trial, known or trial
-            elif alike and not more_general(trial, present):
+            elif alike:
                 rivals.append(trial)
         if present.estimate is not fitted.estimate:
             fitted = search.sharpened(present, stage.base)
-        stage.rivals = [
-            f for f in rivals if not search.apart(f, present) and not more_general(f, present)
-        ]
+        stage.rivals = search.rivals(present, rivals)
     return fitted
 
 

@@ -102,6 +102,18 @@ class Judge:
         fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
         return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
 
+    def rivals(self, winner: Fitted, others: list[Fitted]) -> list[Fitted]:
+        """Models that no run tells from the winner, but for more general ones of these or of it.
+
+        Friction that may differ between the directions is no rival of friction that does not,
+        wherever the latter is named.
+        """
+        near = [f for f in others if f is not winner and not self.apart(f, winner)]
+        return [
+            f for f in near
+            if not any(more_general(f, g) for g in (winner, *near) if g is not f)
+        ]  # fmt: skip
+
     def test(self, first: Fitted, second: Fitted) -> Score:
         """Score of the step between two models on unused runs."""
         return score(second.check - first.check, self.check_data - first.check, self.checking, 0)

@@ -400,11 +400,8 @@ class Search(Judge):
             current.fitted = [current.winner if f is drafted else f for f in current.fitted]
             if self.whole:
                 self.prepare(current.winner.problem)
-            current.rivals = [
-                f for f in current.fitted if f is not current.winner and f.gate is not None
-                and f.gate.passed and not self.apart(f, current.winner)
-                and not more_general(f, current.winner)
-            ]  # fmt: skip
+            wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
+            current.rivals = self.rivals(current.winner, wanted)
         self.rounds.append(current)
         return current
 

@@ -103,3 +103,20 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     assert said == ["start values of the runs could not be estimated: unstable"]
     search.raw.late = ()
     assert Search.released(search, winner, winner) is winner and len(said) == 1
+
+
+def test_a_law_more_general_than_a_rival_is_none() -> None:
+    def model(label: str, place: str, parameters: int) -> Any:
+        signature = SimpleNamespace(same=())
+        effect = SimpleNamespace(label=label, place=place)
+        return SimpleNamespace(effects=(effect,), signature=signature, complexity=parameters)
+
+    winner = model("coulomb", "load.flange", 9)
+    elsewhere = model("coulomb", "gearbox.flange_a", 9)
+    general = model("asymmetric_coulomb", "gearbox.flange_a", 10)
+    other = model("bearing_drag", "motor.shaft", 10)
+    judge: Any = SimpleNamespace(apart=lambda first, second: False)
+    assert Search.rivals(judge, winner, [winner, elsewhere, general, other]) == [elsewhere, other]
+    assert Search.rivals(judge, winner, [general]) == [general]  # nothing simpler was fitted there
+    judge.apart = lambda first, second: first is other
+    assert Search.rivals(judge, winner, [elsewhere, other]) == [elsewhere]
