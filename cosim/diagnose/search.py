@@ -24,7 +24,7 @@ from .deferred import corrected, step_error
 from .exchange import absent, is_open
 from .judge import Judge
 from .linear import MATERIAL, Absorber, Layout, holm
-from .models import GATE, LEVEL, Fitted, compare, more_general
+from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
 from .probes import batches
 from .secant import FLOOR, Bench, model_values, patience
 from .signature import Signature, merge, worthy
@@ -259,15 +259,21 @@ class Search(Judge):
         return Round(base, signatures, named, aside)
 
     def promising(self, current: Round) -> list[Signature]:
-        """Candidates worth a refit: significant, not too small to matter, the best gains first."""
-        good = [
+        """Candidates worth a refit: significant, not too small to matter, the best gains first.
+
+        Where something is evidently missing and none is significant (an effect that shows in few
+        moments has few blocks to prove itself), unused runs decide alone.
+        """
+        able = [
             s
             for s in current.signatures
             if not s.unseen
-            and current.corrected[s.candidate.label] < LEVEL
             and s.score.gain > GATE
             and self.fitting.largest(s.asked) > NEARLY * MATERIAL
         ]
+        good = [s for s in able if current.corrected[s.candidate.label] < LEVEL]
+        if not good and self.lacking(current.base):
+            good = [s for s in able if s.score.z > GATE_Z]
         best = max((s.score.gain for s in good), default=0.0)
         single = balances(current.base.problem)
         alike: Counter[tuple[str, str, str]] = Counter()

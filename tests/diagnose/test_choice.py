@@ -120,3 +120,26 @@ def test_a_law_more_general_than_a_rival_is_none() -> None:
     assert Search.rivals(judge, winner, [general]) == [general]  # nothing simpler was fitted there
     judge.apart = lambda first, second: first is other
     assert Search.rivals(judge, winner, [elsewhere, other]) == [elsewhere]
+
+
+def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: set())
+
+    def refitted(lacking: bool, z: float) -> int:
+        candidate = SimpleNamespace(label="a", effect="a", instance="motor", port="winding")
+        item = SimpleNamespace(
+            candidate=candidate, score=SimpleNamespace(gain=100.0, z=z), unseen=False, asked=None
+        )
+        search: Any = SimpleNamespace(
+            fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking
+        )
+        found: Any = SimpleNamespace(
+            signatures=[item], corrected={"a": 0.8}, base=SimpleNamespace(problem=0)
+        )
+        return len(Search.promising(search, found))
+
+    assert refitted(True, 2.5) == 1
+    assert refitted(False, 2.5) == 0  # at the noise: nothing to look for
+    assert refitted(True, 1.5) == 0
