@@ -159,8 +159,13 @@ class Search(Judge):
             draft: only to be compared; its intervals are not needed.
         """
         theta = quick.estimate.theta
-        problem = corrected(quick.problem, theta, self.raw)
-        return self.again(self.judged(fit(problem, theta, near=True, draft=draft)), quick, base)
+        try:
+            problem = corrected(quick.problem, theta, self.raw)
+            found = self.judged(fit(problem, theta, near=True, draft=draft))
+        except CosimError as error:  # a step finer than that of the quick fit may be unstable
+            self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
+            return quick
+        return self.again(found, quick, base)
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""
@@ -559,7 +564,11 @@ class Search(Judge):
     def eliminated(self, fitted: Fitted) -> Fitted:
         """The model without effects that later ones have made superfluous."""
         for effect in fitted.effects[:-1]:
-            less = self.without(fitted, effect)
+            try:
+                less = self.without(fitted, effect)
+            except CosimError as error:  # it is needed
+                self.say(f"without {effect.label}: {error}")
+                continue
             gate = compare(self.check_data, less.check, fitted.check, self.checking)
             if not gate.passed:
                 self.say(f"dropped again: {effect.label}")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.fit import fit
+from ..errors import CosimError
 from .deferred import corrected
 from .linear import Layout
 from .models import Fitted
@@ -59,12 +60,16 @@ def trimmed(search: Search, fitted: Fitted) -> tuple[Fitted, dict[str, list[tupl
     ):
         return fitted, {}
     theta = fitted.estimate.theta
-    problem = corrected(fitted.problem, theta, search.raw)
-    data = {
-        name: np.where(where[:, None], np.nan, problem.run(name).data)
-        for name, where in sudden.items()
-    }
-    found = search.judged(fit(problem.with_data(data), theta, near=True))
+    try:
+        problem = corrected(fitted.problem, theta, search.raw)
+        data = {
+            name: np.where(where[:, None], np.nan, problem.run(name).data)
+            for name, where in sudden.items()
+        }
+        found = search.judged(fit(problem.with_data(data), theta, near=True))
+    except CosimError as error:
+        search.say(f"no fit without bursts: {error}")
+        return fitted, {}
     found.effects, found.signature = fitted.effects, fitted.signature
     found.gate, found.p_value = fitted.gate, fitted.p_value
     if search.lacking(found):

@@ -143,3 +143,33 @@ def test_without_significance_unused_runs_decide_where_something_is_evidently_mi
     assert refitted(True, 2.5) == 1
     assert refitted(False, 2.5) == 0  # at the noise: nothing to look for
     assert refitted(True, 1.5) == 0
+
+
+def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
+    needed, last = SimpleNamespace(label="delay at motor.command"), SimpleNamespace(label="b")
+
+    def without(*_: Any) -> None:
+        raise CosimError("unstable")
+
+    said: list[str] = []
+    search: Any = SimpleNamespace(without=without, say=said.append)
+    model: Any = SimpleNamespace(effects=(needed, last))
+    assert Search.eliminated(search, model) is model
+    assert said == ["without delay at motor.command: unstable"]
+
+
+def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: Any) -> None:
+        raise CosimError("unstable")
+
+    monkeypatch.setattr("cosim.diagnose.search.corrected", fail)
+    said: list[str] = []
+    effect = SimpleNamespace(label="delay at motor.command")
+    quick: Any = SimpleNamespace(
+        effects=(effect,), problem=None, estimate=SimpleNamespace(theta=None)
+    )
+    search: Any = SimpleNamespace(raw=None, say=said.append)
+    assert Search.sharpened(search, quick, quick) is quick
+    assert said == ["delay at motor.command could not be fitted thoroughly: unstable"]
