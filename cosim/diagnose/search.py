@@ -41,6 +41,9 @@ MEMBERS = 2
 SHARED, WHOLES = 0.5, 3
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most so many: members must not crowd it out."""
+EXTRA = 2
+"""Where the model is far off, so many that gain half as much as the best one are refitted though
+not significant: the blocks' variance is then that of what is missing."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
@@ -267,7 +270,8 @@ class Search(Judge):
         """Candidates worth a refit: significant, not too small to matter, the best gains first.
 
         Where something is evidently missing and none is significant (an effect that shows in few
-        moments has few blocks to prove itself), unused runs decide alone.
+        moments has few blocks to prove itself), unused runs decide alone. So they do on a few more
+        where the model is far off.
         """
         able = [
             s
@@ -299,7 +303,15 @@ class Search(Judge):
             and s.candidate.port
             and (s.candidate.instance, s.candidate.port) not in single
         ]
-        return few[:REFITS] + shared[:WHOLES]
+        chosen = few[:REFITS] + shared[:WHOLES]
+        if chosen and is_open(current.base.estimate):
+            known = {s.candidate.label for s in (*good, *chosen)}
+            chosen += [
+                s for s in able
+                if s.candidate.label not in known and s.score.z > GATE_Z
+                and s.score.gain > SHARED * best
+            ][:EXTRA]  # fmt: skip
+        return chosen
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.

@@ -13,6 +13,13 @@ from cosim.errors import CosimError
 MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
 
 
+def near(mean_square: float = 1.0) -> Any:
+    """A model with this mean square over the noise's."""
+    return SimpleNamespace(
+        problem=0, estimate=SimpleNamespace(cost=0.5 * mean_square * 1e4, count=10000)
+    )
+
+
 def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Labels that are refitted, of `effect at instance.port` -> gain, all of them significant."""
     monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: MEMBERS)
@@ -26,7 +33,7 @@ def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str
             SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
         )
     round_: Any = SimpleNamespace(
-        signatures=signatures, corrected=dict.fromkeys(gains, 0.0), base=SimpleNamespace(problem=0)
+        signatures=signatures, corrected=dict.fromkeys(gains, 0.0), base=near()
     )
     search: Any = SimpleNamespace(fitting=SimpleNamespace(largest=lambda change: 1.0))
     return [s.candidate.label for s in Search.promising(search, round_)]
@@ -135,9 +142,7 @@ def test_without_significance_unused_runs_decide_where_something_is_evidently_mi
         search: Any = SimpleNamespace(
             fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking
         )
-        found: Any = SimpleNamespace(
-            signatures=[item], corrected={"a": 0.8}, base=SimpleNamespace(problem=0)
-        )
+        found: Any = SimpleNamespace(signatures=[item], corrected={"a": 0.8}, base=near())
         return len(Search.promising(search, found))
 
     assert refitted(True, 2.5) == 1
@@ -173,3 +178,24 @@ def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
     search: Any = SimpleNamespace(raw=None, say=said.append)
     assert Search.sharpened(search, quick, quick) is quick
     assert said == ["delay at motor.command could not be fitted thoroughly: unstable"]
+
+
+@pytest.mark.parametrize("mean_square, expected", [(1e3, ["lag", "delay"]), (1.0, ["lag"])])
+def test_far_off_a_few_that_are_not_significant_are_refitted_too(
+    mean_square: float, expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: set())
+    signatures = [
+        SimpleNamespace(
+            candidate=SimpleNamespace(label=label, effect=label, instance="motor", port="command"),
+            score=SimpleNamespace(gain=gain, z=z), unseen=False, asked=None,
+        )
+        for label, gain, z in (("lag", 6.8e7, 10.7), ("delay", 4.4e7, 4.0), ("ripple", 4e7, 1.9),
+                               ("sag", 3e7, 4.0))
+    ]  # fmt: skip
+    search: Any = SimpleNamespace(fitting=SimpleNamespace(largest=lambda change: 1.0))
+    found: Any = SimpleNamespace(
+        signatures=signatures, base=near(mean_square),
+        corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
+    )  # fmt: skip
+    assert [s.candidate.label for s in Search.promising(search, found)] == expected
