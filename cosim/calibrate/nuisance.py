@@ -130,6 +130,7 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
                 break
             cost = after
         part.close()
+    whole.close()
     kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
     return whole.hold(kept), values[: theta.size], before - after
 

@@ -26,7 +26,7 @@ from .models import Fitted
 from .power import power
 from .search import ROUNDS, Round, Search
 from .structure import Structure, structures
-from .trim import trimmed
+from .trim import trimmed, written
 
 Vector = NDArray[np.float64]
 PURPOSES = ("identification", "validation")
@@ -286,17 +286,13 @@ def _searched(
     if current.effects and not any(stage.rivals for stage in winners):
         current, result.aside = trimmed(search, current)
         for name, spans in result.aside.items():
-            say(f"left out of the last fit: {name} {_text(spans)}")
+            say(f"left out of the last fit: {name} {written(spans)}")
     result.after = current
     _judge(result, winners)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)
     result.wall = time.perf_counter() - begun
     return result
-
-
-def _text(spans: list[tuple[float, float]]) -> str:
-    return ", ".join(f"{first:.2f} to {last:.2f} s" for first, last in spans)
 
 
 def _tests(search: Search, fitted: Fitted, purpose: str) -> list[Structure]:

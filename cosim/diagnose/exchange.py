@@ -55,6 +55,7 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
+            trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
             gate = compare(search.check_data, present.check, trial.check, search.checking)
             gain = search.gain(present, trial) + gate.gain
             search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")

@@ -78,6 +78,11 @@ def trimmed(search: Search, fitted: Fitted) -> tuple[Fitted, dict[str, list[tupl
     return found, times
 
 
+def written(spans: list[tuple[float, float]]) -> str:
+    """Stretches of time for people."""
+    return ", ".join(f"{first:.2f} to {last:.2f} s" for first, last in spans)
+
+
 def _spans(times: Vector, where: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """First and last time of each stretch."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(np.int8)))

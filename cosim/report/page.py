@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..diagnose.trim import written
 from .chart import COLOURS, Line, lines
 
 if TYPE_CHECKING:
@@ -201,10 +202,7 @@ def _starts(values: dict[str, dict[str, float]]) -> str:
 def _aside(spans: dict[str, list[tuple[float, float]]]) -> str:
     if not spans:
         return ""
-    rows = [
-        [_td(run), _td(", ".join(f"{first:.2f} to {last:.2f} s" for first, last in parts))]
-        for run, parts in spans.items()
-    ]
+    rows = [[_td(run), _td(written(parts))] for run, parts in spans.items()]
     return (
         "<p>Left out of the last fit: bursts of residuals, where the smallest difference decides "
         "when something happens (casters that turn over). They count in all other tables.</p>"
