@@ -28,7 +28,7 @@ from .recording import Recording
 from .start import find_past
 
 Vector = NDArray[np.float64]
-LOOK, CHECK = 10, 100
+LOOK, CHECK = 50, 100
 """Communication steps after which a limited run looks at the clock, and at what it has recorded."""
 RUNAWAY = 1e30
 """Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,

@@ -9,7 +9,7 @@ derivatives, ends the fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
 EVEN, ROUGHLY = 1e-3, 1e-2
 """Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
-second for drafts."""
+second for drafts and quick fits."""
 PURPOSE = "identification"
 
 
@@ -50,16 +50,27 @@ class Known:
     """Derivatives of another fit, to be used again for a model with some parameters more or less.
 
     Args:
-        estimate: that fit.
+        names: parameters of that fit.
+        jacobian: its derivatives.
     """
 
-    def __init__(self, estimate: Estimate) -> None:
-        names = estimate.problem.names
-        self.runs = {item.run: item for item in estimate.jacobian}
+    def __init__(self, names: Sequence[str], jacobian: Iterable[Sensitivity]) -> None:
+        self.runs = {item.run: item for item in jacobian}
         self.place = {
             name: {names[i]: k for k, i in enumerate(item.columns.tolist())}
             for name, item in self.runs.items()
         }
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Known:
+        """Those of a fit."""
+        return cls(estimate.problem.names, estimate.jacobian)
+
+    @classmethod
+    def at(cls, problem: Problem, theta: Vector) -> Known:
+        """Those at a point of the parameters."""
+        found = problem.jacobian(theta, PURPOSE, central=False, relative=STEPS[1])
+        return cls(problem.names, found)
 
     def extended(
         self, problem: Problem, theta: Vector, purpose: str | Iterable[str]
@@ -229,10 +240,13 @@ class Descent:
             weight = self.weight if math.isfinite(self.cap) else None
             normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
             before = self.cost
-            if self.settle(normal, 1) or self.cost == before:
+            if self.settle(normal, 1) or before - self.cost <= self.enough(ROUGHLY):
                 return
-            if before - self.cost <= max(SETTLED, 1e-4 * before):
-                return
+
+    def enough(self, share: float) -> float:
+        """Fall of the cost below which a fit ends: a share of what is left beyond the noise."""
+        noise = 0.5 * float(sum(np.isfinite(r).sum() for _, r in self.residuals))
+        return max(SETTLED, share * (self.cost - noise))
 
     def gradient(self) -> Vector:
         """J^T r with the last Jacobian and the present residuals."""
@@ -264,11 +278,10 @@ class Descent:
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
-        noise = 0.5 * sum(np.isfinite(r).sum() for _, r in self.residuals)
         for _ in range(DRAFTED if draft else RENEWALS):
             before = self.cost
             normal = self.normal(STEPS[-1], central=not draft)
-            enough = max(SETTLED, (ROUGHLY if draft else EVEN) * (self.cost - noise))
+            enough = self.enough(ROUGHLY if draft else EVEN)
             if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
                 break
         return normal

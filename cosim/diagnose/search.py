@@ -32,7 +32,8 @@ from .signature import Signature, merge, worthy
 Vector = NDArray[np.float64]
 NEARLY = 0.7
 """Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
-REFITS = 6
+REFITS, ITERATIONS = 6, 6
+"""Candidates that are refitted, and steps of a quick fit, at most."""
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
 refitted: it is no rival, and another round will ask again."""
@@ -104,6 +105,7 @@ class Search(Judge):
         self.evaluations = 0
         self.rounds: list[Round] = []
         self.own: dict[str, Sensitivity] | None = None
+        self._begun: tuple[Fitted, Known] | None = None
         self._builder = ThreadPoolExecutor(1)
 
     def prepare(self, problem: Problem | None = None) -> None:
@@ -137,7 +139,7 @@ class Search(Judge):
         if exact:
             return self.judged(first)
         near = corrected(raw, first.theta, raw)
-        second = fit(near, first.theta, known=Known(first))
+        second = fit(near, first.theta, known=Known.of(first))
         near.close()
         self.evaluations += second.evaluations
         self.say("errors of the exchange removed")
@@ -148,9 +150,9 @@ class Search(Judge):
 
     def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
-        known = None if close is None else Known(close)
+        known = None if close is None else Known.of(close)
         return self.judged(
-            fit(problem, theta, limit=6, robust=False, polish=known is None, known=known)
+            fit(problem, theta, limit=ITERATIONS, robust=False, polish=known is None, known=known)
         )
 
     def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
@@ -354,10 +356,9 @@ class Search(Judge):
             costs = [self._cost(problem, theta) for theta in starts]
             result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
             if again and self.far(base) and self.far(result):
-                kept = {p.name: base.estimate.values[p.name] for p in base.problem.parameters
-                        if p.run or p.role == "effect"}  # fmt: skip
+                kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
-                anew = self.anew(problem, kept, limit=1, robust=False)
+                anew = self.anew(problem, kept, base, limit=ITERATIONS)
                 if anew is not None and anew.estimate.cost < result.estimate.cost:
                     result = anew
         except CosimError as error:
@@ -367,19 +368,44 @@ class Search(Judge):
         result.signature = item
         return result
 
-    def anew(self, problem: Problem, kept: Mapping[str, float], **how: Any) -> Fitted | None:
+    @staticmethod
+    def effects(fitted: Fitted) -> dict[str, float]:
+        """Values of a model's effects, and those that concern one run only."""
+        return {
+            p.name: fitted.estimate.values[p.name]
+            for p in fitted.problem.parameters
+            if p.run or p.role == "effect"
+        }
+
+    def begun(self, base: Fitted) -> Known:
+        """Derivatives of a model at nominal values of its declared parameters."""
+        if self._begun is None or self._begun[0] is not base:
+            problem = base.problem._with()
+            problem.limits = patience(base.problem)
+            theta = problem.nominal
+            for name, value in self.effects(base).items():
+                theta[problem.index(name)] = value
+            self._begun = base, Known.at(problem, theta)
+            problem.close()
+        return self._begun[1]
+
+    def anew(
+        self, problem: Problem, kept: Mapping[str, float], base: Fitted | None = None, **how: Any
+    ) -> Fitted | None:
         """A rough fit from nominal values; None if that cannot be simulated.
 
         Args:
             problem: to fit.
             kept: parameters that begin elsewhere.
+            base: a model without the last effect, whose derivatives will do.
             how: arguments of `fit`.
         """
         theta = problem.nominal
         for name, value in kept.items():
             theta[problem.index(name)] = value
         try:
-            return self.judged(fit(problem, theta, rough=True, **how))
+            known = None if base is None else self.begun(base)
+            return self.judged(fit(problem, theta, rough=True, known=known, **how))
         except CosimError as error:
             self.say(f"no fit from nominal values: {error}")
             return None
@@ -430,8 +456,10 @@ class Search(Judge):
 
     def opened(self, base: Fitted, current: Round, first: Fitted) -> Round:
         """End a round whose best model evidently lacks more: others are compared after that."""
-        found = self.released(self.refined(base, self.retried(first, base)), base)
-        current.winner = self.sharpened(found, base, draft=True)
+        found = self.refined(base, self.retried(first, base), quick=True)
+        current.winner = self.released(found, base)
+        if current.winner is found:
+            current.winner = self.sharpened(found, base, draft=True)
         if not is_open(current.winner.estimate):
             current.winner = self.sharpened(current.winner, base)
         current.fitted = [current.winner if f is first else f for f in current.fitted]
@@ -503,7 +531,7 @@ class Search(Judge):
             if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
                 return winner
             self.say(f"start values of the runs estimated: {fall:.0f} nats")
-            found = self.judged(fit(problem, theta, rough=True, limit=3, robust=False))
+            found = self.judged(fit(problem, theta, near=True, draft=True))
         except CosimError as error:
             self.say(f"start values of the runs could not be estimated: {error}")
             return winner
@@ -532,8 +560,14 @@ class Search(Judge):
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
 
-    def refined(self, base: Fitted, fitted: Fitted) -> Fitted:
-        """The fit with all parameters of its last effect free, if unused runs want that."""
+    def refined(self, base: Fitted, fitted: Fitted, *, quick: bool = False) -> Fitted:
+        """The fit with all parameters of its last effect free, if unused runs want that.
+
+        Args:
+            base: model without the effect.
+            fitted: that fit.
+            quick: a thorough one follows anyway.
+        """
         item = fitted.signature
         if item is None:
             return fitted
@@ -561,7 +595,7 @@ class Search(Judge):
         ):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
-        return self.sharpened(result, base, draft=True)
+        return result if quick else self.sharpened(result, base, draft=True)
 
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..model import Model, misfit
+from ..quantity import Quantity
 from ..variant import build_model, components, devices, effects, fidelities, parse_name
 
 
@@ -49,8 +50,9 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
     """(effect, balance, its sentence) for every effect that could be added to a variant.
 
     Balances that share parameters are named by their group and, where it has several members, one
-    by one. Random effects (with a seed) are left out: their values say nothing about a log; so are
-    effects of which a more special one has the same law there.
+    by one; only by their group for effects at a place in the world, which every wheel meets that
+    comes there. Random effects (with a seed) are left out: their values say nothing about a log; so
+    are effects of which a more special one has the same law there.
     """
     parsed = parse_name(name)
     model = build_model(parsed)
@@ -70,8 +72,15 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
         special = {item.general for item in fitting.values()}
         for effect, item in fitting.items():
             if f"{effect}@{group}" not in present and effect not in special:
-                found += [(effect, place, item.text) for place in places]
+                some = [group] if _has_place(effect) else places
+                found += [(effect, place, item.text) for place in some]
     return found
+
+
+def _has_place(effect: str) -> bool:
+    """Whether an effect sits at a point in the world."""
+    values = vars(effects()[effect]).values()
+    return any(isinstance(v, Quantity) and v.visits for v in values)
 
 
 def refinements(name: str) -> list[tuple[str, str, dict[str, float], str]]:
