@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
 from .estimate import BOUNDS, KNOWN, Estimate, estimated
-from .normal import Normal, cost_of, drawn, gradient
+from .normal import OUTLYING, Normal, cost_of, drawn, gradient
 from .parts import Sensitivity
 from .problem import Problem
 
@@ -34,15 +34,17 @@ CALM = 0.8
 """Share of the information on a direction that runs without jumps give: then derivatives do."""
 RENEWALS, DRAFTED = 5, 3
 """Jacobians that a fit from close by takes at most, and that a draft takes."""
+FIRM = 1e-9
+"""Damping of a Gauss-Newton step, relative to the information, with which a quick fit begins."""
 PARTS = (1.0, 0.3, 0.1)
 """Shares of a step that are tried."""
 SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
-EVEN, ROUGHLY = 1e-3, 1e-2
+EVEN, ROUGHLY, QUICKLY = 1e-3, 1e-2, 3e-2
 """Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
-second for drafts and quick fits."""
+second for drafts, the third for quick fits."""
 PURPOSE = "identification"
 
 
@@ -126,6 +128,7 @@ class Descent:
         self.cap = math.inf
         self.iterations = 0
         self.promised = math.inf
+        self.damping = FIRM
         self.begun = problem.evaluations if begun is None else begun
         self.drawn = drawn(problem)
         self.residuals = problem.residuals(self.theta, self.purpose)
@@ -228,20 +231,22 @@ class Descent:
             if first - self.cost <= tolerance * max(first, 1.0):
                 return
 
-    def follow(self, known: Known, limit: int) -> None:
+    def follow(self, known: Known, limit: int, share: float) -> None:
         """Gauss-Newton with a Jacobian from close by; only what it lacks is differentiated.
 
         Parameters that were there before hardly change what they do when one is added, so a step
         costs one simulation and one for each new parameter.
         """
+        damping = FIRM
         for _ in range(limit):
             self.iterations += 1
             self.jacobian = known.extended(self.problem, self.theta, self.purpose)
             weight = self.weight if math.isfinite(self.cap) else None
             normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
             before = self.cost
-            if self.settle(normal, 1) or before - self.cost <= self.enough(ROUGHLY):
+            if self.settle(normal, 1, damping) or before - self.cost <= self.enough(share):
                 return
+            damping = max(0.1 * self.damping, FIRM)
 
     def enough(self, share: float) -> float:
         """Fall of the cost below which a fit ends: a share of what is left beyond the noise."""
@@ -253,17 +258,17 @@ class Descent:
         weight = self.weight if math.isfinite(self.cap) else None
         return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
 
-    def settle(self, normal: Normal, limit: int) -> bool:
+    def settle(self, normal: Normal, limit: int, damping: float = FIRM) -> bool:
         """Damped steps with one Jacobian; whether they came to where it promises no more."""
-        damping = 1e-9
         for _ in range(limit):
+            self.damping = damping
             whole = self.step(normal, damping)
             if abs(self.promised) < SETTLED:
                 return True
             # a limit or a threshold is passed: the direction is right, but not so far
             if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
                 for _ in range(SHORTER):
-                    damping = max(damping, 1e-7) * 30.0
+                    damping = self.damping = max(damping, 1e-7) * 30.0
                     if self.attempt(self.step(normal, damping)):
                         break
                 else:
@@ -319,8 +324,11 @@ def fit(
     near: bool = False,
     draft: bool = False,
     known: Known | None = None,
+    share: float = EVEN,
 ) -> Estimate:
     """Estimate the parameters of a problem.
+
+    Near the solution, residuals beyond `normal.OUTLYING` sigma count linearly.
 
     Args:
         problem: what to fit.
@@ -333,12 +341,15 @@ def fit(
         near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
+        share: with `known`, of the cost beyond the noise's, below which a fall ends the fit.
         draft: with `near`, a one-sided Jacobian: the minimum counts and not its intervals.
     """
     begun = problem.evaluations
     run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
+    if near or known is not None:
+        run.set_cap(OUTLYING)
     if known is not None:
-        run.follow(known, limit)
+        run.follow(known, limit, share)
         return estimated(run)
     if near:
         run.correct(draft=draft)
@@ -356,6 +367,7 @@ def fit(
         run.descend(STEPS[1], 4, 0.01)
         run.set_cap(math.inf)
     run.descend(STEPS[1], limit, 5e-3 if rough else 1e-4)
+    run.set_cap(OUTLYING)
     if polish and not rough:
         run.polish()
     elif not rough:

@@ -14,6 +14,9 @@ from .problem import Problem
 Vector = NDArray[np.float64]
 BLOCK = 1.0
 """Length of the blocks over which residuals may be correlated [s]."""
+OUTLYING = 10.0
+"""Residuals over sigma that count linearly where models are compared: no noise is that large, and
+where a run turns unstable, squares of hundreds of sigma would decide instead of all the rest."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 

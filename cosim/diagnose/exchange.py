@@ -29,7 +29,7 @@ MOST = 3
 
 def is_open(estimate: Estimate) -> bool:
     """Whether a fitted model evidently lacks something."""
-    return 2.0 * estimate.cost > OPEN * estimate.count
+    return 2.0 * estimate.robust > OPEN * estimate.count
 
 
 def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:

@@ -16,16 +16,8 @@ RIVAL_Z = 2.0
 FAR = 4.0
 """Mean square over the noise's from which a model is far off: its parameters then stand where they
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
-OUTLYING = 10.0
-"""Residuals over sigma that count linearly in a comparison: no noise is that large."""
 EXPLAINED = 0.98
 """Share of what a model leaves beyond noise from which a candidate explains nearly all of it."""
-
-
-def outlying(residual: Vector) -> float:
-    """What squares count more than Huber's function does, beyond `OUTLYING` sigma [nats]."""
-    over = np.maximum(np.abs(residual) - OUTLYING, 0.0)
-    return 0.5 * float(over @ over)
 
 
 class Judge:
@@ -86,10 +78,9 @@ class Judge:
     def gain(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on the identification runs, less one per additional parameter.
 
-        Residuals beyond `OUTLYING` sigma count linearly (Huber): where a run turns unstable,
-        squares of hundreds of sigma would decide, and not the rest of all runs.
+        Residuals beyond `normal.OUTLYING` sigma count linearly.
         """
-        costs = [f.estimate.cost - outlying(self.fit_data - f.fit) + f.free for f in (base, other)]
+        costs = [f.estimate.robust + f.free for f in (base, other)]
         return costs[0] - costs[1]
 
     def total(self, base: Fitted, other: Fitted) -> float:
@@ -121,12 +112,12 @@ class Judge:
     def far(self, base: Fitted) -> bool:
         """Whether a model is far off the data, with parameters driven to their bounds."""
         estimate = base.estimate
-        return 2.0 * estimate.cost > FAR * estimate.count and bool(estimate.at_bound)
+        return 2.0 * estimate.robust > FAR * estimate.count and bool(estimate.at_bound)
 
     def explained(self, base: Fitted, fitted: list[Fitted]) -> bool:
         """Whether one of these models explains nearly all that the base leaves beyond noise."""
         noise = 0.5 * base.estimate.count
-        beyond = base.estimate.cost - outlying(self.fit_data - base.fit) - noise
+        beyond = base.estimate.robust - noise
         gains = [self.gain(base, f) for f in fitted]
         return beyond > GATE and max(gains, default=0.0) > EXPLAINED * beyond
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
-from ..calibrate.fit import Known, fit
+from ..calibrate.fit import QUICKLY, Known, fit
 from ..calibrate.nuisance import released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
@@ -152,8 +152,11 @@ class Search(Judge):
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
         known = None if close is None else Known.of(close)
         return self.judged(
-            fit(problem, theta, limit=ITERATIONS, robust=False, polish=known is None, known=known)
-        )
+            fit(
+                problem, theta, limit=ITERATIONS, robust=False, polish=known is None,
+                known=known, share=QUICKLY,
+            )
+        )  # fmt: skip
 
     def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
         """A quickly fitted model fitted again with derivatives of its own.
@@ -359,7 +362,7 @@ class Search(Judge):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
                 anew = self.anew(problem, kept, base, limit=ITERATIONS)
-                if anew is not None and anew.estimate.cost < result.estimate.cost:
+                if anew is not None and anew.estimate.robust < result.estimate.robust:
                     result = anew
         except CosimError as error:
             self.say(f"{item.candidate.label} could not be refitted: {error}")
@@ -405,7 +408,7 @@ class Search(Judge):
             theta[problem.index(name)] = value
         try:
             known = None if base is None else self.begun(base)
-            return self.judged(fit(problem, theta, rough=True, known=known, **how))
+            return self.judged(fit(problem, theta, rough=True, known=known, share=QUICKLY, **how))
         except CosimError as error:
             self.say(f"no fit from nominal values: {error}")
             return None
@@ -513,7 +516,7 @@ class Search(Judge):
         effects = {p.name for p in problem.parameters if p.role == "effect"}
         kept = {n: v for n, v in winner.estimate.values.items() if n in effects}
         found = self.anew(problem, kept, limit=6, robust=True)
-        if found is None or not found.estimate.cost < winner.estimate.cost - GATE:
+        if found is None or not found.estimate.robust < winner.estimate.robust - GATE:
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
         return self.again(found, winner, base)

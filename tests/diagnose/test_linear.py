@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnose.judge import OUTLYING, outlying
+from cosim.calibrate.normal import OUTLYING, cost_of
 from cosim.diagnose.linear import Absorber, Layout, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
@@ -121,10 +121,12 @@ def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
 
 def test_outlying_residuals_count_linearly() -> None:
     residual = np.array([0.0, -9.0, OUTLYING, -12.0, 500.0])
-    huber = 0.5 * float(residual @ residual) - outlying(residual)
+    problem: Any = SimpleNamespace(parameters=())
+    huber = cost_of(problem, np.zeros(0), [("run", residual[:, None])], OUTLYING)
     linear = OUTLYING * (12.0 + 500.0) - OUTLYING**2
     assert huber == pytest.approx(0.5 * (81.0 + OUTLYING**2) + linear, rel=1e-12)
-    assert outlying(np.array([9.9, -9.9])) == 0.0
+    calm = [("run", np.array([[9.9, -9.9]]))]
+    assert cost_of(problem, np.zeros(0), calm, OUTLYING) == cost_of(problem, np.zeros(0), calm)
 
 
 def test_a_value_that_was_tried_from_a_list_counts() -> None:

@@ -20,7 +20,7 @@ from cosim.diagnose.trim import bursts, trimmed
 from cosim.report.page import _aside
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
-FIRST, LAST = 500, 512
+FIRST, LAST = 500, 540
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,6 @@ def test_a_burst_pulls_no_parameter(clean: Problem) -> None:
         return float(np.max(2.0 * np.abs(estimate.theta - one.theta)[known] / width[known]))
 
     width = one.high - one.low
-    # half-widths of the intervals: 3 % fewer samples of one run change next to nothing
-    assert off(other) < 0.02
-    assert off(pulled) > 0.2
+    # half-widths of the intervals: fits end where a step promises 0.2 nats, up to 0.3 of them
+    assert off(other) < 0.1
+    assert off(pulled) > 0.3
