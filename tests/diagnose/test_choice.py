@@ -16,7 +16,10 @@ MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "r
 def near(mean_square: float = 1.0) -> Any:
     """A model with this mean square over the noise's."""
     return SimpleNamespace(
-        problem=0, estimate=SimpleNamespace(cost=0.5 * mean_square * 1e4, robust=0.5 * mean_square * 1e4, count=10000)
+        problem=0,
+        estimate=SimpleNamespace(
+            cost=0.5 * mean_square * 1e4, robust=0.5 * mean_square * 1e4, count=10000
+        ),
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from cosim.calibrate import Problem, read_problem
 from cosim.diagnose.visits import visited
+from sources.packaging.catalog import candidates
 
 DATA = Path(__file__).resolve().parents[2] / "scenarios" / "motor_bench" / "data" / "MB-12"
 
@@ -38,3 +39,10 @@ def test_the_first_points_span_the_path(bench: Problem) -> None:
 def test_a_system_without_the_variable_has_no_such_places(bench: Problem) -> None:
     found = visited(bench, bench.nominal, [bench.runs[0]], ("load.angle", "load.nowhere"), 6)
     assert found.shape == (0, 2)
+
+
+def test_what_lies_on_the_floor_meets_every_wheel_that_comes_there() -> None:
+    found = {(effect, place) for effect, place, _ in candidates("mobile_base/planar")}
+    places = {place for effect, place in found if effect == "low_friction_patch"}
+    assert places == {"drive_wheel.mu", "caster.mu"}
+    assert {("pivot_torque", "caster.floor"), ("pivot_torque", "caster_fl.floor")} <= found
