@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..calibrate.estimate import Estimate
+from ..calibrate.fit import QUICKLY
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .models import GATE, Fitted, compare, more_general
@@ -72,6 +73,68 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
     return fitted
 
 
+def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
+    """The winner of a round, or its effect elsewhere, or a simpler law there, if that does as well.
+
+    Fits that end at different distances from their minima would tell laws apart that are one; so
+    all of these are fitted from where the winner's parameters are, down to `fit.SETTLED`.
+
+    Args:
+        search: fits and judges.
+        base: model without the effect.
+        stage: the round; the new fits take their places in it.
+    """
+    settled: dict[Candidate, Fitted] = {}
+    winner = stage.winner
+    while winner is not None and winner.effects[-1] not in settled:
+        others = _alike(search, base, stage, set(settled))
+        if not others:
+            return winner
+        first = winner
+        close = search.fitted(first.problem, first.estimate.theta, first.estimate, share=0.0)
+        winner = search.again(close, first, base)
+        stage.fitted = [winner if f is first else f for f in stage.fitted]
+        settled[winner.effects[-1]] = winner
+        for item, known in others:
+            try:
+                trial = exchanged(search, winner, item, known, share=0.0)
+            except CosimError as error:
+                search.say(f"{item.candidate.label} instead: {error}")
+                continue
+            trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
+            trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
+            more = search.total(base, trial) - search.total(base, winner)
+            search.say(f"{item.candidate.label} instead: {more:+.1f} nats on all runs")
+            stage.fitted = [f for f in stage.fitted if f is not known] + [trial]
+            settled[item.candidate] = trial
+        stage.fitted.sort(key=lambda f: -search.total(base, f))
+        mine = sorted(settled.values(), key=lambda f: -search.total(base, f))
+        best = search.chosen(base, mine) or winner
+        stage.winner = best
+        if best.effects[-1].effect == winner.effects[-1].effect:
+            return best
+        winner = best
+        del settled[best.effects[-1]]  # its places have not been compared yet
+    assert winner is not None
+    return winner
+
+
+def _alike(
+    search: Search, base: Fitted, stage: Round, known: set[Candidate]
+) -> list[tuple[Signature, Fitted | None]]:
+    """The winner's effect at other places and simpler laws at its own, but for known ones."""
+    winner = stage.winner
+    assert winner is not None
+    name = winner.effects[-1].effect
+    found: list[tuple[Signature, Fitted | None]] = [
+        (f.signature, f) for f in stage.fitted
+        if f is not winner and f.signature is not None and search.accepted(base, f)
+        and (f.effects[-1].effect == name or more_general(winner, f))
+    ]  # fmt: skip
+    found += [(twin, None) for twin in search.kin(base, stage)]
+    return [(item, f) for item, f in found if item.candidate not in known]
+
+
 def _seen_last(fitted: Fitted, winner: Fitted) -> Fitted:
     """A model as if the effect of an earlier round had been added last."""
     last = winner.effects[-1]
@@ -104,7 +167,14 @@ def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
     }
 
 
-def exchanged(search: Search, fitted: Fitted, item: Signature, known: Fitted | None) -> Fitted:
+def exchanged(
+    search: Search,
+    fitted: Fitted,
+    item: Signature,
+    known: Fitted | None,
+    *,
+    share: float = QUICKLY,
+) -> Fitted:
     """A model with another effect instead of its last one, quickly refitted.
 
     Args:
@@ -112,6 +182,7 @@ def exchanged(search: Search, fitted: Fitted, item: Signature, known: Fitted | N
         fitted: the model.
         item: what comes instead.
         known: a fit of that, for the values to begin with.
+        share: see `fit`.
 
     Raises:
         CosimError: it cannot be simulated.
@@ -134,7 +205,8 @@ def exchanged(search: Search, fitted: Fitted, item: Signature, known: Fitted | N
     for name, value in {**fitted.estimate.values, **values}.items():
         if name in problem.names:
             theta[problem.index(name)] = value
-    result = search.fitted(problem, theta.clip(problem.lower, problem.upper), fitted.estimate)
+    start = theta.clip(problem.lower, problem.upper)
+    result = search.fitted(problem, start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
     result.signature = item
     return result

@@ -21,10 +21,10 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates, new_parameters
 from .deferred import corrected, step_error
-from .exchange import absent, is_open
+from .exchange import absent, challenged, is_open
 from .judge import Judge
 from .linear import MATERIAL, Absorber, Layout, holm
-from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
+from .models import GATE, GATE_Z, LEVEL, Fitted, compare
 from .probes import batches
 from .secant import FLOOR, Bench, model_values, patience
 from .signature import Signature, merge, worthy
@@ -148,13 +148,20 @@ class Search(Judge):
             return self.judged(fit(self.declared, second.theta, near=True, draft=True))
         return self.judged(fit(self.declared, second.theta, limit=0, robust=False))
 
-    def fitted(self, problem: Problem, theta: Vector, close: Estimate | None = None) -> Fitted:
+    def fitted(
+        self,
+        problem: Problem,
+        theta: Vector,
+        close: Estimate | None = None,
+        *,
+        share: float = QUICKLY,
+    ) -> Fitted:
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
         known = None if close is None else Known.of(close)
         return self.judged(
             fit(
                 problem, theta, limit=ITERATIONS, robust=False, polish=known is None,
-                known=known, share=QUICKLY,
+                known=known, share=share,
             )
         )  # fmt: skip
 
@@ -430,23 +437,10 @@ class Search(Judge):
         if first is not None and is_open(first.estimate):
             return self.opened(base, current, first)
         # quick fits are too far from their minima to be told apart
-        done: list[Fitted] = []
-        share = LOOSE if self.far(base) else CLOSE
-        good = [f for f in current.fitted if self.accepted(base, f)]
-        self.finish(base, current, good, done, share)
+        self.finish(base, current, LOOSE if self.far(base) else CLOSE)
         current.winner = self.chosen(base, current.fitted)
         if current.winner is not None:
-            for item in self.kin(base, current):
-                self.tried(base, current, item, again=False)
-            name, place = current.winner.effects[-1].effect, current.winner.effects[-1].place
-            rest = [f for f in current.fitted if all(f is not d for d in done)]
-            rest = [f for f in rest if self.accepted(base, f) and (
-                f.effects[-1].effect == name
-                or (f.effects[-1].place == place and more_general(current.winner, f)))]  # fmt: skip
-            if rest:  # the same elsewhere and simpler ones: thoroughly, too, before one is named
-                self.finish(base, current, rest, done, CLOSE)
-                current.winner = self.chosen(base, current.fitted)
-        if current.winner is not None:
+            current.winner = challenged(self, base, current)
             drafted = current.winner
             current.winner = self.sharpened(self.released(self.retried(drafted, base), base), base)
             current.fitted = [current.winner if f is drafted else f for f in current.fitted]
@@ -540,26 +534,21 @@ class Search(Judge):
             return winner
         return self.again(found, winner, base) if self.gain(winner, found) > 0.0 else winner
 
-    def finish(
-        self, base: Fitted, current: Round, chosen: list[Fitted], done: list[Fitted], share: float
-    ) -> None:
-        """Replace the first few quick fits by thorough ones; `done` gets these.
+    def finish(self, base: Fitted, current: Round, share: float) -> None:
+        """Replace the first few quick fits by thorough ones.
 
         Args:
             base: model without the effects.
             current: round whose fits are replaced.
-            chosen: quick fits, best first.
-            done: thorough ones so far.
             share: of the best gain, below which a quick fit stays one.
         """
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
-        near = [f for f in chosen if self.total(base, f) > least][:REFINED]
-        rivals = len(near) + len(done) > 1
+        good = [f for f in current.fitted if self.accepted(base, f)]
+        near = [f for f in good if self.total(base, f) > least][:REFINED]
         better = {
-            id(f): self.refined(base, self.sharpened(f, base, draft=True) if rivals else f)
+            id(f): self.refined(base, self.sharpened(f, base, draft=True) if near[1:] else f)
             for f in near
         }
-        done += better.values()
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
 

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from benchmarks.motor_plant import Bench, draw, write_sets
+from benchmarks.own_plant import catalogue, example, made
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.exchange import reconsidered
+from cosim.diagnose.exchange import challenged, reconsidered
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Round, Search
 
+EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 RIGHT, WRONG = "coulomb at load.flange", "bearing_drag at load.flange"
 
@@ -65,3 +67,23 @@ def test_a_round_that_decided_is_not_reconsidered(stage: tuple[Search, Round]) -
         assert reconsidered(search, found.winner, [found]) is found.winner
     finally:
         found.open = True
+
+
+@pytest.mark.parametrize("truth", ["coulomb", "asymmetric_coulomb"])
+def test_a_simpler_law_is_named_where_it_does_as_well(truth: str) -> None:
+    rig = example(EXAMPLE, 3.0, 2)
+    labels = ("coulomb at load.flange", "asymmetric_coulomb at load.flange")
+    known = [c for c in catalogue(rig) if c.label in labels]
+    (item,) = [c for c in known if c.effect == truth]
+    search = Search(made(rig, item, 1.0, 7).problem, only=known)
+    base = search.calibrated()
+    stage = search.scored(base)
+    for signature in stage.signatures:
+        search.tried(base, stage, signature, again=False)
+    stage.winner = search.refined(base, fitted(stage, labels[1]))
+    stage.fitted = [fitted(stage, labels[0]), stage.winner]
+    assert stage.winner.complexity > fitted(stage, labels[0]).complexity
+    found = challenged(search, base, stage)
+    search.close()
+    assert found.effects[-1].effect == truth
+    assert any(f is found for f in stage.fitted)
