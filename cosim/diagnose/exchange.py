@@ -103,6 +103,7 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
                 continue
             trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
+            trial = search.refined(base, trial, quick=True, share=0.0)
             more = search.total(base, trial) - search.total(base, winner)
             search.say(f"{item.candidate.label} instead: {more:+.1f} nats on all runs")
             stage.fitted = [f for f in stage.fitted if f is not known] + [trial]

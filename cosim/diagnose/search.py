@@ -552,13 +552,16 @@ class Search(Judge):
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
 
-    def refined(self, base: Fitted, fitted: Fitted, *, quick: bool = False) -> Fitted:
+    def refined(
+        self, base: Fitted, fitted: Fitted, *, quick: bool = False, share: float = QUICKLY
+    ) -> Fitted:
         """The fit with all parameters of its last effect free, if unused runs want that.
 
         Args:
             base: model without the effect.
             fitted: that fit.
             quick: a thorough one follows anyway.
+            share: see `fit`.
         """
         item = fitted.signature
         if item is None:
@@ -575,7 +578,7 @@ class Search(Judge):
         for name, value in {**item.fixed, **fitted.estimate.values}.items():
             theta[problem.index(name)] = value
         try:
-            result = self.fitted(problem, theta, fitted.estimate)
+            result = self.fitted(problem, theta, fitted.estimate, share=share)
         except CosimError as error:
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
