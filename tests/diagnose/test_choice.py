@@ -102,8 +102,8 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    monkeypatch.setattr("cosim.diagnose.search.corrected", lambda *_: None)
-    monkeypatch.setattr("cosim.diagnose.search.released", fail)
+    monkeypatch.setattr("cosim.diagnose.fitter.corrected", lambda *_: None)
+    monkeypatch.setattr("cosim.diagnose.fitter.released", fail)
     winner: Any = SimpleNamespace(problem=None, estimate=SimpleNamespace(theta=None))
     said: list[str] = []
     search: Any = SimpleNamespace(
@@ -172,7 +172,7 @@ def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    monkeypatch.setattr("cosim.diagnose.search.corrected", fail)
+    monkeypatch.setattr("cosim.diagnose.fitter.corrected", fail)
     said: list[str] = []
     effect = SimpleNamespace(label="delay at motor.command")
     quick: Any = SimpleNamespace(
