@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.fit import STEPS
 from ..calibrate.parts import Run
-from ..calibrate.problem import Problem
 from ..errors import CosimError
 from ..signals import Table
 from .linear import Layout
@@ -40,40 +41,75 @@ def scaled(run: Run, factor: float) -> Run | None:
 def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
     """The run of the library in which two fitted models differ most, and by how much per channel.
 
-    What calibration of the first would absorb in that run alone is not subtracted, since the runs
-    at hand already fix the declared parameters.
+    The distance leaves out what calibration of the first model could take back in that run without
+    doing worse in the runs at hand.
+
+    Args:
+        first, second: models fitted to the same runs.
+
+    Returns:
+        run, input_factor, distance [standard deviations], repetitions, and channels: what the
+        models differ by in each, as they are; None if no run could be simulated with both.
     """
-    best: dict[str, Any] | None = None
+    best: tuple[float, Run, float, Layout, Vector] | None = None
     for run in first.problem.runs:
         for factor in FACTORS:
             changed = scaled(run, factor) if factor != 1.0 else run
             if changed is None:
                 continue
             try:
-                distance, channels = _distance(first, second, changed)
+                layout, change = _difference(first, second, changed)
             except (CosimError, ValueError):
                 continue
-            if best is None or distance > best["distance"]:
-                names = [c.name for c in first.problem.channels]
-                best = {
-                    "run": run.name,
-                    "input_factor": factor,
-                    "distance": distance,
-                    "repetitions": max(int(np.ceil((ENOUGH / max(distance, 1e-9)) ** 2)), 1),
-                    "channels": dict(zip(names, channels, strict=True)),
-                }
-    return best
+            size = float(np.linalg.norm(change))
+            if best is None or size > best[0]:
+                best = size, changed, factor, layout, change
+    if best is None:
+        return None
+    _, run, factor, layout, change = best
+    distance = _left(first, run, layout, change)
+    squares = np.bincount(layout.channel, change**2, layout.channels)
+    names = [c.name for c in first.problem.channels]
+    return {
+        "run": run.name,
+        "input_factor": factor,
+        "distance": distance,
+        "repetitions": max(int(np.ceil((ENOUGH / max(distance, 1e-9)) ** 2)), 1),
+        "channels": dict(zip(names, np.sqrt(squares).tolist(), strict=True)),
+    }
 
 
-def _distance(first: Fitted, second: Fitted, run: Run) -> tuple[float, list[float]]:
+def _difference(first: Fitted, second: Fitted, run: Run) -> tuple[Layout, Vector]:
+    """Model values of the second less those of the first, over sigma."""
     values = []
-    layout = None
     for item in (first, second):
-        p = item.problem
-        problem: Problem = p._with(runs=[run], parameters=p.parameters)
+        problem = item.problem._with(runs=[run])
         layout = Layout(problem, [run])
         values.append(model_values(problem, item.estimate.theta, layout))
         problem.close()
-    assert layout is not None
-    squares = np.bincount(layout.channel, (values[1] - values[0]) ** 2, layout.channels)
-    return float(np.sqrt(squares.sum())), np.sqrt(squares).tolist()
+    return layout, values[1] - values[0]
+
+
+def _left(fitted: Fitted, run: Run, layout: Layout, change: Vector) -> float:
+    """Norm of what is left of a change of a run when the parameters follow it.
+
+    min  |change - J d|^2 + d^T H d    over d,   H: information of the runs at hand
+    """
+    problem = fitted.problem._with(runs=[run])
+    jacobian = problem.jacobian(fitted.estimate.theta, [run.name], central=False, relative=STEPS[1])
+    problem.close()
+    slopes = layout.matrix(jacobian, problem.scale)
+    known = np.zeros((slopes.shape[1], slopes.shape[1]))
+    for item, (_, residual) in zip(
+        fitted.estimate.jacobian, fitted.estimate.residuals, strict=True
+    ):
+        part = (item.values * problem.scale[item.columns])[np.isfinite(residual)]
+        known[np.ix_(item.columns, item.columns)] += part.T @ part
+    for i, p in enumerate(problem.parameters):
+        if p.run:  # the next run starts elsewhere
+            known[i], known[:, i] = 0.0, 0.0
+        if p.prior:
+            known[i, i] += (p.scale / p.prior) ** 2
+    along = slopes.T @ change
+    taken = np.linalg.lstsq(slopes.T @ slopes + known, along, rcond=1e-12)[0]
+    return math.sqrt(max(float(change @ change) - float(along @ taken), 0.0))

@@ -1,0 +1,65 @@
+"""The proposed run tells apart what the runs at hand do not, as well as it was said to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from benchmarks.own_plant import example, made
+from cosim.calibrate.parts import Run
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.candidates import Candidate, candidates
+from cosim.diagnose.experiment import propose, scaled
+from cosim.diagnose.search import Round, Search
+
+EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
+
+
+def varied(run: Run, factor: float, name: str, purpose: str) -> Run:
+    """A run with scaled inputs."""
+    found = scaled(run, factor)
+    assert found is not None
+    return replace(found, name=name, purpose=purpose)
+
+
+def attributed(problem: Problem, known: list[Candidate]) -> Round:
+    """One round over these candidates."""
+    search = Search(problem, only=known)
+    try:
+        return search.round(search.calibrated())
+    finally:
+        search.close()
+
+
+@pytest.mark.parametrize(("truth", "size"), [("coulomb", 0.04), ("stribeck", 0.1)])
+def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
+    truth: str, size: float
+) -> None:
+    rig = example(EXAMPLE, 4.0, 2)
+    step = next(run for run in rig.runs if run.name == "ST1")
+    slow = [varied(step, 0.4, "A", "identification"), varied(step, 0.4, "B", "validation")]
+    rig = rig._with(runs=slow, parameters=[p for p in rig.parameters if not p.run])
+    labels = ("coulomb at load.flange", "stribeck at load.flange")
+    known = [c for c in candidates(rig) if c.label in labels]
+    (item,) = [c for c in known if c.effect == truth]
+
+    first = attributed(made(rig, item, size, 5).problem, known)
+    assert first.winner is not None and len(first.rivals) == 1
+    proposal = propose(first.winner, first.rivals[0])
+    assert proposal is not None and proposal["distance"] > 4.0
+
+    run = next(run for run in slow if run.name == proposal["run"])
+    more = [
+        varied(run, proposal["input_factor"], f"P{i}", "identification")
+        for i in range(proposal["repetitions"])
+    ]
+    second = attributed(made(rig._with(runs=[*slow, *more]), item, size, 5).problem, known)
+    assert second.winner is not None and second.rivals == []
+    assert second.winner.effects[-1].effect == truth
+    costs = {f.effects[-1].effect: f.estimate.cost for f in second.fitted}
+    gain = max(costs.values()) - min(costs.values())
+    # noise alone moves a gain of d^2 / 2 by d: 4 of these, on a distance of 16 and more
+    promised = proposal["distance"]
+    assert gain == pytest.approx(0.5 * promised**2 * len(more), abs=4.0 * promised)
