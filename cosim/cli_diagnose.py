@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -58,10 +58,7 @@ def _print(result: Diagnosis) -> None:
     console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.effects():
-        values = ", ".join(
-            f"{name} = {v['value']:.4g} [{v['ci95'][0]:.4g}, {v['ci95'][1]:.4g}] {v['unit']}"
-            for name, v in effect["parameters"].items()
-        )
+        values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
@@ -76,3 +73,10 @@ def _print(result: Diagnosis) -> None:
         )  # fmt: skip
     console.print(table)
     console.print(f"in {result.files[-1].parent}", soft_wrap=True)
+
+
+def _value(name: str, entry: dict[str, Any]) -> str:
+    """A parameter with its interval; open if the data say no more than its bounds."""
+    low, high = entry["ci95"]
+    tail = "" if entry["identifiable"] else " (open)"
+    return f"{name} = {entry['value']:.4g} [{low:.4g}, {high:.4g}] {entry['unit']}{tail}"

@@ -176,6 +176,7 @@ class Diagnosis:
                     "value": float(estimate.theta[i]),
                     "ci95": [float(estimate.low[i]), float(estimate.high[i])],
                     "unit": p.unit,
+                    "identifiable": bool(estimate.identifiable[i]),
                 }
                 for i, p in enumerate(estimate.problem.parameters)
                 if p.name.startswith(prefix)

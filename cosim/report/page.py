@@ -94,6 +94,12 @@ def _number(value: float | None) -> str:
     return "–" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
+def _interval(entry: dict[str, Any]) -> str:
+    """Both ends, and "open" if the data say no more than the bounds."""
+    low, high = entry["ci95"]
+    return f"{_number(low)} to {_number(high)}{'' if entry['identifiable'] else ', open'}"
+
+
 def _effects(effects: list[dict[str, Any]]) -> str:
     parts = []
     for item in effects:
@@ -104,7 +110,7 @@ def _effects(effects: list[dict[str, Any]]) -> str:
         share = item["explained"]
         rows = [
             [_td(name), _td(_number(v["value"])),
-             _td(f"{_number(v['ci95'][0])} to {_number(v['ci95'][1])}"), _td(v["unit"])]
+             _td(_interval(v)), _td(v["unit"])]
             for name, v in item["parameters"].items()
         ]  # fmt: skip
         parts.append(
@@ -179,10 +185,7 @@ def _parameters(parameters: dict[str, Any]) -> str:
             if value is None:
                 cells += [_td("–"), _td("–")]
                 continue
-            low, high = value["ci95"]
-            text = f"{_number(low)} to {_number(high)}"
-            cells += [_td(_number(value["value"])),
-                      _td(text + ("" if value["identifiable"] else ", open"))]  # fmt: skip
+            cells += [_td(_number(value["value"])), _td(_interval(value))]
         rows.append(cells)
     return "<h2>Parameters</h2>" + _table(
         ["parameter", "unit", "before", "95 % interval", "after", "95 % interval"], rows

@@ -15,10 +15,11 @@ import pytest
 from benchmarks.motor_plant import Bench, draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
+from cosim.cli_diagnose import _value
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.search import Round, Search
-from cosim.report.page import _starts, page
+from cosim.report.page import _interval, _starts, page
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 SIZE = 0.15
@@ -87,6 +88,7 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
     assert table["verdict"] == "effect_found"
     assert [e["effect"] for e in table["effects"]] == ["battery_sag"]
     assert table["localisation"][0]["component"] == "motor"
+    assert all(v["identifiable"] for e in table["effects"] for v in e["parameters"].values())
     json.dumps(table, allow_nan=False)
     text = page(result)
     for part in ("battery_sag at motor.winding", "Where the disturbance enters", "motor.winding"):
@@ -117,3 +119,10 @@ def test_start_values_that_were_estimated_are_reported(sets: dict[str, Path]) ->
     assert found == {problem.runs[0].name: {"theta_0": 0.125}}
     assert "theta_0" in _starts(found) and "0.125" in _starts(found)
     assert _starts({}) == ""
+
+
+def test_what_the_data_leave_open_is_said() -> None:
+    known = {"value": 0.5, "ci95": [0.2, 0.8], "unit": "W", "identifiable": True}
+    for entry, word in ((known, False), ({**known, "identifiable": False}, True)):
+        assert ("open" in _value("P_0", entry)) is word
+        assert ("open" in _interval(entry)) is word
