@@ -51,7 +51,7 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
         run, input_factor, distance [standard deviations], repetitions, and channels: what the
         models differ by in each, as they are; None if no run could be simulated with both.
     """
-    best: tuple[float, Run, float, Layout, Vector] | None = None
+    found: list[tuple[float, Run, float, Layout, Vector]] = []
     for run in first.problem.runs:
         for factor in FACTORS:
             changed = scaled(run, factor) if factor != 1.0 else run
@@ -59,24 +59,24 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
                 continue
             try:
                 layout, change = _difference(first, second, changed)
-            except (CosimError, ValueError):
+            except (CosimError, ValueError):  # not a run for these models
                 continue
-            size = float(np.linalg.norm(change))
-            if best is None or size > best[0]:
-                best = size, changed, factor, layout, change
-    if best is None:
-        return None
-    _, run, factor, layout, change = best
-    distance = _left(first, run, layout, change)
-    squares = np.bincount(layout.channel, change**2, layout.channels)
-    names = [c.name for c in first.problem.channels]
-    return {
-        "run": run.name,
-        "input_factor": factor,
-        "distance": distance,
-        "repetitions": max(int(np.ceil((ENOUGH / max(distance, 1e-9)) ** 2)), 1),
-        "channels": dict(zip(names, np.sqrt(squares).tolist(), strict=True)),
-    }
+            found.append((float(np.linalg.norm(change)), changed, factor, layout, change))
+    for _, run, factor, layout, change in sorted(found, key=lambda item: -item[0]):
+        try:
+            distance = _left(first, run, layout, change)
+        except CosimError:  # one that few parameter values can go through
+            continue
+        squares = np.bincount(layout.channel, change**2, layout.channels)
+        names = [c.name for c in first.problem.channels]
+        return {
+            "run": run.name,
+            "input_factor": factor,
+            "distance": distance,
+            "repetitions": max(int(np.ceil((ENOUGH / max(distance, 1e-9)) ** 2)), 1),
+            "channels": dict(zip(names, np.sqrt(squares).tolist(), strict=True)),
+        }
+    return None
 
 
 def _difference(first: Fitted, second: Fitted, run: Run) -> tuple[Layout, Vector]:
