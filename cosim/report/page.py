@@ -359,8 +359,9 @@ def _next(result: Diagnosis, table: dict[str, Any]) -> str:
     best = ", ".join(f"{name} ({value:.1f} σ)" for name, value in channels[:3])
     return (
         f"<h2>What to measure next</h2><p>Run {escape(proposal['run'])} {how}, "
-        f"{proposal['repetitions']} time(s): there the two explanations differ by "
-        f"{proposal['distance']:.1f} σ, mostly in {escape(best)}.</p>"
+        f"{proposal['repetitions']} time(s): there the two explanations stay "
+        f"{proposal['distance']:.1f} σ apart after calibration. As they are, they differ most in "
+        f"{escape(best)}.</p>"
     )
 
 
