@@ -112,10 +112,10 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
         mine = sorted(settled.values(), key=lambda f: -search.total(base, f))
         best = search.chosen(base, mine) or winner
         stage.winner = best
-        if best.effects[-1].effect == winner.effects[-1].effect:
+        if best is winner:
             return best
         winner = best
-        del settled[best.effects[-1]]  # its places have not been compared yet
+        del settled[best.effects[-1]]  # its places and simpler laws have not been compared yet
     assert winner is not None
     return winner
 
