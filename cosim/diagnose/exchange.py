@@ -86,15 +86,14 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
     """
     settled: dict[Candidate, Fitted] = {}
     winner = stage.winner
-    while winner is not None and winner.effects[-1] not in settled:
-        others = _alike(search, base, stage, set(settled))
-        if not others:
-            return winner
-        first = winner
-        close = search.fitted(first.problem, first.estimate.theta, first.estimate, share=0.0)
-        winner = search.again(close, first, base)
-        stage.fitted = [winner if f is first else f for f in stage.fitted]
-        settled[winner.effects[-1]] = winner
+    assert winner is not None
+    while others := _alike(search, base, stage, set(settled)):
+        if not settled:
+            first = winner
+            close = search.fitted(first.problem, first.estimate.theta, first.estimate, share=0.0)
+            winner = search.again(close, first, base)
+            stage.fitted = [winner if f is first else f for f in stage.fitted]
+            settled[winner.effects[-1]] = winner
         for item, known in others:
             try:
                 trial = exchanged(search, winner, item, known, share=0.0)
@@ -113,10 +112,8 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
         best = search.chosen(base, mine) or winner
         stage.winner = best
         if best is winner:
-            return best
-        winner = best
-        del settled[best.effects[-1]]  # its places and simpler laws have not been compared yet
-    assert winner is not None
+            break
+        winner = best  # its places and simpler laws have not been compared yet
     return winner
 
 
