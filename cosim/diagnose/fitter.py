@@ -61,6 +61,8 @@ class Fitter(Judge):
     ) -> Fitted:
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
         known = None if close is None else Known.of(close)
+        if close is not None and not problem.limits:
+            problem.limits = patience(close.problem)
         return self.judged(
             fit(
                 problem, theta, limit=ITERATIONS, robust=False, polish=known is None,

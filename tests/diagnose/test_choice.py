@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from cosim.diagnose.search import REFITS, Search
+from cosim.diagnose.secant import PATIENCE
 from cosim.errors import CosimError
 
 MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
@@ -202,3 +203,18 @@ def test_far_off_a_few_that_are_not_significant_are_refitted_too(
         corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
     )  # fmt: skip
     assert [s.candidate.label for s in Search.promising(search, found)] == expected
+
+
+@pytest.mark.parametrize("close", [None, 2.0])
+def test_quick_fits_have_a_limit_on_time(
+    close: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search: Any = Search.__new__(Search)
+    search.judged = lambda estimate: estimate
+    monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda problem, *_, **__: problem.limits)
+    monkeypatch.setattr("cosim.diagnose.fitter.Known.of", lambda estimate: None)
+    known: Any = None if close is None else SimpleNamespace(
+        problem=SimpleNamespace(costs={"A": close})
+    )  # fmt: skip
+    limits = search.fitted(SimpleNamespace(limits={}), [0.0], known)
+    assert limits == ({} if close is None else {"A": PATIENCE * close})
