@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
-from .normal import OUTLYING, Normal, cost_of, gradient
+from .loss import Windowed
+from .normal import Normal, cost_of, gradient
 from .parts import Sensitivity
 from .problem import Problem
 
@@ -63,7 +64,7 @@ class Estimate:
         combinations: what the runs cannot tell apart.
         at_bound: parameters that ended at a bound.
         cost: half the sum of squared residuals over sigma, priors included.
-        robust: the same with residuals beyond `normal.OUTLYING` sigma counted linearly (Huber).
+        robust: the same with windows that are far off counted by their logarithm (`loss.Windowed`).
         count: residuals.
         iterations, evaluations: of the fit.
         jacobian, residuals: at the solution, by run.
@@ -218,7 +219,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=cost,
-        robust=cost_of(problem, run.theta, run.residuals, OUTLYING),
+        robust=cost_of(problem, run.theta, run.residuals, Windowed()),
         count=count,
         iterations=run.iterations,
         evaluations=problem.evaluations - run.begun,

@@ -17,7 +17,8 @@ from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
 from .estimate import BOUNDS, KNOWN, Estimate, estimated
-from .normal import OUTLYING, Normal, cost_of, drawn, gradient
+from .loss import Huber, Loss, Squares, Windowed
+from .normal import Normal, cost_of, drawn, gradient
 from .parts import Sensitivity
 from .problem import Problem
 
@@ -125,7 +126,7 @@ class Descent:
         self.problem = problem
         self.purpose = purpose if isinstance(purpose, str) else list(purpose)
         self.theta = np.clip(theta, problem.lower, problem.upper)
-        self.cap = math.inf
+        self.loss: Loss = Squares()
         self.iterations = 0
         self.promised = math.inf
         self.damping = FIRM
@@ -138,24 +139,19 @@ class Descent:
         """Cost with the bounds as a weak prior, which decides where the data are silent."""
         p = self.problem
         away = ((theta - p.nominal) / p.scale)[self.drawn]
-        return cost_of(p, theta, residuals, self.cap) + 0.5 * BOUNDS * float(away @ away)
+        return cost_of(p, theta, residuals, self.loss) + 0.5 * BOUNDS * float(away @ away)
 
-    def set_cap(self, cap: float) -> None:
-        """Count residuals beyond so many sigma linearly."""
-        self.cap = cap
+    def count(self, loss: Loss) -> None:
+        """Count residuals in another way from here on."""
+        self.loss = loss
         self.cost = self.total(self.theta, self.residuals)
-
-    def weight(self, errors: Vector) -> Vector:
-        """Weights that make large residuals count linearly."""
-        return np.minimum(1.0, self.cap / np.maximum(np.abs(errors), 1e-300))
 
     def normal(self, relative: float, central: bool) -> Normal:
         """Normal equations here, from differences with steps of this share of the spans."""
         self.jacobian = self.problem.jacobian(
             self.theta, self.purpose, central=central, relative=relative
         )
-        weight = self.weight if math.isfinite(self.cap) else None
-        normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+        normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
         if not normal.rough:
             return normal
         for place, item in enumerate(self.jacobian):
@@ -164,7 +160,7 @@ class Descent:
                 self.jacobian[place] = self.problem.directional(
                     self.theta, item.run, np.linalg.eigh(part)[1], relative=relative
                 )
-        return Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+        return Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
 
     def attempt(self, theta: Vector) -> bool:
         """Go there, inside the bounds, if it is better."""
@@ -241,8 +237,7 @@ class Descent:
         for _ in range(limit):
             self.iterations += 1
             self.jacobian = known.extended(self.problem, self.theta, self.purpose)
-            weight = self.weight if math.isfinite(self.cap) else None
-            normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, weight)
+            normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
             before = self.cost
             if self.settle(normal, 1, damping) or before - self.cost <= self.enough(share):
                 return
@@ -255,8 +250,7 @@ class Descent:
 
     def gradient(self) -> Vector:
         """J^T r with the last Jacobian and the present residuals."""
-        weight = self.weight if math.isfinite(self.cap) else None
-        return gradient(self.problem, self.theta, self.jacobian, self.residuals, weight)
+        return gradient(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
 
     def settle(self, normal: Normal, limit: int, damping: float = FIRM) -> bool:
         """Damped steps with one Jacobian; whether they came to where it promises no more."""
@@ -328,7 +322,7 @@ def fit(
 ) -> Estimate:
     """Estimate the parameters of a problem.
 
-    Near the solution, residuals beyond `normal.OUTLYING` sigma count linearly.
+    Near the solution, windows that are far off count by their logarithm (`loss.Windowed`).
 
     Args:
         problem: what to fit.
@@ -347,7 +341,7 @@ def fit(
     begun = problem.evaluations
     run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
     if near or known is not None:
-        run.set_cap(OUTLYING)
+        run.count(Windowed())
     if known is not None:
         run.follow(known, limit, share)
         return estimated(run)
@@ -358,16 +352,16 @@ def fit(
         run = Descent(problem, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
         typical = float(np.median(np.abs(sizes))) if sizes.size else 1.0
-        run.set_cap(max(3.0, typical))
+        run.count(Huber(max(3.0, typical)))
         run.descend(STEPS[0], 3, 0.05)
-        run.set_cap(3.0)
+        run.count(Huber(3.0))
         run.descend(STEPS[1], 3, 0.01)
         run = Descent(problem, purpose, run.theta, begun)
-        run.set_cap(3.0)
+        run.count(Huber(3.0))
         run.descend(STEPS[1], 4, 0.01)
-        run.set_cap(math.inf)
+        run.count(Squares())
     run.descend(STEPS[1], limit, 5e-3 if rough else 1e-4)
-    run.set_cap(OUTLYING)
+    run.count(Windowed())
     if polish and not rough:
         run.polish()
     elif not rough:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .loss import Loss, Squares
 from .parts import Sensitivity
 from .problem import Problem
 
 Vector = NDArray[np.float64]
+SQUARES = Squares()
 BLOCK = 1.0
 """Length of the blocks over which residuals may be correlated [s]."""
-OUTLYING = 10.0
-"""Residuals over sigma that count linearly where models are compared: no noise is that large, and
-where a run turns unstable, squares of hundreds of sigma would decide instead of all the rest."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 
@@ -41,7 +39,7 @@ class Normal:
         theta: Vector,
         sensitivities: Iterable[Sensitivity],
         residuals: Iterable[tuple[str, Vector]],
-        weight: Callable[[Vector], Vector] | None = None,
+        loss: Loss = SQUARES,
         block: float = BLOCK,
     ) -> None:
         size, scale = theta.size, problem.scale
@@ -55,7 +53,7 @@ class Normal:
             derivative = item.values * scale[columns]
             good = np.isfinite(residual) & np.isfinite(derivative).all(axis=2)
             errors = np.where(good, residual, 0.0)
-            factor = np.where(good, 1.0 if weight is None else weight(errors), 0.0)
+            factor = np.where(good, loss.weight(residual), 0.0)
             derivative = np.where(good[:, :, None], derivative, 0.0)
             flat = derivative.reshape(-1, columns.size)
             matrix = (flat * factor.reshape(-1, 1)).T @ flat
@@ -102,16 +100,14 @@ def gradient(
     theta: Vector,
     sensitivities: Iterable[Sensitivity],
     residuals: Iterable[tuple[str, Vector]],
-    weight: Callable[[Vector], Vector] | None = None,
+    loss: Loss = SQUARES,
 ) -> Vector:
     """J^T r in scaled parameters, with priors."""
     result = np.zeros(theta.size)
     scale = problem.scale
     for item, (_, residual) in zip(sensitivities, residuals, strict=True):
         good = np.isfinite(residual) & np.isfinite(item.values).all(axis=2)
-        errors = np.where(good, residual, 0.0)
-        if weight is not None:
-            errors = errors * weight(errors)
+        errors = np.where(good, residual * loss.weight(residual), 0.0)
         values = np.where(good[:, :, None], item.values, 0.0)
         result[item.columns] += np.einsum("tcp,tc->p", values, errors) * scale[item.columns]
     for i, p in enumerate(problem.parameters):
@@ -121,17 +117,13 @@ def gradient(
 
 
 def cost_of(
-    problem: Problem, theta: Vector, residuals: Iterable[tuple[str, Vector]], cap: float = math.inf
+    problem: Problem,
+    theta: Vector,
+    residuals: Iterable[tuple[str, Vector]],
+    loss: Loss = SQUARES,
 ) -> float:
-    """Half the sum of squares; residuals beyond `cap` sigma count linearly (Huber)."""
-    total = 0.0
-    for _, residual in residuals:
-        size = np.abs(residual[np.isfinite(residual)])
-        total += float(
-            np.sum(np.where(size <= cap, 0.5 * size**2, cap * size - 0.5 * cap**2))
-            if math.isfinite(cap)
-            else 0.5 * np.sum(size**2)
-        )
+    """Cost of the residuals and of leaving the priors."""
+    total = sum(loss.cost(residual) for _, residual in residuals)
     for value, p in zip(theta.tolist(), problem.parameters, strict=True):
         if p.prior:
             total += 0.5 * ((value - p.nominal) / p.prior) ** 2

@@ -3,9 +3,10 @@
 A start pose is known to a millimetre and a few milliradians; a run that was not used for fitting
 must have it estimated before its residual says anything about the model.
 
-    min  sum over the run's samples of ((measured - model) / sigma)^2 + ((p - nominal) / prior)^2
+    min  loss of (measured - model) / sigma over the run + ((p - nominal) / prior)^2 / 2
 
-by Gauss-Newton steps with one Jacobian per run: these values move the model almost linearly.
+(`loss.Windowed`) by Gauss-Newton steps with one Jacobian per run: these values move the model
+almost linearly.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .loss import Windowed
 from .parts import Sensitivity
 from .problem import Problem
 
 Vector = NDArray[np.float64]
+WINDOWED = Windowed()
 STEP = 5e-3
 """Step of the differences over the span."""
 STEPS = 8
@@ -33,6 +36,8 @@ each must remove to be followed by another one."""
 HORIZONS = (0.1, 0.2, 0.4, 1.0)
 """Shares of a run from its beginning over which late values are estimated, one after the other. The
 first metres tell a start angle; once casters have turned over, the error has many minima in it."""
+OFF = 1.5
+"""Cost over the noise's from which a run is tried once more from nominal late values."""
 ENOUGH = 0.1
 """Fall of the cost [nats] below which a run is settled: far below anything that is decided."""
 
@@ -104,7 +109,7 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     Such values may move the model far from linearly, start angles of casters for instance, which
     turn over after an unstable moment. In a joint fit one such run would hold up all parameters;
     run by run, with steps that are shortened until they help, it harms none. The beginnings of the
-    runs come first (see `HORIZONS`).
+    runs come first (see `HORIZONS`), but where they were estimated before and did well.
 
     Returns:
         The problem with these parameters held at what was found, all its values, and the fall of
@@ -116,23 +121,48 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
         for p in problem.late
     ]
     whole = problem.with_parameters([*problem.parameters, *problem.late])
+    whole.limits = problem.limits
     names = [run.name for run in problem.runs]
     first = np.clip(np.concatenate([theta, start]), whole.lower, whole.upper)
-    before = _costs(whole, first, names)
-    values = first
-    for share in HORIZONS:
-        part = _beginnings(whole, share)
-        begun = cost = _costs(part, values, names)
+    anew = first.copy()
+    anew[theta.size :] = whole.nominal[theta.size :]
+    values, costs = first.copy(), _costs(whole, first, names)
+    before = sum(costs.values())
+
+    def tried(begun: Vector, runs: list[str], horizons: tuple[float, ...]) -> None:
+        found = _followed(whole, begun, runs, horizons)
+        for name, cost in _costs(whole, found, runs).items():
+            if cost < costs[name]:
+                own = concerned(whole, [name])
+                costs[name], values[own] = cost, found[own]
+
+    moved = [n for n in names if np.any(first[(own := concerned(whole, [n]))] != anew[own])]
+    tried(first, moved, HORIZONS[-1:])
+    count = {run.name: np.count_nonzero(np.isfinite(run.data)) for run in problem.runs}
+    off = [n for n in names if n not in moved or 2.0 * costs[n] > OFF * count[n]]
+    tried(anew, off, HORIZONS)
+    whole.close()
+    kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
+    return whole.hold(kept), values[: theta.size], before - sum(costs.values())
+
+
+def _followed(
+    problem: Problem, theta: Vector, names: list[str], horizons: tuple[float, ...]
+) -> Vector:
+    """Values of some runs estimated over longer and longer beginnings."""
+    if not names:
+        return theta
+    for share in horizons:
+        part = _beginnings(problem, share)
+        begun = cost = sum(_costs(part, theta, names).values())
         for _ in range(RELEASES):
-            values = settled(part, values, names)
-            after = _costs(part, values, names)
+            theta = settled(part, theta, names)
+            after = sum(_costs(part, theta, names).values())
             if not after < cost - RELEASED * begun:
                 break
             cost = after
         part.close()
-    whole.close()
-    kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
-    return whole.hold(kept), values[: theta.size], before - after
+    return theta
 
 
 def _beginnings(problem: Problem, share: float) -> Problem:
@@ -141,16 +171,19 @@ def _beginnings(problem: Problem, share: float) -> Problem:
     for run in problem.runs:
         size = math.ceil(share * run.times.size)
         runs.append(replace(run, times=run.times[:size], data=run.data[:size]))
-    return problem._with(runs=runs)
+    part = problem._with(runs=runs)
+    part.limits = problem.limits
+    return part
 
 
-def _costs(problem: Problem, theta: Vector, names: list[str]) -> float:
-    own = {name: concerned(problem, [name]) for name in names}
-    return sum(_cost(problem, theta, r, own[name]) for name, r in problem.residuals(theta, names))
+def _costs(problem: Problem, theta: Vector, names: list[str]) -> dict[str, float]:
+    """Run -> cost; nothing is simulated without names."""
+    found = problem.residuals(theta, names)
+    return {n: _cost(problem, theta, r, concerned(problem, [n])) for n, r in found}
 
 
 def _cost(problem: Problem, theta: Vector, residual: Vector, own: list[int]) -> float:
-    total = 0.5 * float(np.nansum(residual**2))
+    total = WINDOWED.cost(residual)
     for i in own:
         p = problem.parameters[i]
         if p.prior:
@@ -165,8 +198,9 @@ def _step(
     scale = problem.scale[own]
     good = np.isfinite(residual) & np.isfinite(item.values[:, :, place]).all(axis=2)
     slope = item.values[:, :, place][good] * scale
-    matrix = slope.T @ slope + 1e-9 * np.eye(len(own))
-    gradient = slope.T @ residual[good]
+    weighted = slope * WINDOWED.weight(residual)[good][:, None]
+    matrix = weighted.T @ slope + 1e-9 * np.eye(len(own))
+    gradient = weighted.T @ residual[good]
     for row, i in enumerate(own):
         p: Any = problem.parameters[i]
         if p.prior:

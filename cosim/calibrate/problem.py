@@ -441,6 +441,7 @@ class Problem:
         return self._with(
             runs=[run for run in self.runs if run.name in names],
             parameters=[p for p in self.parameters if not p.run or p.run in names],
+            late=[p for p in self.late if p.run in names],
         )
 
     def with_parameters(self, parameters: Sequence[Parameter]) -> Problem:

@@ -94,15 +94,24 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
             winner = search.again(close, first, base)
             stage.fitted = [winner if f is first else f for f in stage.fitted]
             settled[winner.effects[-1]] = winner
+        last, simple = winner.effects[-1], False
         for item, known in others:
+            law = item.candidate.effect != last.effect
+            if law and simple:
+                continue  # more general than one that does as well
             try:
                 trial = exchanged(search, winner, item, known, share=0.0)
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
-            trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
+            trial.p_value = min(stage.corrected.get(item.candidate.label, 1.0), winner.p_value)
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
             trial = search.refined(base, trial, quick=True, share=0.0)
+            if law and (late := search.released(trial, base)) is not trial:
+                trial = search.refined(base, late, quick=True, share=0.0)
+            simple |= law and not (
+                search.gain(trial, winner) > GATE and search.apart(trial, winner)
+            )
             more = search.total(base, trial) - search.total(base, winner)
             search.say(f"{item.candidate.label} instead: {more:+.1f} nats on all runs")
             stage.fitted = [f for f in stage.fitted if f is not known] + [trial]
@@ -120,7 +129,10 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
 def _alike(
     search: Search, base: Fitted, stage: Round, known: set[Candidate]
 ) -> list[tuple[Signature, Fitted | None]]:
-    """The winner's effect at other places and simpler laws at its own, but for known ones."""
+    """The winner's effect at other places and simpler laws at its own, but for known ones.
+
+    The laws come by their number of parameters.
+    """
     winner = stage.winner
     assert winner is not None
     name = winner.effects[-1].effect
@@ -129,8 +141,14 @@ def _alike(
         if f is not winner and f.signature is not None and search.accepted(base, f)
         and (f.effects[-1].effect == name or more_general(winner, f))
     ]  # fmt: skip
-    found += [(twin, None) for twin in search.kin(base, stage)]
-    return [(item, f) for item, f in found if item.candidate not in known]
+    fitted = {f.effects[-1] for f in stage.fitted}
+    more = [*search.kin(base, stage), *search.simpler(stage)]
+    found += [(item, None) for item in more if item.candidate not in fitted]
+    unique = {item.candidate: (item, f) for item, f in reversed(found)}
+    return sorted(
+        (pair for candidate, pair in unique.items() if candidate not in known),
+        key=lambda pair: pair[0].probe.own,
+    )
 
 
 def _seen_last(fitted: Fitted, winner: Fitted) -> Fitted:
@@ -194,6 +212,10 @@ def exchanged(
         values[item.probe.second] = item.second
     if known is not None:
         values = {n: v for n, v in known.estimate.values.items() if n in names}
+    elif fitted.effects[-1].place == item.candidate.place:  # the same quantities
+        old, new = fitted.effects[-1].prefix, item.candidate.prefix
+        mine = {n.removeprefix(old): v for n, v in fitted.estimate.values.items()}
+        values |= {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
     fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in others if p.name not in values}
     problem = whole.with_parameters(
         [replace(p, span=abs(values[p.name]) or p.span) if p.strength and p.name in values else p

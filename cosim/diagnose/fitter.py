@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY, Known, fit
+from ..calibrate.loss import Windowed
+from ..calibrate.normal import cost_of
 from ..calibrate.nuisance import released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
+from ..calibrate.staged import staged
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .deferred import corrected, step_error
@@ -28,6 +31,8 @@ Vector = NDArray[np.float64]
 Say = Callable[[str], None]
 ITERATIONS = 6
 """Steps of a quick fit at most."""
+RELEASES = 3
+"""Times at most that late values and all others are estimated in turn."""
 WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
 
@@ -123,10 +128,18 @@ class Fitter(Judge):
         real.close()
         return values
 
-    def absorber(self, fitted: Fitted, layout: Layout) -> Absorber:
-        """What the parameters of a fitted model can do in some of the identification runs."""
+    def absorber(self, fitted: Fitted, layout: Layout, root: Vector | None = None) -> Absorber:
+        """What the parameters of a fitted model can do in some of the identification runs.
+
+        Args:
+            fitted: the model.
+            layout: of the runs.
+            root: factors on the samples, if not all count the same.
+        """
         slopes = {item.run: item for item in fitted.estimate.jacobian}
         matrix = layout.matrix([slopes[n] for n in layout.names], fitted.problem.scale)
+        if root is not None:
+            matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
@@ -153,8 +166,9 @@ class Fitter(Judge):
         if held:
             problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
         problem.limits = patience(base.problem)
-        absorber = self.absorber(base, self.fitting)
-        residual = self.fit_data - base.fit - item.score.amplitude * item.change
+        root = self.fitting.root(self.fit_data - base.fit)
+        absorber = self.absorber(base, self.fitting, root)
+        residual = root * (self.fit_data - base.fit - item.score.amplitude * item.change)
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
@@ -225,7 +239,7 @@ class Fitter(Judge):
             return None
 
     def _cost(self, problem: Problem, theta: Vector) -> float:
-        return sum(float(np.nansum(r**2)) for _, r in problem.residuals(theta, self.fitting.names))
+        return cost_of(problem, theta, problem.residuals(theta, self.fitting.names), Windowed())
 
     def retried(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model fitted from nominal values, as the first one was, if that leads farther.
@@ -249,19 +263,35 @@ class Fitter(Judge):
 
         The effect may be what makes them matter: dry friction keeps casters where they were.
         """
-        if not self.raw.late or not self.lacking(winner):
+        if not self.raw.late:
             return winner
-        problem = corrected(winner.problem, winner.estimate.theta, self.raw)
-        try:
-            problem, theta, fall = released(problem, winner.estimate.theta)
-            if fall < WORTH * (winner.estimate.cost - 0.5 * winner.estimate.count):
-                return winner
-            self.say(f"start values of the runs estimated: {fall:.0f} nats")
-            found = self.judged(fit(problem, theta, near=True, draft=True))
-        except CosimError as error:
-            self.say(f"start values of the runs could not be estimated: {error}")
-            return winner
-        return self.again(found, winner, base) if self.gain(winner, found) > 0.0 else winner
+        for number in range(RELEASES):
+            if not self.lacking(winner):
+                break
+            theta = winner.estimate.theta
+            try:
+                problem = corrected(winner.problem, theta, self.raw)
+                problem.limits = limits = patience(winner.problem)
+                problem, values, fall = released(problem, theta)
+                problem.limits = limits
+                beyond = winner.estimate.robust - 0.5 * winner.estimate.count
+                if fall < WORTH * beyond:
+                    break
+                self.say(f"start values of the runs estimated: {fall:.0f} nats")
+                if number == 0:
+                    problem, values = staged(problem, values)
+                found = self.judged(fit(problem, values, near=True, draft=True))
+            except CosimError as error:
+                self.say(f"start values of the runs could not be estimated: {error}")
+                break
+            gain = self.gain(winner, found)
+            if gain <= 0.0:
+                break
+            self.say(f"fitted with them: {gain:.0f} nats")
+            winner = self.again(found, winner, base)
+            if gain < WORTH * beyond:
+                break
+        return winner
 
     def refined(
         self, base: Fitted, fitted: Fitted, *, quick: bool = False, share: float = QUICKLY
@@ -284,7 +314,7 @@ class Fitter(Judge):
         spans = {p.name: p.span for p in fitted.problem.parameters}
         problem = whole.with_parameters(
             [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
-        )
+        )._with(runs=fitted.problem.runs)  # with their late values
         theta = problem.nominal
         for name, value in {**item.fixed, **fitted.estimate.values}.items():
             theta[problem.index(name)] = value

@@ -16,8 +16,9 @@ RIVAL_Z = 2.0
 FAR = 4.0
 """Mean square over the noise's from which a model is far off: its parameters then stand where they
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
-EXPLAINED = 0.98
-"""Share of what a model leaves beyond noise from which a candidate explains nearly all of it."""
+EXPLAINED = 0.9
+"""Share of what a model leaves beyond noise (by its logarithm, where much) from which a candidate
+explains nearly all of it."""
 
 
 class Judge:
@@ -78,7 +79,7 @@ class Judge:
     def gain(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on the identification runs, less one per additional parameter.
 
-        Residuals beyond `normal.OUTLYING` sigma count linearly.
+        Windows that are far off count by their logarithm (`loss.Windowed`).
         """
         costs = [f.estimate.robust + f.free for f in (base, other)]
         return costs[0] - costs[1]
@@ -97,9 +98,14 @@ class Judge:
         """Models that no run tells from the winner, but for more general ones of these or of it.
 
         Friction that may differ between the directions is no rival of friction that does not,
-        wherever the latter is named.
+        wherever the latter is named; nor is a law of the same quantity with more parameters than
+        the winner's at another place, which its freedom may make up for.
         """
-        near = [f for f in others if f is not winner and not self.apart(f, winner)]
+        near = [
+            f for f in others
+            if f is not winner and not self.apart(f, winner)
+            and not (f.quantity == winner.quantity != "" and f.complexity > winner.complexity)
+        ]  # fmt: skip
         return [
             f for f in near
             if not any(more_general(f, g) for g in (winner, *near) if g is not f)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ..calibrate.loss import WINDOW, trust
 from ..calibrate.normal import BLOCK
 from ..calibrate.parts import Run, Sensitivity
 from ..calibrate.problem import Problem
@@ -60,6 +61,16 @@ class Layout:
         )  # fmt: skip
         self.run = np.concatenate([np.full(int(g.sum()), i) for i, g in enumerate(self.good)])
         self.size = int(self.block.size)
+        windows, first = [], 0
+        for good in self.good:
+            measured = good.reshape(-1, self.channels)
+            index = (np.cumsum(measured, axis=0) - 1) // WINDOW
+            each = int(index.max(initial=0)) + 1
+            index += first + each * np.arange(self.channels)
+            windows.append(index.ravel()[good])
+            first += each * self.channels
+        self.window = np.concatenate(windows)
+        self._samples = np.maximum(np.bincount(self.window, minlength=first), 1)
         self._cell = self.run * self.channels + self.channel
         self._count = np.maximum(np.bincount(self._cell), 1)
 
@@ -83,6 +94,16 @@ class Layout:
     def sums(self, values: Vector) -> Vector:
         """Sum over each block."""
         return np.asarray(np.bincount(self.block, values, self.blocks), dtype=np.float64)
+
+    def mean_squares(self, vector: Vector) -> Vector:
+        """Mean square of each sample's window (see `loss`)."""
+        sums = np.bincount(self.window, vector**2, self._samples.size)
+        return np.asarray((sums / self._samples)[self.window])
+
+    def root(self, *residuals: Vector) -> Vector:
+        """Factors that make residuals count as `loss.Windowed` does, by the largest of some."""
+        size = np.max([self.mean_squares(residual) for residual in residuals], axis=0)
+        return np.sqrt(trust(size))
 
     def largest(self, change: Vector) -> float:
         """Largest RMS of a change of the model values in a channel of a run."""

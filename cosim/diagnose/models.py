@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
+from ..calibrate.loss import concentrated
 from ..calibrate.problem import Problem
 from .candidates import Candidate
 from .linear import Layout
@@ -56,6 +57,13 @@ class Fitted:
         return int(self.estimate.theta.size)
 
     @property
+    def quantity(self) -> str:
+        """Name of the last effect's strength among its parameters, "" without one."""
+        if self.signature is None:
+            return ""
+        return self.signature.strength.name.removeprefix(self.effects[-1].prefix)
+
+    @property
     def complexity(self) -> int:
         """Number of parameters that were fitted or tried from a list: cogging with one cycle per
         turn is an unbalance that had its number of cycles chosen.
@@ -85,11 +93,16 @@ class Gate:
 def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
     """Compare two sets of model values against data (all over sigma).
 
-    z tests whether the data move from the first towards the second: both are fixed beforehand.
+    Windows that are far off count as in `loss.Windowed`. z tests whether the data move from the
+    first towards the second: both are fixed beforehand.
     """
-    direction, residual = second - first, data - first
-    rest = data - second
-    gain = 0.5 * float(residual @ residual - rest @ rest)
+    residual, rest = data - first, data - second
+    gain = float(
+        np.sum(concentrated(layout.mean_squares(residual)))
+        - np.sum(concentrated(layout.mean_squares(rest)))
+    )
+    root = layout.root(residual, rest)
+    direction, residual = root * (second - first), root * residual
     square = float(direction @ direction)
     if square <= 0.0:
         return Gate(0.0, 0.0)

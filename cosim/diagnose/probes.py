@@ -61,6 +61,12 @@ class Probe:
         }  # fmt: skip
 
     @property
+    def own(self) -> int:
+        """Number of parameters of the effect, 0 of one on a whole vector."""
+        prefix = self.candidate.prefix
+        return sum(p.name.startswith(prefix) for p in self.problem.parameters)
+
+    @property
     def choices(self) -> list[dict[str, float]]:
         """Parameter -> value, one parameter at a time."""
         return [{name: value} for name, values in self.tries for value in values]

@@ -19,9 +19,10 @@ from .exchange import challenged, is_open
 from .fitter import Fitter, Say
 from .linear import MATERIAL, Layout, holm
 from .models import GATE, GATE_Z, LEVEL, Fitted, compare
-from .probes import batches
+from .probes import Probe, batches
 from .secant import Bench, model_values
-from .signature import Signature, merge, worthy
+from .signature import Signature, merge, unscored, worthy
+from .structure import structures
 
 Vector = NDArray[np.float64]
 NEARLY = 0.7
@@ -46,6 +47,9 @@ RIVAL = 0.5
 gains to first order are no rivals."""
 ALIKE = 1e-5
 """Share of what they explain by which candidates may differ that are one to first order."""
+UNEVEN = 10.0
+"""Runs that are farther off than this many times the mean square of the one that is least off do
+not choose candidates: linear signatures are wrong there, or an unstable moment decides."""
 ROUNDS = 4
 CHECK = "validation"
 
@@ -63,6 +67,7 @@ class Round:
         winner: accepted one.
         rivals: fitted ones that the data cannot tell from it.
         open: whether more was so evidently missing that the choice waits for it.
+        probes: all candidates that were simulated, with the systems they were simulated in.
     """
 
     base: Fitted
@@ -73,6 +78,7 @@ class Round:
     winner: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
     open: bool = False
+    probes: dict[Candidate, Probe] = field(default_factory=dict)
 
 
 class Search(Fitter):
@@ -143,18 +149,28 @@ class Search(Fitter):
         )  # fmt: skip
         rest = dict(rows)
         residual = layout.vector([rest[n] for n in layout.names])
-        return Bench(
-            problem, base.estimate.theta, layout, model, residual, self.absorber(base, layout)
-        )
+        root = layout.root(residual)
+        absorber = self.absorber(base, layout, root)
+        return Bench(problem, base.estimate.theta, layout, model, residual, absorber, root)
 
     def telling(self, base: Fitted) -> Layout:
-        """The run with most of what the model lacks; all, if no channel exceeds its noise."""
+        """The run with most of what the model lacks; all, if no channel exceeds its noise.
+
+        Runs that are much farther off than others do not count: first orders say little there.
+        """
         if not self.lacking(base):
             return self.fitting
         residual = self.fit_data - base.fit
-        rows = self.fitting.by_run(residual)
-        excess = [float(np.nansum(r**2)) - np.count_nonzero(np.isfinite(r)) for r in rows]
-        return Layout(self.raw, [self.fitting.runs[int(np.argmax(excess))]])
+        rows = zip(self.fitting.runs, self.fitting.by_run(residual), strict=True)
+        found = []
+        for run, values in rows:
+            layout = Layout(self.raw, [run])
+            vector = layout.vector([values])
+            if any(s.structured for s in structures(vector, layout)):
+                found.append((float(np.mean(vector**2)), vector.size, layout))
+        least = min((size for size, _, _ in found), default=0.0)
+        near = [(n * (size - 1.0), layout) for size, n, layout in found if size < UNEVEN * least]
+        return max(near, key=lambda item: item[0])[1] if near else self.fitting
 
     def scored(self, base: Fitted) -> Round:
         """Score all candidates against a model's residual.
@@ -170,6 +186,7 @@ class Search(Fitter):
         bench = self.bench(base, layout)
         signatures = bench.followed(bench.begun(chosen, thorough=layout is not self.fitting))
         self.evaluations += bench.evaluations
+        probes = {s.candidate: s.probe for s in signatures}
         aside: tuple[str, ...] = ()
         if layout is not self.fitting:
             kept = worthy(signatures)
@@ -184,7 +201,7 @@ class Search(Fitter):
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         named |= {label: named[s.candidate.label] for s in signatures for label in s.same}
         signatures.sort(key=lambda s: -s.score.gain)
-        return Round(base, signatures, named, aside)
+        return Round(base, signatures, named, aside, probes=probes)
 
     def promising(self, current: Round) -> list[Signature]:
         """Candidates worth a refit: significant, not too small to matter, the best gains first.
@@ -243,38 +260,42 @@ class Search(Fitter):
             if not explained or item.score.gain >= RIVAL * most:
                 self.tried(base, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
+        self.rounds.append(current)
         first = self.chosen(base, current.fitted)
         if first is not None and is_open(first.estimate):
-            return self.opened(base, current, first)
-        # quick fits are too far from their minima to be told apart
-        self.finish(base, current, LOOSE if self.far(base) else CLOSE)
-        current.winner = self.chosen(base, current.fitted)
-        if current.winner is not None:
-            current.winner = challenged(self, base, current)
-            drafted = current.winner
-            current.winner = self.sharpened(self.released(self.retried(drafted, base), base), base)
-            current.fitted = [current.winner if f is drafted else f for f in current.fitted]
-            if self.whole:
-                self.prepare(current.winner.problem)
+            self.opened(base, current, first)
+        else:
+            # quick fits are too far from their minima to be told apart
+            self.finish(base, current, LOOSE if self.far(base) else CLOSE)
+            current.winner = self.chosen(base, current.fitted)
+            if current.winner is not None:
+                self.follow(current, self.released(current.winner, base))
+        if current.winner is None:
+            return current
+        if not current.open:
+            challenged(self, base, current)
+            self.follow(current, self.sharpened(current.winner, base))
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
-        self.rounds.append(current)
-        return current
-
-    def opened(self, base: Fitted, current: Round, first: Fitted) -> Round:
-        """End a round whose best model evidently lacks more: others are compared after that."""
-        found = self.refined(base, self.retried(first, base), quick=True)
-        current.winner = self.released(found, base)
-        if current.winner is found:
-            current.winner = self.sharpened(found, base, draft=True)
-        if not is_open(current.winner.estimate):
-            current.winner = self.sharpened(current.winner, base)
-        current.fitted = [current.winner if f is first else f for f in current.fitted]
-        current.open = True
         if self.whole:
             self.prepare(current.winner.problem)
-        self.rounds.append(current)
         return current
+
+    def opened(self, base: Fitted, current: Round, first: Fitted) -> None:
+        """Fit a model that evidently lacks more; if it still does, others are compared later."""
+        current.winner = first
+        found = self.refined(base, self.retried(first, base), quick=True)
+        better = self.released(found, base)
+        if better is found:
+            better = self.sharpened(found, base, draft=True)
+        self.follow(current, better)
+        current.open = is_open(better.estimate)
+
+    @staticmethod
+    def follow(current: Round, better: Fitted) -> None:
+        """Let another fit of a round's winner take its place."""
+        current.fitted = [better if f is current.winner else f for f in current.fitted]
+        current.winner = better
 
     def tried(self, base: Fitted, current: Round, item: Signature, *, again: bool) -> None:
         """Refit a candidate and note what that gains."""
@@ -306,6 +327,24 @@ class Search(Fitter):
             t for t in twins
             if t.candidate.effect == last.effect
             or (t.candidate.place == last.place and t.tuned < tuned)
+        ]  # fmt: skip
+
+    def simpler(self, current: Round) -> list[Signature]:
+        """Laws at the winner's place whose strength is the same quantity, with fewer parameters.
+
+        A bristle gives way before it slips, so to first order it explains dry friction where a law
+        that sticks at once does not; only fits show whether the simpler one does as well.
+        """
+        winner = current.winner
+        assert winner is not None and winner.signature is not None
+        last = winner.effects[-1]
+        scored = {s.candidate: s for s in current.signatures}
+        return [
+            scored.get(candidate) or unscored(probe)
+            for candidate, probe in current.probes.items()
+            if candidate.place == last.place and candidate not in winner.effects
+            and probe.strength.name.removeprefix(candidate.prefix) == winner.quantity
+            and probe.own < winner.signature.probe.own
         ]  # fmt: skip
 
     def finish(self, base: Fitted, current: Round, share: float) -> None:

@@ -62,7 +62,8 @@ class Bench:
         layout: of the runs that are simulated.
         model: model values over sigma at theta.
         residual: of theta.
-        absorber: of the calibration.
+        absorber: of the calibration, its rows multiplied by `root`.
+        root: factors on the samples; those of stretches that are far off are small.
     """
 
     def __init__(
@@ -73,10 +74,12 @@ class Bench:
         model: Vector,
         residual: Vector,
         absorber: Absorber,
+        root: Vector | None = None,
     ) -> None:
         self.problem, self.theta, self.layout = problem, theta, layout
         self.model, self.absorber = model, absorber
-        self.residual = absorber.rest(residual)
+        self.root = np.ones_like(residual) if root is None else root
+        self.residual = absorber.rest(self.root * residual)
         self.evaluations = 0
         self._lock = threading.Lock()
 
@@ -322,7 +325,7 @@ class Bench:
         one, other = changes
         if trials.probe.mix == "shift":
             other = (other - one) / SECONDS["shift"][1]
-        rests = np.array([self.absorber.rest(change) for change in (one, other)])
+        rests = np.array([self.absorber.rest(self.root * change) for change in (one, other)])
         wanted = np.linalg.lstsq(rests @ rests.T, rests @ self.residual, rcond=1e-6)[0]
         if trials.probe.mix == "turn":
             trials.second = float(np.arctan2(wanted[1], wanted[0]))
@@ -336,8 +339,9 @@ class Bench:
 
     def _measure(self, trials: Trials, value: float, change: Vector) -> Signature:
         """The signature; the trials note its gain as if its strength could be negative."""
-        rest = self.absorber.rest(change)
-        total = float(change @ change)
+        counted = self.root * change
+        rest = self.absorber.rest(counted)
+        total = float(counted @ counted)
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
         result = score(rest, self.residual, self.layout, self.theta.size)
         trials.promise, trials.wish = result.gain, result.amplitude

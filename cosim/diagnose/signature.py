@@ -34,7 +34,7 @@ class Signature:
         probe: the candidate in the system that was simulated.
         value: strength at which the secant was taken.
         change: model values over sigma with the effect less those without (float32).
-        rest: what of it calibration cannot absorb.
+        rest: what of it calibration cannot absorb, stretches that are far off counted less.
         score: of `rest` against the residual.
         absorbed: share of the signature's energy that calibration absorbs.
         second: value of the effect's second parameter (see `Parameter.mix`).
@@ -81,6 +81,13 @@ class Signature:
     def unseen(self) -> bool:
         """Whether calibration absorbs it, or the runs do not show it at all."""
         return self.absorbed > 1.0 - ABSORBED or self.score.size == 0.0
+
+
+def unscored(probe: Probe) -> Signature:
+    """A candidate of which only fits are judged."""
+    nothing = np.zeros(0, dtype=np.float32)
+    none = Score(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    return Signature(probe, probe.strength.span, nothing, nothing, none, 0.0)
 
 
 def worthy(found: Sequence[Signature]) -> list[Signature]:

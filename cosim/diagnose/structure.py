@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from ..calibrate.loss import WINDOW
 from .linear import Layout
 
 Vector = NDArray[np.float64]
-WINDOW = 20
-"""Samples that are summed: noise adds up like their root, structure like their number."""
 BURST = 0.01
 """Share of the windows, those with the largest residuals, that do not count. Where casters turn
 over the smallest difference decides when: for some tenths of a second a model that is right is off

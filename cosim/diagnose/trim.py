@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.fit import fit
+from ..calibrate.loss import WINDOW
 from ..errors import CosimError
 from .deferred import corrected
 from .linear import Layout
 from .models import Fitted
-from .structure import BURST, WINDOW
+from .structure import BURST
 
 if TYPE_CHECKING:
     from .search import Search

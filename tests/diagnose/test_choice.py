@@ -103,9 +103,10 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    monkeypatch.setattr("cosim.diagnose.fitter.corrected", lambda *_: None)
+    problem = SimpleNamespace(costs={})
+    monkeypatch.setattr("cosim.diagnose.fitter.corrected", lambda *_: problem)
     monkeypatch.setattr("cosim.diagnose.fitter.released", fail)
-    winner: Any = SimpleNamespace(problem=None, estimate=SimpleNamespace(theta=None))
+    winner: Any = SimpleNamespace(problem=problem, estimate=SimpleNamespace(theta=None))
     said: list[str] = []
     search: Any = SimpleNamespace(
         raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append
@@ -117,10 +118,12 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
 
 
 def test_a_law_more_general_than_a_rival_is_none() -> None:
-    def model(label: str, place: str, parameters: int) -> Any:
+    def model(label: str, place: str, parameters: int, quantity: str = "") -> Any:
         signature = SimpleNamespace(same=())
         effect = SimpleNamespace(label=label, place=place)
-        return SimpleNamespace(effects=(effect,), signature=signature, complexity=parameters)
+        return SimpleNamespace(
+            effects=(effect,), signature=signature, complexity=parameters, quantity=quantity
+        )
 
     winner = model("coulomb", "load.flange", 9)
     elsewhere = model("coulomb", "gearbox.flange_a", 9)
@@ -131,6 +134,13 @@ def test_a_law_more_general_than_a_rival_is_none() -> None:
     assert Search.rivals(judge, winner, [general]) == [general]  # nothing simpler was fitted there
     judge.apart = lambda first, second: first is other
     assert Search.rivals(judge, winner, [elsewhere, other]) == [elsewhere]
+    simple = model("coulomb", "base.left.axle", 9, "tau_c")
+    free = model("bristle", "gearbox.flange_a", 12, "tau_c")
+    spring = model("hose_spring", "motor.shaft", 12, "k")
+    same = model("coulomb", "gearbox.flange_a", 9, "tau_c")
+    judge.apart = lambda first, second: False
+    assert Search.rivals(judge, simple, [free, spring, same]) == [spring, same]
+    assert Search.rivals(judge, free, [simple, free]) == [simple]
 
 
 def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(

@@ -69,8 +69,10 @@ def test_a_round_that_decided_is_not_reconsidered(stage: tuple[Search, Round]) -
         found.open = True
 
 
+@pytest.mark.parametrize("known_before", [True, False])
 @pytest.mark.parametrize("truth", ["coulomb", "asymmetric_coulomb"])
-def test_a_simpler_law_is_named_where_it_does_as_well(truth: str) -> None:
+def test_a_simpler_law_is_named_where_it_does_as_well(truth: str, known_before: bool) -> None:
+    """Whether it was fitted before or its score was too poor for that."""
     rig = example(EXAMPLE, 3.0, 2)
     labels = ("coulomb at load.flange", "asymmetric_coulomb at load.flange")
     known = [c for c in catalogue(rig) if c.label in labels]
@@ -81,8 +83,11 @@ def test_a_simpler_law_is_named_where_it_does_as_well(truth: str) -> None:
     for signature in stage.signatures:
         search.tried(base, stage, signature, again=False)
     stage.winner = search.refined(base, fitted(stage, labels[1]))
-    stage.fitted = [fitted(stage, labels[0]), stage.winner]
-    assert stage.winner.complexity > fitted(stage, labels[0]).complexity
+    simple = fitted(stage, labels[0])
+    assert stage.winner.complexity > simple.complexity
+    stage.fitted = [simple, stage.winner] if known_before else [stage.winner]
+    if not known_before:
+        stage.signatures = [s for s in stage.signatures if s.candidate.label != labels[0]]
     found = challenged(search, base, stage)
     search.close()
     assert found.effects[-1].effect == truth

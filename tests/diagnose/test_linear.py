@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.calibrate.normal import OUTLYING, cost_of
+from cosim.calibrate.loss import DOUBTFUL, WINDOW, Huber, Squares, Windowed, mean_squares
 from cosim.diagnose.linear import Absorber, Layout, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
@@ -119,14 +119,64 @@ def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
     assert held.change(first)[0] == 0.0
 
 
-def test_outlying_residuals_count_linearly() -> None:
-    residual = np.array([0.0, -9.0, OUTLYING, -12.0, 500.0])
-    problem: Any = SimpleNamespace(parameters=())
-    huber = cost_of(problem, np.zeros(0), [("run", residual[:, None])], OUTLYING)
-    linear = OUTLYING * (12.0 + 500.0) - OUTLYING**2
-    assert huber == pytest.approx(0.5 * (81.0 + OUTLYING**2) + linear, rel=1e-12)
-    calm = [("run", np.array([[9.9, -9.9]]))]
-    assert cost_of(problem, np.zeros(0), calm, OUTLYING) == cost_of(problem, np.zeros(0), calm)
+def test_windows_that_are_far_off_count_by_their_logarithm() -> None:
+    calm = np.full((3 * WINDOW, 2), 1.5)
+    calm[5, 0] = np.nan
+    # nothing changes below the limit: 1.5^2 < 4
+    assert Windowed().cost(calm) == pytest.approx(Squares().cost(calm), rel=1e-12)
+    off = calm.copy()
+    off[2 * WINDOW :, 1] = -40.0
+    more = Windowed().cost(off) - Windowed().cost(calm)
+    expected = 0.5 * WINDOW * (DOUBTFUL * (1.0 + np.log(1600.0 / DOUBTFUL)) - 1.5**2)
+    assert more == pytest.approx(expected, rel=1e-12)
+    weights = Windowed().weight(off)
+    assert weights[-1] == pytest.approx([1.0, DOUBTFUL / 1600.0], rel=1e-12)
+    # a gap moves the windows of its channel by one sample
+    assert weights[2 * WINDOW - 1] == pytest.approx([1.0, 1.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("loss", [Squares(), Huber(3.0), Windowed()])
+def test_weights_give_the_gradient_of_a_loss(loss: Any) -> None:
+    random = np.random.default_rng(3)
+    residual = random.standard_normal((3 * WINDOW + 7, 2)) * np.repeat([[1.0, 8.0]], 67, axis=0)
+    residual[4, 1] = np.nan
+    slope = np.nan_to_num(loss.weight(residual) * residual)
+    for place in ((0, 0), (11, 1), (65, 1), (30, 0)):
+        moved, step = residual.copy(), 1e-5
+        moved[place] += step
+        back = residual.copy()
+        back[place] -= step
+        # central differences: errors of 1e-10 against rounding of 1e-11 / 1e-5
+        change = (loss.cost(moved) - loss.cost(back)) / (2.0 * step)
+        assert change == pytest.approx(slope[place], rel=1e-4, abs=1e-5)
+
+
+def test_windows_of_vectors_are_those_of_arrays() -> None:
+    random = np.random.default_rng(4)
+    times = np.arange(3 * WINDOW + 7) / RATE
+    rows = random.standard_normal((times.size, 2)) * 5.0
+    rows[3:9, 1] = np.nan
+    runs: Any = [SimpleNamespace(name=n, times=times, data=rows) for n in "AB"]
+    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name=n) for n in "yz"])
+    place = Layout(problem, runs)
+    vector = place.vector([rows, 3.0 * rows])
+    both = place.vector([mean_squares(rows), mean_squares(3.0 * rows)])
+    assert place.mean_squares(vector) == pytest.approx(both, rel=1e-12)
+    assert place.root(vector, 0.5 * vector) ** 2 == pytest.approx(
+        place.vector([Windowed().weight(rows), Windowed().weight(3.0 * rows)]), rel=1e-12
+    )
+
+
+def test_one_stretch_that_is_far_off_does_not_decide_between_models() -> None:
+    place = layout()
+    truth = np.sin(2 * np.pi * 0.5 * place.runs[0].times)
+    data = truth + np.random.default_rng(6).standard_normal(place.size)
+    data[1000:1040] += 60.0  # a moment that neither model has
+    nothing, lucky = np.zeros(place.size), np.zeros(place.size)
+    lucky[1000:1040] += 20.0
+    assert compare(data, lucky, truth, place).gain > GATE
+    assert float((data - lucky) @ (data - lucky)) < float((data - truth) @ (data - truth))
+    assert compare(data, nothing, truth, place).passed
 
 
 def test_a_value_that_was_tried_from_a_list_counts() -> None:

@@ -1,0 +1,108 @@
+"""How much residuals count: squares, Huber's, or less where a whole window is far off.
+
+Where a model lacks something, or where casters turn over a moment too early, residuals of tens of
+sigma say little about all else; counted as squares they would decide instead of it. So the noise of
+a stretch that is far off is taken as unknown, and its likelihood concentrated: with m the mean of
+(residual/sigma)^2 over a window of n samples,
+
+    cost = n/2 m                          m <= D
+    cost = n/2 D (1 + ln(m / D))          m > D
+
+which is smooth, and the same as squares for a model that is right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+WINDOW = 20
+"""Measured samples of a channel in a window: noise alone hardly varies over as many."""
+DOUBTFUL = 4.0
+"""Mean square over the noise's beyond which a window counts by its logarithm; the mean of 20
+squares of noise never gets there."""
+
+
+class Loss(Protocol):
+    """A cost of residuals, and the weights with which least squares has the same gradient."""
+
+    def cost(self, residual: Vector) -> float:
+        """Of (samples, channels), NaN where nothing was measured."""
+        ...
+
+    def weight(self, residual: Vector) -> Vector:
+        """Of each sample; of any value where nothing was measured."""
+        ...
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Half the sum of squares."""
+
+    def cost(self, residual: Vector) -> float:
+        """See `Loss`."""
+        return 0.5 * float(np.nansum(residual**2))
+
+    def weight(self, residual: Vector) -> Vector:
+        """See `Loss`."""
+        return np.ones_like(residual)
+
+
+@dataclass(frozen=True)
+class Huber:
+    """Half the sum of squares; residuals beyond `cap` count linearly."""
+
+    cap: float
+
+    def cost(self, residual: Vector) -> float:
+        """See `Loss`."""
+        size = np.abs(residual[np.isfinite(residual)])
+        each = np.where(size <= self.cap, 0.5 * size**2, self.cap * size - 0.5 * self.cap**2)
+        return float(np.sum(each))
+
+    def weight(self, residual: Vector) -> Vector:
+        """See `Loss`."""
+        size = np.nan_to_num(np.abs(residual))
+        return np.asarray(np.minimum(1.0, self.cap / np.maximum(size, 1e-300)))
+
+
+@dataclass(frozen=True)
+class Windowed:
+    """Half the sum of squares; windows that are far off count by their logarithm."""
+
+    def cost(self, residual: Vector) -> float:
+        """See `Loss`."""
+        size = mean_squares(residual)[np.isfinite(residual)]
+        return float(np.sum(concentrated(size)))
+
+    def weight(self, residual: Vector) -> Vector:
+        """See `Loss`."""
+        return trust(mean_squares(residual))
+
+
+def mean_squares(residual: Vector) -> Vector:
+    """Mean square of the window of each sample, 0 where nothing was measured."""
+    found = np.zeros_like(residual)
+    for column, values in enumerate(residual.T):
+        good = np.flatnonzero(np.isfinite(values))
+        if good.size:
+            first = np.arange(0, good.size, WINDOW)
+            counts = np.diff(np.append(first, good.size))
+            means = np.add.reduceat(values[good] ** 2, first) / counts
+            found[good, column] = np.repeat(means, counts)
+    return found
+
+
+def concentrated(size: Vector) -> Vector:
+    """Cost of each sample from the mean square of its window."""
+    beyond = DOUBTFUL * (1.0 + np.log(np.maximum(size, DOUBTFUL) / DOUBTFUL))
+    return np.asarray(0.5 * np.where(size <= DOUBTFUL, size, beyond))
+
+
+def trust(size: Vector) -> Vector:
+    """Weight of each sample from the mean square of its window."""
+    return np.asarray(DOUBTFUL / np.maximum(size, DOUBTFUL))
