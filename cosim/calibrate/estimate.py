@@ -164,7 +164,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     """
     problem = run.problem
     # the last Jacobian, whose point is less than the steps of its differences away
-    normal = Normal(problem, run.theta, run.jacobian, run.residuals)
+    loss = Windowed()
+    normal = Normal(problem, run.theta, run.jacobian, run.residuals, loss)
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
@@ -183,7 +184,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     middle = normal.scores.T @ normal.scores * blocks / freedom
     sandwich = inverse @ middle @ inverse
     cost = cost_of(problem, run.theta, run.residuals)
-    spread = max(2.0 * cost / max(count - int(np.sum(~poor)), 1), 1.0)
+    robust_cost = cost_of(problem, run.theta, run.residuals, loss)
+    spread = max(2.0 * robust_cost / max(count - int(np.sum(~poor)), 1), 1.0)
     # a few blocks can seem to agree by chance: never below what white residuals give
     white, robust = np.diag(inverse) * spread, np.diag(sandwich)
     factor = np.sqrt(np.maximum(white, robust) / np.maximum(robust, 1e-300))
@@ -219,7 +221,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=cost,
-        robust=cost_of(problem, run.theta, run.residuals, Windowed()),
+        robust=robust_cost,
         count=count,
         iterations=run.iterations,
         evaluations=problem.evaluations - run.begun,

@@ -103,6 +103,22 @@ def settled(
     return best
 
 
+def _starts(problem: Problem) -> list[float]:
+    """Values at which late parameters are held."""
+    known = {run.name: run.starts for run in problem.runs}
+    return [
+        next((known[p.run][n] / f for n, f in p.targets if n in known[p.run]), p.nominal)
+        for p in problem.late
+    ]
+
+
+def begun(problem: Problem) -> bool:
+    """Whether late values of a problem have been estimated."""
+    moved = np.subtract(_starts(problem), [p.nominal for p in problem.late])
+    # values are divided by a factor and multiplied again
+    return bool(np.any(np.abs(moved) > 1e-9 * np.array([p.scale for p in problem.late])))
+
+
 def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     """Estimate the late parameters of every run, with its other own values.
 
@@ -115,11 +131,7 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
         The problem with these parameters held at what was found, all its values, and the fall of
         the cost [nats].
     """
-    known = {run.name: run.starts for run in problem.runs}
-    start = [
-        next((known[p.run][n] / f for n, f in p.targets if n in known[p.run]), p.nominal)
-        for p in problem.late
-    ]
+    start = _starts(problem)
     whole = problem.with_parameters([*problem.parameters, *problem.late])
     whole.limits = problem.limits
     names = [run.name for run in problem.runs]
@@ -129,8 +141,8 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     values, costs = first.copy(), _costs(whole, first, names)
     before = sum(costs.values())
 
-    def tried(begun: Vector, runs: list[str], horizons: tuple[float, ...]) -> None:
-        found = _followed(whole, begun, runs, horizons)
+    def tried(theta: Vector, runs: list[str], horizons: tuple[float, ...]) -> None:
+        found = _followed(whole, theta, runs, horizons)
         for name, cost in _costs(whole, found, runs).items():
             if cost < costs[name]:
                 own = concerned(whole, [name])

@@ -17,6 +17,7 @@ from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError
 from ..provider import locate
 from ..variants import apply
+from .bursts import bursts, times
 from .deferred import step_error
 from .exchange import is_open, reconsidered
 from .experiment import propose
@@ -26,7 +27,6 @@ from .models import Fitted
 from .power import power
 from .search import ROUNDS, Round, Search
 from .structure import Structure, structures
-from .trim import trimmed, written
 
 Vector = NDArray[np.float64]
 PURPOSES = ("identification", "validation")
@@ -49,7 +49,7 @@ class Diagnosis:
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
         experiment: proposed to separate rivals.
-        aside: times of bursts that were left out of the last fit, by run (see `trim`).
+        bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
     """
 
@@ -66,7 +66,7 @@ class Diagnosis:
     structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     experiment: dict[str, Any] | None = None
-    aside: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -109,7 +109,7 @@ class Diagnosis:
             "channels": {},
             "parameters": self.parameters(),
             "start_values": self.start_values(),
-            "left_out": self.aside,
+            "bursts": self.bursts,
             "structure": {
                 f"{which} {purpose}": [s.to_dict() for s in tests]
                 for (which, purpose), tests in self.structure.items()
@@ -284,10 +284,9 @@ def _searched(
     if len(current.effects) > 1:
         current = search.eliminated(current)
         winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]
-    if current.effects and not any(stage.rivals for stage in winners):
-        current, result.aside = trimmed(search, current)
-        for name, spans in result.aside.items():
-            say(f"left out of the last fit: {name} {written(spans)}")
+    if not search.lacking(current):
+        sudden = bursts(search.fit_data - current.fit, search.fitting)
+        result.bursts = times(sudden, list(search.fitting.runs))
     result.after = current
     _judge(result, winners)
     if out is not None and current.effects:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY
+from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .models import GATE, Fitted, compare, more_general
@@ -100,7 +101,9 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
             if law and simple:
                 continue  # more general than one that does as well
             try:
-                trial = exchanged(search, winner, item, known, share=0.0)
+                # without the winner's effect, and with its late values
+                less = base.problem._with(runs=winner.problem.runs)
+                trial = exchanged(search, winner, item, known, less, share=0.0)
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
@@ -188,6 +191,7 @@ def exchanged(
     fitted: Fitted,
     item: Signature,
     known: Fitted | None,
+    less: Problem | None = None,
     *,
     share: float = QUICKLY,
 ) -> Fitted:
@@ -198,12 +202,13 @@ def exchanged(
         fitted: the model.
         item: what comes instead.
         known: a fit of that, for the values to begin with.
+        less: the problem without the last effect; if not given, that effect is held absent.
         share: see `fit`.
 
     Raises:
         CosimError: it cannot be simulated.
     """
-    less = fitted.problem.hold(absent(fitted, fitted.effects[-1]))
+    less = less or fitted.problem.hold(absent(fitted, fitted.effects[-1]))
     whole = item.candidate.added_to(less)
     strengths, others = new_parameters(less, whole)
     names = {p.name for p in (*strengths, *others)}

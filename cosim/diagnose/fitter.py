@@ -13,7 +13,7 @@ from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY, Known, fit
 from ..calibrate.loss import Windowed
 from ..calibrate.normal import cost_of
-from ..calibrate.nuisance import released, settled, slopes
+from ..calibrate.nuisance import begun, released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
 from ..calibrate.staged import staged
@@ -31,8 +31,9 @@ Vector = NDArray[np.float64]
 Say = Callable[[str], None]
 ITERATIONS = 6
 """Steps of a quick fit at most."""
-RELEASES = 3
-"""Times at most that late values and all others are estimated in turn."""
+RELEASES, PAYS = 4, 0.01
+"""Times at most that late values and all others are estimated in turn, and the share of what a
+model leaves beyond noise that another turn must remove."""
 WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
 
@@ -265,20 +266,21 @@ class Fitter(Judge):
         """
         if not self.raw.late:
             return winner
-        for number in range(RELEASES):
+        least = PAYS if begun(winner.problem) else WORTH
+        for _ in range(RELEASES):
             if not self.lacking(winner):
                 break
             theta = winner.estimate.theta
+            beyond = winner.estimate.robust - 0.5 * winner.estimate.count
             try:
                 problem = corrected(winner.problem, theta, self.raw)
                 problem.limits = limits = patience(winner.problem)
                 problem, values, fall = released(problem, theta)
-                problem.limits = limits
-                beyond = winner.estimate.robust - 0.5 * winner.estimate.count
-                if fall < WORTH * beyond:
+                if fall < least * beyond:
                     break
                 self.say(f"start values of the runs estimated: {fall:.0f} nats")
-                if number == 0:
+                problem.limits = limits
+                if not begun(winner.problem):
                     problem, values = staged(problem, values)
                 found = self.judged(fit(problem, values, near=True, draft=True))
             except CosimError as error:
@@ -289,8 +291,9 @@ class Fitter(Judge):
                 break
             self.say(f"fitted with them: {gain:.0f} nats")
             winner = self.again(found, winner, base)
-            if gain < WORTH * beyond:
+            if gain < PAYS * beyond:
                 break
+            least = PAYS
         return winner
 
     def refined(

@@ -274,7 +274,7 @@ class Search(Fitter):
             return current
         if not current.open:
             challenged(self, base, current)
-            self.follow(current, self.sharpened(current.winner, base))
+            self.follow(current, self.sharpened(self.released(current.winner, base), base))
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
         if self.whole:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..diagnose.trim import written
+from ..diagnose.bursts import written
 from .chart import COLOURS, Line, lines
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def page(result: Diagnosis) -> str:
         _errors(result, table),
         _parameters(table["parameters"]),
         _starts(table["start_values"]),
-        _aside(table["left_out"]),
+        _bursts(table["bursts"]),
         _measured(result),
         _residuals(result),
         _located(result),
@@ -202,13 +202,13 @@ def _starts(values: dict[str, dict[str, float]]) -> str:
     )
 
 
-def _aside(spans: dict[str, list[tuple[float, float]]]) -> str:
+def _bursts(spans: dict[str, list[tuple[float, float]]]) -> str:
     if not spans:
         return ""
     rows = [[_td(run), _td(written(parts))] for run, parts in spans.items()]
     return (
-        "<p>Left out of the last fit: bursts of residuals, where the smallest difference decides "
-        "when something happens (casters that turn over). They count in all other tables.</p>"
+        "<p>Bursts of residuals, where the smallest difference decides when something happens "
+        "(casters that turn over). They count little in the fits and fully in all tables.</p>"
         + _table(["run", "when"], rows)
     )
 
