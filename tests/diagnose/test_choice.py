@@ -103,10 +103,11 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    problem = SimpleNamespace(costs={})
+    problem = SimpleNamespace(costs={}, runs=(), late=())
     monkeypatch.setattr("cosim.diagnose.fitter.corrected", lambda *_: problem)
     monkeypatch.setattr("cosim.diagnose.fitter.released", fail)
-    winner: Any = SimpleNamespace(problem=problem, estimate=SimpleNamespace(theta=None))
+    estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
+    winner: Any = SimpleNamespace(problem=problem, estimate=estimate)
     said: list[str] = []
     search: Any = SimpleNamespace(
         raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append
