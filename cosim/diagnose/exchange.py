@@ -25,6 +25,9 @@ OPEN = 4.0
 """Mean square over the noise's from which the best model of a round evidently lacks more."""
 NEARLY = 0.8
 """Rivals gained this share of what the best one did; their fits were rough."""
+HOPEFUL = 0.5
+"""A law that gains less than this share of what the winner does, from the winner's parameters, is
+not fitted further."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
@@ -109,7 +112,10 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
                 continue
             trial.p_value = min(stage.corrected.get(item.candidate.label, 1.0), winner.p_value)
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
-            trial = search.refined(base, trial, quick=True, share=0.0)
+            if search.total(base, trial) > HOPEFUL * search.total(base, winner):
+                trial = search.refined(base, trial, quick=True, share=0.0)
+            else:
+                law = False
             if law and (late := search.released(trial, base)) is not trial:
                 trial = search.refined(base, late, quick=True, share=0.0)
             simple |= law and not (
@@ -139,9 +145,11 @@ def _alike(
     winner = stage.winner
     assert winner is not None
     name = winner.effects[-1].effect
+    least = NEARLY * search.total(base, winner)
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in stage.fitted
         if f is not winner and f.signature is not None and search.accepted(base, f)
+        and search.total(base, f) > least
         and (f.effects[-1].effect == name or more_general(winner, f))
     ]  # fmt: skip
     fitted = {f.effects[-1] for f in stage.fitted}
