@@ -5,8 +5,10 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from cosim.diagnose.linear import Layout
 from cosim.diagnose.search import REFITS, Search
 from cosim.diagnose.secant import PATIENCE
 from cosim.errors import CosimError
@@ -229,3 +231,32 @@ def test_quick_fits_have_a_limit_on_time(
     )  # fmt: skip
     limits = search.fitted(SimpleNamespace(limits={}), [0.0], known)
     assert limits == ({} if close is None else {"A": PATIENCE * close})
+
+
+@pytest.mark.parametrize(
+    "sizes, expected",
+    [
+        ({"calm": 2.5, "long": 2.0, "unstable": 30.0}, ["long"]),  # most excess, of what is near
+        ({"calm": 1.0, "long": 1.0, "unstable": 30.0}, ["unstable"]),  # the others are at the noise
+        ({"calm": 5.0, "long": 2.0, "unstable": 1.0}, ["calm"]),
+        ({"calm": 1.0, "long": 1.0, "unstable": 1.0}, ["calm", "long", "unstable"]),
+    ],
+)
+def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others(
+    sizes: dict[str, float], expected: list[str]
+) -> None:
+    random = np.random.default_rng(8)
+    runs: list[Any] = []
+    for name, size in sizes.items():
+        times = np.arange(4000 if name == "long" else 1000) / 100
+        # noise of the given size with slow parts, as what a model lacks has
+        slow = np.sin(2.0 * np.pi * 0.3 * times) * np.sqrt(2.0 * (size**2 - 1.0))
+        data = (slow + random.standard_normal(times.size))[:, None]
+        runs.append(SimpleNamespace(name=name, times=times, data=data))
+    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")], runs=runs)
+    layout = Layout(problem, runs)
+    vector = layout.vector([run.data for run in runs])
+    search: Any = SimpleNamespace(raw=problem, fitting=layout, fit_data=vector)
+    search.lacking = lambda base: Search.lacking(search, base)
+    base: Any = SimpleNamespace(fit=np.zeros_like(vector))
+    assert Search.telling(search, base).names == expected
