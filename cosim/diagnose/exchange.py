@@ -28,6 +28,9 @@ NEARLY = 0.8
 HOPEFUL = 0.5
 """A law that gains less than this share of what the winner does, from the winner's parameters, is
 not fitted further."""
+CHANGED = 0.01
+"""Share of what the best quick fit gained by which a challenger must be better for all others to be
+fitted from its parameters again."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
@@ -116,6 +119,9 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
                 trial = search.refined(base, trial, quick=True, share=0.0)
             else:
                 law = False
+            if law and search.gain(trial, winner) > GATE:  # its derivatives may be others
+                near = search.sharpened(trial, base, draft=True)
+                trial = near if search.gain(trial, near) > 0.0 else trial
             if law and (late := search.released(trial, base)) is not trial:
                 trial = search.refined(base, late, quick=True, share=0.0)
             simple |= law and not (
@@ -131,6 +137,8 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
         stage.winner = best
         if best is winner:
             break
+        if search.total(base, best) - search.total(base, winner) > CHANGED * stage.quick:
+            settled = {best.effects[-1]: best}  # others were fitted from a poor place
         winner = best  # its places and simpler laws have not been compared yet
     return winner
 
@@ -145,16 +153,16 @@ def _alike(
     winner = stage.winner
     assert winner is not None
     name = winner.effects[-1].effect
-    least = NEARLY * search.total(base, winner)
+    least = NEARLY * stage.quick
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in stage.fitted
         if f is not winner and f.signature is not None and search.accepted(base, f)
         and search.total(base, f) > least
         and (f.effects[-1].effect == name or more_general(winner, f))
     ]  # fmt: skip
-    fitted = {f.effects[-1] for f in stage.fitted}
-    more = [*search.kin(base, stage), *search.simpler(stage)]
-    found += [(item, None) for item in more if item.candidate not in fitted]
+    fitted = {f.effects[-1]: f for f in stage.fitted}
+    found += [(t, None) for t in search.kin(base, stage) if t.candidate not in fitted]
+    found += [(item, fitted.get(item.candidate)) for item in search.simpler(stage)]
     unique = {item.candidate: (item, f) for item, f in reversed(found)}
     return sorted(
         (pair for candidate, pair in unique.items() if candidate not in known),
@@ -173,7 +181,7 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
     """Rivals of a round's winner with their quick fits, and its twins elsewhere."""
     winner = stage.winner
     assert winner is not None
-    least = NEARLY * max(search.total(stage.base, f) for f in stage.fitted)
+    least = NEARLY * stage.quick
     near = [
         f for f in stage.fitted
         if f.effects[-1] != winner.effects[-1] and f.signature is not None
@@ -182,7 +190,11 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in near if f.signature is not None
     ]
-    return found + [(twin, None) for twin in search.kin(stage.base, stage)]
+    found += [(twin, None) for twin in search.kin(stage.base, stage)]
+    known = {item.candidate for item, _ in found}
+    fitted = {f.effects[-1]: f for f in stage.fitted}
+    simple = [s for s in search.simpler(stage) if s.candidate not in known]
+    return found + [(item, fitted.get(item.candidate)) for item in simple]
 
 
 def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
@@ -225,7 +237,7 @@ def exchanged(
         values[item.probe.second] = item.second
     if known is not None:
         values = {n: v for n, v in known.estimate.values.items() if n in names}
-    elif fitted.effects[-1].place == item.candidate.place:  # the same quantities
+    if fitted.effects[-1].place == item.candidate.place:  # the same quantities
         old, new = fitted.effects[-1].prefix, item.candidate.prefix
         mine = {n.removeprefix(old): v for n, v in fitted.estimate.values.items()}
         values |= {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}

@@ -68,6 +68,7 @@ class Round:
         rivals: fitted ones that the data cannot tell from it.
         open: whether more was so evidently missing that the choice waits for it.
         probes: all candidates that were simulated, with the systems they were simulated in.
+        quick: what the best quick fit gained on all runs [nats].
     """
 
     base: Fitted
@@ -79,6 +80,7 @@ class Round:
     rivals: list[Fitted] = field(default_factory=list)
     open: bool = False
     probes: dict[Candidate, Probe] = field(default_factory=dict)
+    quick: float = 0.0
 
 
 class Search(Fitter):
@@ -261,6 +263,7 @@ class Search(Fitter):
                 self.tried(base, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         self.rounds.append(current)
+        current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         first = self.chosen(base, current.fitted)
         if first is not None and is_open(first.estimate):
             self.opened(base, current, first)
