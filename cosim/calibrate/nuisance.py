@@ -112,7 +112,7 @@ def _starts(problem: Problem) -> list[float]:
     ]
 
 
-def begun(problem: Problem) -> bool:
+def late_estimated(problem: Problem) -> bool:
     """Whether late values of a problem have been estimated."""
     moved = np.subtract(_starts(problem), [p.nominal for p in problem.late])
     # values are divided by a factor and multiplied again

@@ -162,7 +162,7 @@ def _alike(
     ]  # fmt: skip
     fitted = {f.effects[-1]: f for f in stage.fitted}
     found += [(t, None) for t in search.kin(base, stage) if t.candidate not in fitted]
-    found += [(item, fitted.get(item.candidate)) for item in search.simpler(stage)]
+    found += _simpler(search, stage)
     unique = {item.candidate: (item, f) for item, f in reversed(found)}
     return sorted(
         (pair for candidate, pair in unique.items() if candidate not in known),
@@ -192,9 +192,13 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
     ]
     found += [(twin, None) for twin in search.kin(stage.base, stage)]
     known = {item.candidate for item, _ in found}
+    return found + [pair for pair in _simpler(search, stage) if pair[0].candidate not in known]
+
+
+def _simpler(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None]]:
+    """Simpler laws at the winner's place, with their fits where there are any."""
     fitted = {f.effects[-1]: f for f in stage.fitted}
-    simple = [s for s in search.simpler(stage) if s.candidate not in known]
-    return found + [(item, fitted.get(item.candidate)) for item in simple]
+    return [(item, fitted.get(item.candidate)) for item in search.simpler(stage)]
 
 
 def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:

@@ -13,7 +13,7 @@ from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY, Known, fit
 from ..calibrate.loss import Windowed
 from ..calibrate.normal import cost_of
-from ..calibrate.nuisance import begun, released, settled, slopes
+from ..calibrate.nuisance import late_estimated, released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
 from ..calibrate.staged import staged
@@ -266,7 +266,7 @@ class Fitter(Judge):
         """
         if not self.raw.late:
             return winner
-        least = PAYS if begun(winner.problem) else WORTH
+        least = PAYS if late_estimated(winner.problem) else WORTH
         for _ in range(RELEASES):
             if not self.lacking(winner):
                 break
@@ -280,7 +280,7 @@ class Fitter(Judge):
                     break
                 self.say(f"start values of the runs estimated: {fall:.0f} nats")
                 problem.limits = limits
-                if not begun(winner.problem):
+                if not late_estimated(winner.problem):
                     problem, values = staged(problem, values)
                 found = self.judged(fit(problem, values, near=True, draft=True))
             except CosimError as error:
