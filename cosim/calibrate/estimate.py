@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
-from .loss import Windowed
+from .loss import loss_for
 from .normal import Normal, cost_of, gradient
 from .parts import Sensitivity
 from .problem import Problem
@@ -64,7 +64,7 @@ class Estimate:
         combinations: what the runs cannot tell apart.
         at_bound: parameters that ended at a bound.
         cost: half the sum of squared residuals over sigma, priors included.
-        robust: the same with windows that are far off counted by their logarithm (`loss.Windowed`).
+        robust: the same with residuals that are far off counted less (`loss.loss_for`).
         count: residuals.
         iterations, evaluations: of the fit.
         jacobian, residuals: at the solution, by run.
@@ -164,8 +164,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     """
     problem = run.problem
     # the last Jacobian, whose point is less than the steps of its differences away
-    loss = Windowed()
-    normal = Normal(problem, run.theta, run.jacobian, run.residuals, loss)
+    normal = Normal(problem, run.theta, run.jacobian, run.residuals, run.loss)
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
@@ -184,8 +183,9 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     middle = normal.scores.T @ normal.scores * blocks / freedom
     sandwich = inverse @ middle @ inverse
     cost = cost_of(problem, run.theta, run.residuals)
-    robust_cost = cost_of(problem, run.theta, run.residuals, loss)
-    spread = max(2.0 * robust_cost / max(count - int(np.sum(~poor)), 1), 1.0)
+    robust_cost = cost_of(problem, run.theta, run.residuals, loss_for(problem.unstable))
+    spread_cost = cost_of(problem, run.theta, run.residuals, run.loss)
+    spread = max(2.0 * spread_cost / max(count - int(np.sum(~poor)), 1), 1.0)
     # a few blocks can seem to agree by chance: never below what white residuals give
     white, robust = np.diag(inverse) * spread, np.diag(sandwich)
     factor = np.sqrt(np.maximum(white, robust) / np.maximum(robust, 1e-300))

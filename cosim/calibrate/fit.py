@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
 from .estimate import BOUNDS, KNOWN, Estimate, estimated
-from .loss import Huber, Loss, Squares, Windowed
+from .loss import Huber, Loss, Squares, loss_for
 from .normal import Normal, cost_of, drawn, gradient
 from .parts import Sensitivity
 from .problem import Problem
@@ -322,7 +322,7 @@ def fit(
 ) -> Estimate:
     """Estimate the parameters of a problem.
 
-    Near the solution, windows that are far off count by their logarithm (`loss.Windowed`).
+    Near the solution, residuals that are far off count less (`loss.loss_for`).
 
     Args:
         problem: what to fit.
@@ -341,7 +341,7 @@ def fit(
     begun = problem.evaluations
     run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
     if near or known is not None:
-        run.count(Windowed())
+        run.count(loss_for(problem.unstable, run.residuals))
     if known is not None:
         run.follow(known, limit, share)
         return estimated(run)
@@ -361,7 +361,7 @@ def fit(
         run.descend(STEPS[1], 4, 0.01)
         run.count(Squares())
     run.descend(STEPS[1], limit, 5e-3 if rough else 1e-4)
-    run.count(Windowed())
+    run.count(loss_for(problem.unstable, run.residuals))
     if polish and not rough:
         run.polish()
     elif not rough:

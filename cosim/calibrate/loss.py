@@ -1,18 +1,22 @@
 """How much residuals count: squares, Huber's, or less where a whole window is far off.
 
-Where a model lacks something, or where casters turn over a moment too early, residuals of tens of
-sigma say little about all else; counted as squares they would decide instead of it. So the noise of
-a stretch that is far off is taken as unknown, and its likelihood concentrated: with m the mean of
-(residual/sigma)^2 over a window of n samples,
+Where casters turn over a moment too early, residuals of tens of sigma say little about all else;
+counted as squares they would decide instead of it. So in problems whose runs may turn unstable, the
+noise of a stretch that is far off is taken as unknown, and its likelihood concentrated: with m the
+mean of (residual/sigma)^2 over a window of n samples,
 
     cost = n/2 m                          m <= D
     cost = n/2 D (1 + ln(m / D))          m > D
 
-which is smooth, and the same as squares for a model that is right.
+which is smooth, and the same as squares for a model that is right. Elsewhere a stretch that is far
+off is what tells most about an effect that is lacking: comparisons count squares, and fits count
+residuals beyond `OUTLYING` sigma linearly. Where only few windows are far off, they may be faults
+of the data, and fits of any problem count them by their logarithm.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -25,6 +29,12 @@ WINDOW = 20
 DOUBTFUL = 4.0
 """Mean square over the noise's beyond which a window counts by its logarithm; the mean of 20
 squares of noise never gets there."""
+
+
+FEW = 0.02
+"""Share of the windows that may be far off in data that a model explains elsewhere."""
+OUTLYING = 10.0
+"""Residuals over sigma that count linearly where no run turns unstable; no noise is that large."""
 
 
 class Loss(Protocol):
@@ -82,6 +92,18 @@ class Windowed:
     def weight(self, residual: Vector) -> Vector:
         """See `Loss`."""
         return trust(mean_squares(residual))
+
+
+def loss_for(unstable: bool, residuals: Iterable[tuple[str, Vector]] = ()) -> Loss:
+    """How residuals count near a solution.
+
+    Args:
+        unstable: whether runs may turn unstable.
+        residuals: run -> of a model, if what is far off may be few faults of the data.
+    """
+    far = [mean_squares(r)[np.isfinite(r)] > DOUBTFUL for _, r in residuals]
+    few = bool(far) and np.mean(np.concatenate(far)) < FEW
+    return Windowed() if unstable or few else Huber(OUTLYING)
 
 
 def mean_squares(residual: Vector) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ Vector = NDArray[np.float64]
 SQUARES = Squares()
 BLOCK = 1.0
 """Length of the blocks over which residuals may be correlated [s]."""
+BLOCKS = 40
+"""Blocks needed to estimate a variance from them: its own error is then a quarter."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 
@@ -40,13 +42,14 @@ class Normal:
         sensitivities: Iterable[Sensitivity],
         residuals: Iterable[tuple[str, Vector]],
         loss: Loss = SQUARES,
-        block: float = BLOCK,
     ) -> None:
         size, scale = theta.size, problem.scale
         self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
         self.rough: list[str] = []
         calm = np.zeros((size, size))
         scores = []
+        residuals = list(residuals)
+        block = block_length([problem.run(name).times for name, _ in residuals])
         for item, (name, residual) in zip(sensitivities, residuals, strict=True):
             run = problem.run(name)
             columns = item.columns
@@ -81,6 +84,11 @@ class Normal:
                 ratio = scale[i] / p.prior
                 self.matrix[i, i] += ratio**2
                 self.gradient[i] -= ratio * (theta[i] - p.nominal) / p.prior
+
+
+def block_length(times: Sequence[Vector], most: float = BLOCK) -> float:
+    """Length of blocks for runs at these times [s], shorter where there would be too few."""
+    return min(most, sum(float(each[-1] - each[0]) for each in times) / BLOCKS)
 
 
 def _reliable(matrix: Vector, bend: Vector) -> tuple[Vector, Vector | None]:

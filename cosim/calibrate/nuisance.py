@@ -5,7 +5,7 @@ must have it estimated before its residual says anything about the model.
 
     min  loss of (measured - model) / sigma over the run + ((p - nominal) / prior)^2 / 2
 
-(`loss.Windowed`) by Gauss-Newton steps with one Jacobian per run: these values move the model
+(`loss.loss_for`) by Gauss-Newton steps with one Jacobian per run: these values move the model
 almost linearly.
 """
 
@@ -19,12 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .loss import Windowed
+from .loss import loss_for
 from .parts import Sensitivity
 from .problem import Problem
 
 Vector = NDArray[np.float64]
-WINDOWED = Windowed()
 STEP = 5e-3
 """Step of the differences over the span."""
 STEPS = 8
@@ -195,7 +194,7 @@ def _costs(problem: Problem, theta: Vector, names: list[str]) -> dict[str, float
 
 
 def _cost(problem: Problem, theta: Vector, residual: Vector, own: list[int]) -> float:
-    total = WINDOWED.cost(residual)
+    total = loss_for(problem.unstable).cost(residual)
     for i in own:
         p = problem.parameters[i]
         if p.prior:
@@ -210,7 +209,7 @@ def _step(
     scale = problem.scale[own]
     good = np.isfinite(residual) & np.isfinite(item.values[:, :, place]).all(axis=2)
     slope = item.values[:, :, place][good] * scale
-    weighted = slope * WINDOWED.weight(residual)[good][:, None]
+    weighted = slope * loss_for(problem.unstable).weight(residual)[good][:, None]
     matrix = weighted.T @ slope + 1e-9 * np.eye(len(own))
     gradient = weighted.T @ residual[good]
     for row, i in enumerate(own):

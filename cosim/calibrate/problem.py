@@ -115,6 +115,11 @@ class Problem:
         self._system: System | None = None
         self._known = {p.name: index for index, p in enumerate(self.parameters)}
 
+    @property
+    def unstable(self) -> bool:
+        """Whether runs begin at values that decide when something turns over (late ones)."""
+        return bool(self.late)
+
     # -- values ------------------------------------------------------------------------------------
 
     def _column(self, of: str) -> Vector:

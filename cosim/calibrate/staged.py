@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fit import PURPOSE, fit
-from .loss import Windowed
+from .loss import loss_for
 from .nuisance import released
 from .problem import Problem
 
@@ -33,10 +33,10 @@ def staged(problem: Problem, theta: Vector, purpose: str = PURPOSE) -> tuple[Pro
     Returns:
         The problem with late values held, and its parameters.
     """
-    costs = []
+    costs, loss = [], loss_for(problem.unstable)
     for name, residual in problem.residuals(theta, purpose):
         count = int(np.isfinite(residual).sum())
-        costs.append((Windowed().cost(residual) / max(count, 1), name))
+        costs.append((loss.cost(residual) / max(count, 1), name))
     calm = [name for _, name in sorted(costs)[: (len(costs) + 1) // 2]]
     part = problem.only(calm)
     limits = part.limits = problem.limits

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY, Known, fit
-from ..calibrate.loss import Windowed
+from ..calibrate.loss import loss_for
 from ..calibrate.normal import cost_of
 from ..calibrate.nuisance import late_estimated, released, settled, slopes
 from ..calibrate.parts import Sensitivity
@@ -240,7 +240,8 @@ class Fitter(Judge):
             return None
 
     def _cost(self, problem: Problem, theta: Vector) -> float:
-        return cost_of(problem, theta, problem.residuals(theta, self.fitting.names), Windowed())
+        residuals = problem.residuals(theta, self.fitting.names)
+        return cost_of(problem, theta, residuals, loss_for(problem.unstable))
 
     def retried(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model fitted from nominal values, as the first one was, if that leads farther.

@@ -16,9 +16,11 @@ RIVAL_Z = 2.0
 FAR = 4.0
 """Mean square over the noise's from which a model is far off: its parameters then stand where they
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
-EXPLAINED = 0.9
-"""Share of what a model leaves beyond noise (by its logarithm, where much) from which a candidate
-explains nearly all of it."""
+ALIKE = 1e-5
+"""Share of what they explain by which models may differ that are one to first order."""
+EXPLAINED, CONCENTRATED = 0.98, 0.9
+"""Share of what a model leaves beyond noise from which a candidate explains nearly all of it; the
+second where much counts by its logarithm (`loss.Windowed`)."""
 
 
 class Judge:
@@ -49,13 +51,20 @@ class Judge:
         return fitted.gate is not None and fitted.gate.passed and self.material(base, fitted)
 
     def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
-        """What explains the data as well as the best one, at the same place, by fewer parameters.
+        """What explains the data as well as the best one, by fewer parameters.
 
-        A law with a parameter more often does better by a hair where the simpler one is true.
+        A law with a parameter more often does better by a hair where the simpler one is true. At
+        another place, where a parameter more may make up for that, it must do so by even less than
+        fits are exact.
         """
+        hair = ALIKE * self.total(base, best)
         simpler = [
             f for f in fitted
-            if self.accepted(base, f) and more_general(best, f) and not self.apart(f, best)
+            if self.accepted(base, f) and f.complexity < best.complexity and (
+                (more_general(best, f) and not self.apart(f, best))
+                or (f.quantity == best.quantity != ""
+                    and self.total(base, best) - self.total(base, f) < hair)
+            )
         ]  # fmt: skip
         return min(simpler, key=lambda f: f.complexity, default=best)
 
@@ -79,7 +88,7 @@ class Judge:
     def gain(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on the identification runs, less one per additional parameter.
 
-        Windows that are far off count by their logarithm (`loss.Windowed`).
+        Residuals that are far off count less (`loss.loss_for`).
         """
         costs = [f.estimate.robust + f.free for f in (base, other)]
         return costs[0] - costs[1]
@@ -125,7 +134,8 @@ class Judge:
         noise = 0.5 * base.estimate.count
         beyond = base.estimate.robust - noise
         gains = [self.gain(base, f) for f in fitted]
-        return beyond > GATE and max(gains, default=0.0) > EXPLAINED * beyond
+        share = CONCENTRATED if self.raw.unstable else EXPLAINED
+        return beyond > GATE and max(gains, default=0.0) > share * beyond
 
     def chosen(self, base: Fitted, fitted: list[Fitted]) -> Fitted | None:
         """The first of some models, best first, that unused runs want; None if there is none."""

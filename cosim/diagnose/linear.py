@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from ..calibrate.loss import WINDOW, trust
-from ..calibrate.normal import BLOCK
+from ..calibrate.loss import WINDOW, concentrated, trust
+from ..calibrate.normal import BLOCK, block_length
 from ..calibrate.parts import Run, Sensitivity
 from ..calibrate.problem import Problem
 
 Vector = NDArray[np.float64]
-BLOCKS = 40
-"""Blocks needed to estimate a variance from them: its own error is then a quarter."""
 ABSORBED = 1e-3
 """A signature of which less than this share is left has no direction of its own: differences over
 rounded simulations carry relative errors of that order."""
@@ -38,13 +36,13 @@ class Layout:
         problem: whose channels.
         runs: in order.
         block: length of the blocks over which residuals may be correlated [s]; shorter where that
-            leaves fewer than `BLOCKS`.
+            leaves too few (`normal.BLOCKS`).
     """
 
     def __init__(self, problem: Problem, runs: Sequence[Run], block: float = BLOCK) -> None:
-        total = sum(float(run.times[-1] - run.times[0]) for run in runs)
-        block = min(block, total / BLOCKS)
+        block = block_length([run.times for run in runs], block)
         self.problem, self.runs = problem, tuple(runs)
+        self.unstable = problem.unstable
         self.names = [run.name for run in runs]
         self.good = [np.isfinite(run.data).ravel() for run in runs]
         self.channels = len(problem.channels)
@@ -100,8 +98,16 @@ class Layout:
         sums = np.bincount(self.window, vector**2, self._samples.size)
         return np.asarray((sums / self._samples)[self.window])
 
+    def cost(self, residual: Vector) -> float:
+        """Half the sum of squares; as in `loss.Windowed` where runs may turn unstable."""
+        if not self.unstable:
+            return 0.5 * float(residual @ residual)
+        return float(np.sum(concentrated(self.mean_squares(residual))))
+
     def root(self, *residuals: Vector) -> Vector:
-        """Factors that make residuals count as `loss.Windowed` does, by the largest of some."""
+        """Factors that make squares of residuals count as `cost` does, by the largest of some."""
+        if not self.unstable:
+            return np.ones_like(residuals[0])
         size = np.max([self.mean_squares(residual) for residual in residuals], axis=0)
         return np.sqrt(trust(size))
 

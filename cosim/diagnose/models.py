@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
-from ..calibrate.loss import concentrated
 from ..calibrate.problem import Problem
 from .candidates import Candidate
 from .linear import Layout
@@ -93,14 +92,11 @@ class Gate:
 def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
     """Compare two sets of model values against data (all over sigma).
 
-    Windows that are far off count as in `loss.Windowed`. z tests whether the data move from the
-    first towards the second: both are fixed beforehand.
+    Where runs may turn unstable, windows that are far off count as in `loss.Windowed`. z tests
+    whether the data move from the first towards the second: both are fixed beforehand.
     """
     residual, rest = data - first, data - second
-    gain = float(
-        np.sum(concentrated(layout.mean_squares(residual)))
-        - np.sum(concentrated(layout.mean_squares(rest)))
-    )
+    gain = layout.cost(residual) - layout.cost(rest)
     root = layout.root(residual, rest)
     direction, residual = root * (second - first), root * residual
     square = float(direction @ direction)

@@ -17,6 +17,7 @@ from .candidates import Candidate, balances, candidates
 from .deferred import corrected
 from .exchange import challenged, is_open
 from .fitter import Fitter, Say
+from .judge import ALIKE
 from .linear import MATERIAL, Layout, holm
 from .models import GATE, GATE_Z, LEVEL, Fitted, compare
 from .probes import Probe, batches
@@ -45,8 +46,6 @@ second share counts where the model before was far off."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
 gains to first order are no rivals."""
-ALIKE = 1e-5
-"""Share of what they explain by which candidates may differ that are one to first order."""
 UNEVEN = 10.0
 """Runs that are farther off than this many times the mean square of the one that is least off do
 not choose candidates: linear signatures are wrong there, or an unstable moment decides."""
@@ -158,7 +157,8 @@ class Search(Fitter):
     def telling(self, base: Fitted) -> Layout:
         """The run with most of what the model lacks; all, if no channel exceeds its noise.
 
-        Runs that are much farther off than others do not count: first orders say little there.
+        Where runs may turn unstable, those much farther off than others do not count: first orders
+        say little there.
         """
         if not self.lacking(base):
             return self.fitting
@@ -171,7 +171,8 @@ class Search(Fitter):
             if any(s.structured for s in structures(vector, layout)):
                 found.append((float(np.mean(vector**2)), vector.size, layout))
         least = min((size for size, _, _ in found), default=0.0)
-        near = [(n * (size - 1.0), layout) for size, n, layout in found if size < UNEVEN * least]
+        most = UNEVEN * least if self.raw.unstable else np.inf
+        near = [(n * (size - 1.0), layout) for size, n, layout in found if size < most]
         return max(near, key=lambda item: item[0])[1] if near else self.fitting
 
     def scored(self, base: Fitted) -> Round:

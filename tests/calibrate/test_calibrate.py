@@ -21,6 +21,8 @@ def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
         deviation = estimate.deviation[known]
         errors += ((estimate.theta - truth)[known] / deviation).tolist()
         covered += ((estimate.low <= truth) & (truth <= estimate.high))[known].tolist()
+        # Student's factor of 30 blocks is 2.04; 4 s of data have four blocks of a second
+        assert np.max((estimate.high - estimate.low)[known] / deviation) < 2.0 * 2.1
         problem.close()
     # 30 cases at 95 %: fewer than 25 has a probability of 6e-4
     assert np.sum(covered) >= 25

@@ -234,16 +234,17 @@ def test_quick_fits_have_a_limit_on_time(
 
 
 @pytest.mark.parametrize(
-    "sizes, expected",
+    "sizes, unstable, expected",
     [
-        ({"calm": 2.5, "long": 2.0, "unstable": 30.0}, ["long"]),  # most excess, of what is near
-        ({"calm": 1.0, "long": 1.0, "unstable": 30.0}, ["unstable"]),  # the others are at the noise
-        ({"calm": 5.0, "long": 2.0, "unstable": 1.0}, ["calm"]),
-        ({"calm": 1.0, "long": 1.0, "unstable": 1.0}, ["calm", "long", "unstable"]),
+        ({"calm": 2.5, "long": 2.0, "far": 30.0}, True, ["long"]),  # most excess, of what is near
+        ({"calm": 2.5, "long": 2.0, "far": 30.0}, False, ["far"]),  # no run can be so by itself
+        ({"calm": 1.0, "long": 1.0, "far": 30.0}, True, ["far"]),  # the others are at the noise
+        ({"calm": 5.0, "long": 2.0, "far": 1.0}, True, ["calm"]),
+        ({"calm": 1.0, "long": 1.0, "far": 1.0}, True, ["calm", "long", "far"]),
     ],
 )
 def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others(
-    sizes: dict[str, float], expected: list[str]
+    sizes: dict[str, float], unstable: bool, expected: list[str]
 ) -> None:
     random = np.random.default_rng(8)
     runs: list[Any] = []
@@ -253,7 +254,9 @@ def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others
         slow = np.sin(2.0 * np.pi * 0.3 * times) * np.sqrt(2.0 * (size**2 - 1.0))
         data = (slow + random.standard_normal(times.size))[:, None]
         runs.append(SimpleNamespace(name=name, times=times, data=data))
-    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")], runs=runs)
+    problem: Any = SimpleNamespace(
+        channels=[SimpleNamespace(name="y")], runs=runs, unstable=unstable
+    )
     layout = Layout(problem, runs)
     vector = layout.vector([run.data for run in runs])
     search: Any = SimpleNamespace(raw=problem, fitting=layout, fit_data=vector)

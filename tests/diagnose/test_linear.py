@@ -18,11 +18,11 @@ from cosim.diagnose.structure import structures
 RATE, SECONDS = 100, 40
 
 
-def layout() -> Layout:
+def layout(unstable: bool = False) -> Layout:
     """One run of one channel, sampled at `RATE`."""
     times = np.arange(RATE * SECONDS) / RATE
     run: Any = SimpleNamespace(name="A", times=times, data=np.zeros((times.size, 1)))
-    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")])
+    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")], unstable=unstable)
     return Layout(problem, [run])
 
 
@@ -88,15 +88,29 @@ def test_a_time_below_the_tick_of_the_rig_has_no_name(time: float, named: bool) 
 
 @pytest.mark.parametrize("told_apart", [False, True])
 def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
-    def law(free: int, place: str = "load.flange", same: tuple[str, ...] = ()) -> Any:
+    def law(
+        free: int, place: str = "load.flange", same: tuple[str, ...] = (), quantity: str = "tau_c",
+        gain: float = 1e7,
+    ) -> Any:  # fmt: skip
         gate, item = SimpleNamespace(passed=True), SimpleNamespace(same=same)
         effects = [SimpleNamespace(place=place)]
-        return SimpleNamespace(complexity=free, effects=effects, gate=gate, signature=item)
+        return SimpleNamespace(
+            complexity=free, effects=effects, gate=gate, signature=item, quantity=quantity,
+            gain=gain,
+        )  # fmt: skip
 
-    rig: Any = SimpleNamespace(accepted=lambda *_: True, apart=lambda *_: told_apart)
-    best, simple, elsewhere = law(12), law(11), law(10, "gearbox.flange_a")
+    rig: Any = SimpleNamespace(
+        accepted=lambda *_: True, apart=lambda *_: told_apart, total=lambda _, f: f.gain
+    )
+    best, simple, elsewhere = law(12), law(11, gain=1e7 - 1e3), law(10, "gearbox.flange_a")
+    elsewhere.quantity = "b"
     chosen = Search.simplest(rig, law(10), best, [best, simple, elsewhere])
     assert chosen is (best if told_apart else simple)
+    # the same quantity at another place with fewer parameters: only if it does as well to a hair
+    for less, wanted in ((50.0, True), (500.0, False)):
+        twin = law(11, "gearbox.flange_a", gain=1e7 - less)
+        chosen = Search.simplest(rig, law(10), best, [best, twin])
+        assert chosen is (twin if wanted else best)
     assert more_general(best, simple)
     assert not more_general(simple, best)
     assert not more_general(best, elsewhere)
@@ -157,18 +171,25 @@ def test_windows_of_vectors_are_those_of_arrays() -> None:
     rows = random.standard_normal((times.size, 2)) * 5.0
     rows[3:9, 1] = np.nan
     runs: Any = [SimpleNamespace(name=n, times=times, data=rows) for n in "AB"]
-    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name=n) for n in "yz"])
+    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name=n) for n in "yz"], unstable=True)
     place = Layout(problem, runs)
     vector = place.vector([rows, 3.0 * rows])
     both = place.vector([mean_squares(rows), mean_squares(3.0 * rows)])
     assert place.mean_squares(vector) == pytest.approx(both, rel=1e-12)
+    costs = Windowed().cost(rows) + Windowed().cost(3.0 * rows)
+    assert place.cost(vector) == pytest.approx(costs, rel=1e-12)
     assert place.root(vector, 0.5 * vector) ** 2 == pytest.approx(
         place.vector([Windowed().weight(rows), Windowed().weight(3.0 * rows)]), rel=1e-12
     )
+    # where no run turns unstable, what is far off counts in full
+    problem.unstable = False
+    place = Layout(problem, runs)
+    assert place.cost(vector) == pytest.approx(0.5 * float(vector @ vector), rel=1e-12)
+    assert np.all(place.root(vector) == 1.0)
 
 
-def test_one_stretch_that_is_far_off_does_not_decide_between_models() -> None:
-    place = layout()
+def test_one_stretch_that_is_far_off_does_not_decide_where_runs_turn_unstable() -> None:
+    place = layout(unstable=True)
     truth = np.sin(2 * np.pi * 0.5 * place.runs[0].times)
     data = truth + np.random.default_rng(6).standard_normal(place.size)
     data[1000:1040] += 60.0  # a moment that neither model has
@@ -177,6 +198,7 @@ def test_one_stretch_that_is_far_off_does_not_decide_between_models() -> None:
     assert compare(data, lucky, truth, place).gain > GATE
     assert float((data - lucky) @ (data - lucky)) < float((data - truth) @ (data - truth))
     assert compare(data, nothing, truth, place).passed
+    assert compare(data, lucky, truth, layout()).gain < -GATE
 
 
 def test_a_value_that_was_tried_from_a_list_counts() -> None:
