@@ -32,7 +32,7 @@ class Quantity:
             strength * (cos * effect at 0 + sin * effect at pi/2)); `shift`, an offset
             (effect = strength * (effect at 0 + value * derivative)).
         tries: values that a search should try, where a model with another one tells nothing of the
-            right one (cycles per revolution).
+            right one (cycles per revolution); for a strength, values near which fits begin.
         visits: output of the component among whose values along a run the right value is, for a
             parameter that tells nothing where it is wrong (where a patch lies).
         variability: of a parameter; `fixed` ones can only be set before initialization.

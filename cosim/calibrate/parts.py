@@ -50,7 +50,7 @@ class Parameter:
         strength: whether 0 makes an effect absent exactly.
         span: size of a typical change; the distance of the bounds if not given.
         inverse: the targets get factor / value: a compliance that sets a stiffness.
-        tries: values that a search should try.
+        tries: values that a search should try; of a strength, where fits should begin, too.
         visits: variable of the system among whose values along a run the right one is.
         mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
         late: held, and estimated run by run once a model explains the data (`nuisance.released`).

@@ -31,9 +31,6 @@ not fitted further."""
 CHANGED = 0.01
 """Share of what the best quick fit gained by which a challenger must be better for all others to be
 fitted from its parameters again."""
-AGAIN, PAYS = 5, 0.1
-"""Times at most that a challenger is fitted with new derivatives, and the share of what it lacks
-that each must bring to be followed by another."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
@@ -120,7 +117,7 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
             if search.total(base, trial) > HOPEFUL * search.total(base, winner):
                 trial = search.refined(base, trial, quick=True, share=0.0)
-                trial = _approached(search, base, winner, trial)
+                trial = search.approached(trial, winner, base)
             else:
                 law = False
             if law and (late := search.released(trial, base)) is not trial:
@@ -142,23 +139,6 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
             settled = {best.effects[-1]: best}  # others were fitted from a poor place
         winner = best  # its places and simpler laws have not been compared yet
     return winner
-
-
-def _approached(search: Search, base: Fitted, winner: Fitted, trial: Fitted) -> Fitted:
-    """A challenger fitted with derivatives of its own, as long as it does worse and that helps.
-
-    The winner's say little about it where one of them sticks and the other does not.
-    """
-    for _ in range(AGAIN):
-        worse = search.gain(trial, winner)
-        if max(worse, search.total(base, winner) - search.total(base, trial)) <= GATE:
-            break
-        near = search.sharpened(trial, base, draft=True)
-        fall = search.gain(trial, near)
-        trial = near if fall > 0.0 else trial
-        if fall < max(PAYS * worse, GATE):
-            break
-    return trial
 
 
 def _alike(

@@ -31,9 +31,15 @@ Vector = NDArray[np.float64]
 Say = Callable[[str], None]
 ITERATIONS = 6
 """Steps of a quick fit at most."""
+USUAL = 2.1
+"""Usual values of a strength (see `Parameter.tries`) by a larger factor away from what its first
+order asks for are no places to begin."""
 RELEASES, PAYS = 4, 0.01
 """Times at most that late values and all others are estimated in turn, and the share of what a
 model leaves beyond noise that another turn must remove."""
+AGAIN, BRINGS = 5, 0.1
+"""Times at most that a model is fitted with new derivatives to come up with another one, and the
+share of what it lacks that each must bring to be followed by another."""
 WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
 
@@ -173,11 +179,13 @@ class Fitter(Judge):
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
-        for factor, part in ((1.0, 1.0), (0.0, 1.0), (0.0, 0.1)):
+        usual = [v for v in item.strength.tries if 1.0 / USUAL < v / value < USUAL]
+        for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
+                              *((1.0, v) for v in usual)):  # fmt: skip
             theta = problem.nominal
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift
-            theta[problem.index(item.strength.name)] = part * value
+            theta[problem.index(item.strength.name)] = begun
             if item.probe.second:
                 theta[problem.index(item.probe.second)] = item.second
             starts.append(np.clip(theta, problem.lower, problem.upper))
@@ -337,6 +345,23 @@ class Fitter(Judge):
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
         return result if quick else self.sharpened(result, base, draft=True)
 
+    def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
+        """A model fitted with derivatives of its own, as long as another does better and it helps.
+
+        Derivatives of the other say little about it where one of them sticks and one does not.
+        """
+        for _ in range(AGAIN):
+            worse = self.gain(trial, goal)
+            unused = compare(self.check_data, trial.check, goal.check, self.checking).gain
+            if max(worse, worse + unused) <= GATE:
+                break
+            near = self.sharpened(trial, base, draft=True)
+            fall = self.gain(trial, near)
+            trial = near if fall > 0.0 else trial
+            if fall < max(BRINGS * worse, GATE):
+                break
+        return trial
+
     def without(self, fitted: Fitted, effect: Candidate) -> Fitted:
         """A model refitted with one of its effects absent."""
         problem = fitted.problem
@@ -356,6 +381,9 @@ class Fitter(Judge):
                 self.say(f"without {effect.label}: {error}")
                 continue
             gate = compare(self.check_data, less.check, fitted.check, self.checking)
+            if gate.passed:
+                less = self.approached(less, fitted, fitted)
+                gate = compare(self.check_data, less.check, fitted.check, self.checking)
             if not gate.passed:
                 self.say(f"dropped again: {effect.label}")
                 return self.eliminated(less)

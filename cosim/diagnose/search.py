@@ -43,6 +43,8 @@ not significant: the blocks' variance is then that of what is missing."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
+UNWANTED = 2
+"""So many where unused runs want none."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
 gains to first order are no rivals."""
@@ -354,6 +356,9 @@ class Search(Fitter):
     def finish(self, base: Fitted, current: Round, share: float) -> None:
         """Replace the first few quick fits by thorough ones.
 
+        Where unused runs want none of them, those that gain most on the others: a quick fit may
+        still be too far from its minimum to be of use elsewhere.
+
         Args:
             base: model without the effects.
             current: round whose fits are replaced.
@@ -362,8 +367,12 @@ class Search(Fitter):
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         good = [f for f in current.fitted if self.accepted(base, f)]
         near = [f for f in good if self.total(base, f) > least][:REFINED]
+        alone = bool(good) and not near[1:]
+        if not good and self.lacking(base):
+            gains = sorted(current.fitted, key=lambda f: -self.gain(base, f))
+            near = [f for f in gains if self.gain(base, f) > GATE][:UNWANTED]
         better = {
-            id(f): self.refined(base, self.sharpened(f, base, draft=True) if near[1:] else f)
+            id(f): self.refined(base, f if alone else self.sharpened(f, base, draft=True))
             for f in near
         }
         current.fitted = [better.get(id(f), f) for f in current.fitted]

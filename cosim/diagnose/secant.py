@@ -29,8 +29,9 @@ VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
 WORTH = 0.5
 """Share of `MATERIAL` that a candidate must promise, to first order, for another simulation."""
-TRIALS, NEAR = 3, 0.3
-"""Trials at most; a strength this close to one that was tried is not tried again."""
+TRIALS, BRACKETED, NEAR = 3, 6, 0.3
+"""Trials at most, also where some were too weak and some too strong; a strength this close to one
+that was tried is not tried again."""
 FLOOR = 1e-3
 """A time below this share of a typical one is as good as none: sampling or lagging that fast would
 only cost time."""
@@ -47,10 +48,11 @@ FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
-BEYOND, ASKED = 1e3, 1e-3
+BEYOND, ASKED, DESCENTS = 100.0, 0.01, 4
 """A trial that changes a channel by so many times the noise where the residual asks for less than
 this share of it has left the regime in which shares mean anything: a loop that oscillates does so
-at its limits, whatever the delay. The geometric mean of both strengths is tried then."""
+at its limits, whatever the delay, and a signal whose rate is limited far too much stands still. The
+geometric mean of both strengths is tried then, and so on, so many times."""
 
 
 class Bench:
@@ -148,12 +150,21 @@ class Bench:
         if not np.any(found.change):
             trials.value = 10.0 * trials.tried[-1]  # a limit that does not bind yet
             self.more(trials)
-        elif (
-            abs(trials.wish) < ASKED
-            and self.layout.largest(found.change.astype(np.float64)) > BEYOND
-        ):
+        for _ in range(DESCENTS):
+            if not self._beyond(trials):
+                break
+            trials.tried, trials.open = trials.tried[-1:], True
             trials.value = trials.tried[-1] * float(np.sqrt(max(abs(trials.wish), 1.0 / RUNAWAY)))
             self.more(trials)
+
+    def _beyond(self, trials: Trials) -> bool:
+        """Whether a trial was far too strong to say how strong it should be."""
+        found = trials.best
+        return (
+            found is not None
+            and abs(trials.wish) < ASKED
+            and self.layout.largest(found.change.astype(np.float64)) > BEYOND
+        )
 
     def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
         """First simulation of the elements of a vector, all in one."""
@@ -235,7 +246,7 @@ class Bench:
 
         def pursued(group: list[Trials]) -> list[Trials]:
             for trials in group:
-                if trials.rough and self._hopeful(trials, least):
+                if trials.rough and (self._hopeful(trials, least) or self._beyond(trials)):
                     trials.best, trials.rough = None, False
                     self._alone(trials)
                 while trials.open and self._hopeful(trials, least):
@@ -249,7 +260,8 @@ class Bench:
         if trials.promise <= least or trials.best is None:
             return False
         found = trials.best
-        asked = abs(trials.wish) * found.rest.astype(np.float64)
+        # the best trial need not be the last one; one that should be negative asks for nothing
+        asked = (found.score.amplitude or abs(trials.wish)) * found.rest.astype(np.float64)
         return self.layout.largest(asked) > WORTH * MATERIAL
 
     def continued(self, found: Sequence[Signature]) -> list[Signature]:
@@ -301,7 +313,11 @@ class Bench:
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
             trials.open = False
-        trials.value = self._wanted(found, value)
+        trials.asked[value] = trials.wish
+        between = trials.between()
+        if between is not None and len(tried) < BRACKETED:
+            trials.open = True
+        trials.value = self._wanted(found, value) if between is None else between
 
     @staticmethod
     def _wanted(found: Signature, value: float) -> float:
@@ -366,6 +382,7 @@ class Trials:
         best: signature at the strength nearest to the one that the residual asks for.
         second: value of its second parameter at which it is tried.
         fixed: its parameters that have another value than its FMU's.
+        asked: strength that was tried -> share of it that the residual asked for.
         promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
         open: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
@@ -378,11 +395,25 @@ class Trials:
     best: Signature | None = None
     second: float = 0.0
     fixed: Mapping[str, float] = field(default_factory=dict)
+    asked: dict[float, float] = field(default_factory=dict)
     promise: float = 0.0
     wish: float = 0.0
     open: bool = True
     rough: bool = False
     known: bool = False
+
+    def between(self) -> float | None:
+        """Where the residual would ask for the whole strength, if trials lie on both sides of it.
+
+        Limits and dead zones do nothing up to a strength and much beyond, so that shares lead from
+        one side to the other; their logarithm over that of the strength is straighter.
+        """
+        weak = max(((v, a) for v, a in self.asked.items() if a > 1.0 and v > 0.0), default=None)
+        strong = min(((v, a) for v, a in self.asked.items() if 0.0 < a < 1.0), default=None)
+        if weak is None or strong is None or weak[0] >= strong[0]:
+            return None
+        part = np.log(weak[1]) / np.log(weak[1] / strong[1])
+        return float(weak[0] * (strong[0] / weak[0]) ** part)
 
     def clipped(self, value: float) -> float:
         """A strength inside its bounds."""

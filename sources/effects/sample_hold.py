@@ -19,6 +19,10 @@ from ..quantity import Quantity
 
 SHORTEST = 1e-5
 """Sample periods below 10 us act like this one: nothing here changes faster [s]."""
+PERIODS = (5e-4, 1e-3, 2e-3, 2.5e-3, 4e-3, 5e-3, 8e-3, 0.01, 0.0125, 0.016, 0.02, 0.025, 0.03, 0.04,
+           0.05, 0.1)  # fmt: skip
+"""Periods that devices and buses have [s]. A period that is wrong by little samples at quite other
+times after a second, so a fit does not find them."""
 T_S = Quantity(
     "t_s",
     "s",
@@ -27,6 +31,7 @@ T_S = Quantity(
     minimum=0.0,
     strength=True,
     variability="fixed",
+    tries=PERIODS,
 )
 HELD = Quantity("held", "1", "value at the last sample")
 STARTED = Quantity("started", "1", "1 once the first sample is taken")

@@ -1,0 +1,33 @@
+"""Holds, delays and rate limits of one signal are told apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.own_plant import catalogue, example, made
+from cosim.diagnose.search import Search
+
+EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
+LABELS = tuple(f"{law} at encoder.speed" for law in ("sample_hold", "delay", "rate_limit"))
+
+
+@pytest.mark.parametrize("truth", LABELS)
+def test_what_a_signal_lacks_in_time_is_named(truth: str) -> None:
+    """On average a hold is a delay, and a period that is wrong by a percent samples at other times
+    after a second; a limit that is far too low lets nothing through and so tells nothing.
+    """
+    rig = example(EXAMPLE, 3.0, 2)
+    known = [c for c in catalogue(rig) if c.label in LABELS]
+    (item,) = [c for c in known if c.label == truth]
+    search = Search(
+        made(rig, item, 1e-3 if item.effect == "rate_limit" else 1.0, 11).problem, only=known
+    )
+    winner = search.round(search.calibrated()).winner
+    search.close()
+    assert winner is not None and winner.effects[-1].label == truth
+    if item.effect == "sample_hold":
+        found = winner.estimate.values["encoder.speed.sample_hold.t_s"]
+        # fits stay at the period that they began with
+        assert found == pytest.approx(0.01, rel=1e-3)
