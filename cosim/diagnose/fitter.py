@@ -37,7 +37,7 @@ order asks for are no places to begin."""
 RELEASES, PAYS = 4, 0.01
 """Times at most that late values and all others are estimated in turn, and the share of what a
 model leaves beyond noise that another turn must remove."""
-AGAIN, BRINGS = 5, 0.1
+AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
 WORTH = 0.05
