@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
-from .estimate import BOUNDS, KNOWN, Estimate, estimated
+from .estimate import BOUNDS, Estimate, estimated
 from .loss import Huber, Loss, Squares, loss_for
 from .normal import Normal, cost_of, drawn, gradient
 from .parts import Sensitivity
 from .problem import Problem
+from .weak import KNOWN
 
 Vector = NDArray[np.float64]
 STEPS = (2e-2, 5e-3, 1e-2)

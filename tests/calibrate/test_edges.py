@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from cosim.calibrate.estimate import _confirmed
 from cosim.calibrate.fit import Descent
+from cosim.calibrate.weak import confirmed
 
 # two nearly collinear columns, and a third one that both share something with
 MATRIX = np.array([[1.0, 0.99, 0.2], [0.0, 0.1, 0.3], [0.0, 0.0, 1.0], [0.3, 0.31, 0.0]]) * 100.0
@@ -69,14 +69,14 @@ def test_what_a_long_step_does_not_show_is_no_information() -> None:
     """Both columns are the same: only rounding makes their difference look known."""
     run = linear(np.array([[1e4, 1e4], [1e4, 1e4]]))
     vectors = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
-    found, _ = _confirmed(run, np.array([100.0, 4e8]), vectors)
+    found, _ = confirmed(run, np.array([100.0, 4e8]), vectors)
     assert found[0] < 1e-12
     assert np.isinf(found[1])  # not weak: not measured
 
 
 def test_what_a_long_step_shows_stays() -> None:
     run = linear(np.diag([10.0, 2e4]))
-    found, _ = _confirmed(run, np.array([100.0, 4e8]), np.eye(2))
+    found, _ = confirmed(run, np.array([100.0, 4e8]), np.eye(2))
     # exact in a linear model, but for rounding
     assert found[0] == pytest.approx(100.0, rel=1e-9)
 
@@ -86,7 +86,7 @@ def test_a_direction_that_rounding_has_turned_is_judged_by_what_no_other_can_und
     turn = 1e-3  # towards the direction with information 4e8: it would count as 400
     vectors = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
     turned = vectors @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    found, back = _confirmed(run, np.array([100.0, 4e8]), turned)
+    found, back = confirmed(run, np.array([100.0, 4e8]), turned)
     # 1 % of the contamination: Jacobian and information differ by the turn's square
     assert found[0] < 4.0
     # turned back but for the square of the turn
