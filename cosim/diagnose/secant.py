@@ -29,9 +29,9 @@ VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
 WORTH = 0.5
 """Share of `MATERIAL` that a candidate must promise, to first order, for another simulation."""
-TRIALS, BRACKETED, NEAR = 3, 6, 0.3
+TRIALS, BRACKETED, NEAR, BETWEEN = 3, 6, 0.3, 0.1
 """Trials at most, also where some were too weak and some too strong; a strength this close to one
-that was tried is not tried again."""
+that was tried is not tried again, also where it lies between those."""
 FLOOR = 1e-3
 """A time below this share of a typical one is as good as none: sampling or lagging that fast would
 only cost time."""
@@ -291,7 +291,8 @@ class Bench:
         strength, tried = trials.probe.strength, trials.tried
         value = trials.clipped(trials.value)
         least = FLOOR * strength.span if strength.unit == "s" else 0.0
-        if abs(value) <= least or any(abs(value / old - 1.0) < NEAR for old in tried):
+        near = NEAR if trials.between() is None else BETWEEN
+        if abs(value) <= least or any(abs(value / old - 1.0) < near for old in tried):
             trials.open = False
             return
         tried.append(value)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from benchmarks.own_plant import catalogue, example, made
 from cosim.diagnose.search import Search
+from cosim.diagnose.secant import Trials
 
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 LABELS = tuple(f"{law} at encoder.speed" for law in ("sample_hold", "delay", "rate_limit"))
@@ -31,3 +33,20 @@ def test_what_a_signal_lacks_in_time_is_named(truth: str) -> None:
         found = winner.estimate.values["encoder.speed.sample_hold.t_s"]
         # fits stay at the period that they began with
         assert found == pytest.approx(0.01, rel=1e-3)
+
+
+def test_strengths_are_tuned_between_trials_on_both_sides() -> None:
+    def trials(asked: dict[float, float]) -> Trials:
+        probe: Any = None
+        return Trials(probe, 1.0, asked=asked)
+
+    # the same ratio on both sides: the geometric mean
+    assert trials({1e-3: 4.0, 1e-2: 0.25}).between() == pytest.approx(10**-2.5, rel=1e-9)
+    # the nearest two count
+    assert trials({1e-4: 5.0, 1e-3: 4.0, 1e-2: 0.25, 1.0: 1e-3}).between() == pytest.approx(
+        10**-2.5, rel=1e-9
+    )
+    assert trials({1e-3: 4.0, 1e-2: 2.0}).between() is None
+    assert trials({1e-3: 0.5, 1e-2: 0.2}).between() is None
+    # a strength that should be negative lies on neither side
+    assert trials({1e-3: 4.0, 1e-2: -0.2}).between() is None
