@@ -34,6 +34,8 @@ ITERATIONS = 6
 USUAL = 2.1
 """Usual values of a strength (see `Parameter.tries`) by a larger factor away from what its first
 order asks for are no places to begin."""
+EXACT = 0.1
+"""Share of a trial's strength by which the residual may ask for another one, and it is the same."""
 RELEASES, PAYS = 4, 0.01
 """Times at most that late values and all others are estimated in turn, and the share of what a
 model leaves beyond noise that another turn must remove."""
@@ -179,9 +181,11 @@ class Fitter(Judge):
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
-        usual = [v for v in item.strength.tries if 1.0 / USUAL < v / value < USUAL]
+        near = [v for v in item.strength.tries if 1.0 / USUAL < v / value < USUAL]
+        if abs(item.score.amplitude - 1.0) > EXACT:
+            near.append(item.value)  # what was simulated: a steep law goes too far from there
         for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
-                              *((1.0, v) for v in usual)):  # fmt: skip
+                              *((1.0, v) for v in near)):  # fmt: skip
             theta = problem.nominal
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift
