@@ -119,6 +119,11 @@ def mean_squares(residual: Vector) -> Vector:
     return found
 
 
+def typical(residuals: Iterable[Vector]) -> float:
+    """Median over the windows of their mean squares."""
+    return float(np.median(np.concatenate([mean_squares(r)[np.isfinite(r)] for r in residuals])))
+
+
 def concentrated(size: Vector) -> Vector:
     """Cost of each sample from the mean square of its window."""
     beyond = DOUBTFUL * (1.0 + np.log(np.maximum(size, DOUBTFUL) / DOUBTFUL))

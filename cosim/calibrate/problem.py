@@ -69,6 +69,7 @@ class Problem:
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
         late: parameters of single runs that are held until `nuisance.released` estimates them.
+        far: whether all residuals count in full, since nearly all are large (see `unstable`).
 
     Attributes:
         evaluations: simulated runs so far.
@@ -95,13 +96,14 @@ class Problem:
         search: Coarse | None = None,
         relative: Sequence[Sequence[str]] = (),
         late: Sequence[Parameter] = (),
+        far: bool = False,
     ) -> None:
         self.ticks, self.search = ticks, search or Coarse(step)
         self.search_step = self.search.step
         self.name, self.file, self.provider = name, file, provider
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
-        self.relative, self.late = tuple(relative), tuple(late)
+        self.relative, self.late, self.far = tuple(relative), tuple(late), far
         self.constants = dict(constants or {})
         self.step, self.algorithm, self.period = step, algorithm, period
         self.instances = dict(instances or file.instances)
@@ -117,8 +119,11 @@ class Problem:
 
     @property
     def unstable(self) -> bool:
-        """Whether runs begin at values that decide when something turns over (late ones)."""
-        return bool(self.late)
+        """Whether what is far off says little: late values decide when something turns over.
+
+        Not where the declared system is so far off that moments hardly count.
+        """
+        return bool(self.late) and not self.far
 
     # -- values ------------------------------------------------------------------------------------
 
@@ -421,7 +426,7 @@ class Problem:
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
             "ticks": self.ticks, "search": self.search, "relative": self.relative,
-            "late": self.late,
+            "late": self.late, "far": self.far,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)

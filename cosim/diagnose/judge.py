@@ -42,6 +42,12 @@ class Judge:
     def _data(self, layout: Layout) -> Vector:
         return layout.vector([run.data / self.raw.sigma for run in layout.runs])
 
+    def count_in_full(self) -> Problem:
+        """Let residuals count in full though runs may turn unstable; returns the problem."""
+        self.raw = self.raw._with(far=True)
+        self.fitting.unstable = self.checking.unstable = False
+        return self.raw
+
     def lacking(self, fitted: Fitted) -> bool:
         """Whether a channel still exceeds its noise."""
         return any(s.structured for s in structures(self.fit_data - fitted.fit, self.fitting))

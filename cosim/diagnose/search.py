@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.fit import Known, fit
+from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
 from ..provider import locate
 from ..variants import apply
@@ -43,6 +44,9 @@ not significant: the blocks' variance is then that of what is missing."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
+OFF = 100.0
+"""Mean square of typical windows over the noise beyond which all residuals count in full: by their
+logarithm, fits end far from their minima, and moments at which casters turn over are then small."""
 UNWANTED = 2
 """So many where unused runs want none."""
 RIVAL = 0.5
@@ -127,6 +131,8 @@ class Search(Fitter):
         exact = raw.ticks and raw.search_step == raw.step
         first = fit(coarse, None, limit=6, robust=True, polish=exact, rough=not exact)
         coarse.close()
+        if raw.late and typical(r for _, r in first.residuals) > OFF:
+            raw = self.count_in_full()
         self.evaluations += first.evaluations
         self.say(
             f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
