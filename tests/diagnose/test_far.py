@@ -1,0 +1,62 @@
+"""Moments at which something turns over count little, but not where everything is far off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import draw, write_sets
+from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.search import OFF, Search
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+
+
+@pytest.fixture(scope="module")
+def unstable(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
+    """A bench that lacks nothing, with a parameter that counts as a start value of its runs."""
+    folder = tmp_path_factory.mktemp("benches")
+    (place,) = write_sets(folder, [draw(np.random.default_rng(3))], SHEET, 5, 2.0, ("ST", "MS"))
+    problem = read_problem(place, workers=2)
+    yield problem._with(late=problem.parameters[:1])
+    problem.close()
+
+
+def test_typical_windows_are_those_in_the_middle() -> None:
+    rows = np.ones((100, 2))
+    rows[:20] = 1e3
+    assert typical([rows]) == 1.0
+    assert typical([rows, np.full((300, 2), 4.0)]) == 16.0
+
+
+def test_few_windows_that_are_far_off_are_faults_of_the_data() -> None:
+    few = np.ones((2000, 1))
+    few[100:120] = 50.0
+    many = few.copy()
+    many[200:400] = 50.0
+    assert loss_for(False, [("A", few)]) == Windowed()
+    assert isinstance(loss_for(False, [("A", many)]), Huber)
+    assert loss_for(True, [("A", many)]) == Windowed()
+
+
+@pytest.mark.parametrize("offset", [0.0, 40.0])
+def test_where_everything_is_far_off_residuals_count_in_full(
+    unstable: Problem, offset: float
+) -> None:
+    data = {
+        run.name: run.data + offset * unstable.sigma * np.sign(np.sin(60.0 * run.times))[:, None]
+        for run in unstable.runs
+    }
+    search = Search(unstable.with_data(data), only=[])
+    fitted = search.calibrated()
+    search.close()
+    far = typical([search.fit_data[:, None] - fitted.fit[:, None]]) > OFF
+    assert far == (offset > 0.0)
+    for problem in (search.raw, search.declared, fitted.problem):
+        assert problem.unstable != far
+    assert search.fitting.unstable != far and search.checking.unstable != far
