@@ -120,8 +120,12 @@ def mean_squares(residual: Vector) -> Vector:
 
 
 def typical(residuals: Iterable[Vector]) -> float:
-    """Median over the windows of their mean squares."""
-    return float(np.median(np.concatenate([mean_squares(r)[np.isfinite(r)] for r in residuals])))
+    """Median over the windows of their mean squares, of the channel where it is largest."""
+    runs = list(residuals)
+    sizes = np.concatenate([mean_squares(r) for r in runs])
+    measured = np.isfinite(np.concatenate(runs))
+    channels = [size[good] for size, good in zip(sizes.T, measured.T, strict=True) if np.any(good)]
+    return max((float(np.median(size)) for size in channels), default=0.0)
 
 
 def concentrated(size: Vector) -> Vector:

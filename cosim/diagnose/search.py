@@ -44,9 +44,10 @@ not significant: the blocks' variance is then that of what is missing."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
-OFF = 100.0
-"""Mean square of typical windows over the noise beyond which all residuals count in full: by their
-logarithm, fits end far from their minima, and moments at which casters turn over are then small."""
+OFF = 400.0
+"""Mean square over the noise's of a channel's typical windows beyond which all residuals count in
+full: by their logarithm, fits end far from their minima, and beside that much, moments at which
+casters turn over are small."""
 UNWANTED = 2
 """So many where unused runs want none."""
 RIVAL = 0.5

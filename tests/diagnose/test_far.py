@@ -30,8 +30,10 @@ def unstable(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
 def test_typical_windows_are_those_in_the_middle() -> None:
     rows = np.ones((100, 2))
     rows[:20] = 1e3
+    rows[60:80, 1] = np.nan
     assert typical([rows]) == 1.0
-    assert typical([rows, np.full((300, 2), 4.0)]) == 16.0
+    # the channel that is farthest off counts
+    assert typical([rows, np.tile([4.0, 7.0], (300, 1))]) == 49.0
 
 
 def test_few_windows_that_are_far_off_are_faults_of_the_data() -> None:
