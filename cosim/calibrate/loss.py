@@ -29,8 +29,6 @@ WINDOW = 20
 DOUBTFUL = 4.0
 """Mean square over the noise's beyond which a window counts by its logarithm; the mean of 20
 squares of noise never gets there."""
-
-
 FEW = 0.02
 """Share of the windows that may be far off in data that a model explains elsewhere."""
 OUTLYING = 10.0

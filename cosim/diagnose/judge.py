@@ -45,7 +45,7 @@ class Judge:
     def count_in_full(self) -> Problem:
         """Let residuals count in full though runs may turn unstable; returns the problem."""
         self.raw = self.raw._with(far=True)
-        self.fitting.unstable = self.checking.unstable = False
+        self.fitting.problem = self.checking.problem = self.raw
         return self.raw
 
     def lacking(self, fitted: Fitted) -> bool:

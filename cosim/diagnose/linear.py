@@ -42,7 +42,6 @@ class Layout:
     def __init__(self, problem: Problem, runs: Sequence[Run], block: float = BLOCK) -> None:
         block = block_length([run.times for run in runs], block)
         self.problem, self.runs = problem, tuple(runs)
-        self.unstable = problem.unstable
         self.names = [run.name for run in runs]
         self.good = [np.isfinite(run.data).ravel() for run in runs]
         self.channels = len(problem.channels)
@@ -97,6 +96,11 @@ class Layout:
         """Mean square of each sample's window (see `loss`)."""
         sums = np.bincount(self.window, vector**2, self._samples.size)
         return np.asarray((sums / self._samples)[self.window])
+
+    @property
+    def unstable(self) -> bool:
+        """See `Problem.unstable`."""
+        return self.problem.unstable
 
     def cost(self, residual: Vector) -> float:
         """Half the sum of squares; as in `loss.Windowed` where runs may turn unstable."""

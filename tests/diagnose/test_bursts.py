@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 
-from benchmarks.motor_plant import draw, write_sets
-from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.bursts import bursts, times
 from cosim.diagnose.linear import Layout
 from cosim.diagnose.search import Search
 from cosim.report.page import _bursts
 
-SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 FIRST, LAST = 500, 540
-
-
-@pytest.fixture(scope="module")
-def clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
-    """A bench that lacks nothing."""
-    folder = tmp_path_factory.mktemp("benches")
-    (place,) = write_sets(folder, [draw(np.random.default_rng(3))], SHEET, 5, 2.0, ("ST", "MS"))
-    problem = read_problem(place, workers=2)
-    yield problem
-    problem.close()
 
 
 def test_windows_with_a_burst_and_their_neighbours_are_found() -> None:
@@ -42,18 +26,18 @@ def test_windows_with_a_burst_and_their_neighbours_are_found() -> None:
     assert (where[0], where[-1], where.size) == (80, 139, 60)
 
 
-def test_a_burst_pulls_no_parameter(clean: Problem) -> None:
-    run = clean.chosen("identification")[0]
+def test_a_burst_pulls_no_parameter(clean_bench: Problem) -> None:
+    run = clean_bench.chosen("identification")[0]
     data = run.data.copy()
-    data[FIRST:LAST, 2] += 80.0 * clean.sigma[2]
+    data[FIRST:LAST, 2] += 80.0 * clean_bench.sigma[2]
     values = []
-    for problem in (clean, clean.with_data({run.name: data})):
+    for problem in (clean_bench, clean_bench.with_data({run.name: data})):
         search = Search(problem, only=[])
         fitted = search.calibrated()
         values.append(fitted.estimate)
         found = bursts(search.fit_data - fitted.fit, search.fitting)
         spans = times(found, list(search.fitting.runs))
-        if problem is clean:
+        if problem is clean_bench:
             assert spans == {}
         else:
             assert list(spans) == [run.name]

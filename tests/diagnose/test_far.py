@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from benchmarks.motor_plant import draw, write_sets
 from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
-from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.search import OFF, Search
-
-SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
-
-
-@pytest.fixture(scope="module")
-def unstable(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
-    """A bench that lacks nothing, with a parameter that counts as a start value of its runs."""
-    folder = tmp_path_factory.mktemp("benches")
-    (place,) = write_sets(folder, [draw(np.random.default_rng(3))], SHEET, 5, 2.0, ("ST", "MS"))
-    problem = read_problem(place, workers=2)
-    yield problem._with(late=problem.parameters[:1])
-    problem.close()
 
 
 def test_typical_windows_are_those_in_the_middle() -> None:
@@ -48,8 +31,10 @@ def test_few_windows_that_are_far_off_are_faults_of_the_data() -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 40.0])
 def test_where_everything_is_far_off_residuals_count_in_full(
-    unstable: Problem, offset: float
+    clean_bench: Problem, offset: float
 ) -> None:
+    # a parameter that counts as a start value of its runs
+    unstable = clean_bench._with(late=clean_bench.parameters[:1])
     data = {
         run.name: run.data + offset * unstable.sigma * np.sign(np.sin(60.0 * run.times))[:, None]
         for run in unstable.runs

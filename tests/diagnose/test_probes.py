@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks.motor_plant import draw, write_sets
-from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.linear import Absorber, Layout
 from cosim.diagnose.probes import MOST, Batch, batches
 from cosim.diagnose.secant import Bench, _shared, model_values
 from cosim.errors import CosimError
-
-SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Problem]:
-    """A short data set without undeclared effects."""
-    folder = tmp_path_factory.mktemp("probes")
-    (place,) = write_sets(folder, [draw(np.random.default_rng(4))], SHEET, 5, 2.0, ("ST", "MS"))
-    problem = read_problem(place, workers=2)
-    yield problem
-    problem.close()
 
 
 def places(*ports: str) -> list[Candidate]:
@@ -74,15 +58,15 @@ def test_no_candidate_is_lost() -> None:
     assert len(alone.members) == 1
 
 
-def test_an_effect_among_its_siblings_does_what_it_does_alone(bench: Problem) -> None:
-    known = [c for c in candidates(bench) if c.effect == "delay"]
+def test_an_effect_among_its_siblings_does_what_it_does_alone(clean_bench: Problem) -> None:
+    known = [c for c in candidates(clean_bench) if c.effect == "delay"]
     assert len({c.instance for c in known}) == 2
-    layout = Layout(bench, bench.chosen("identification"))
-    several = [b for b in batches(known, bench) if len(b.members) > 1]
+    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    several = [b for b in batches(known, clean_bench) if len(b.members) > 1]
     assert several
     for batch in several:
-        for probe in batch.probes(bench):
-            (alone,) = Batch(None, ((probe.candidate, None),)).probes(bench)
+        for probe in batch.probes(clean_bench):
+            (alone,) = Batch(None, ((probe.candidate, None),)).probes(clean_bench)
             assert alone.problem is not probe.problem
             values = []
             for one in (alone, probe):
@@ -95,21 +79,21 @@ def test_an_effect_among_its_siblings_does_what_it_does_alone(bench: Problem) ->
             assert np.array_equal(*values)
 
 
-def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> None:
-    (wanted,) = [c for c in candidates(bench) if c.label == "unbalance at load.flange"]
-    layout = Layout(bench, bench.chosen("identification"))
-    theta = bench.nominal
-    model = model_values(bench, theta, layout)
-    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+def test_the_angle_of_an_effect_is_found_without_a_search(clean_bench: Problem) -> None:
+    (wanted,) = [c for c in candidates(clean_bench) if c.label == "unbalance at load.flange"]
+    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    theta = clean_bench.nominal
+    model = model_values(clean_bench, theta, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
     strength, angle = 0.02, 2.2  # small against what moves the shaft, in no special direction
     point = probe.problem.nominal
     for name, value in probe.values(strength, angle, {}).items():
         point[probe.problem.index(name)] = value
     seen = model_values(probe.problem, point, layout) - model
     probe.problem.close()
-    jacobian = np.zeros((layout.size, len(bench.parameters)))
-    absorber = Absorber(jacobian, bench)
-    place = Bench(bench, theta, layout, model, seen, absorber)
+    jacobian = np.zeros((layout.size, len(clean_bench.parameters)))
+    absorber = Absorber(jacobian, clean_bench)
+    place = Bench(clean_bench, theta, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted]))
     # the signature is linear in the strength to a percent, and so is the angle
     assert found.second == pytest.approx(angle, abs=0.02)
@@ -118,20 +102,22 @@ def test_the_angle_of_an_effect_is_found_without_a_search(bench: Problem) -> Non
 
 @pytest.mark.parametrize("asymmetry", [-0.4, 0.0, 1.0])
 def test_the_asymmetry_of_friction_is_found_without_a_search(
-    bench: Problem, asymmetry: float
+    clean_bench: Problem, asymmetry: float
 ) -> None:
-    (wanted,) = [c for c in candidates(bench) if c.label == "asymmetric_coulomb at load.flange"]
-    layout = Layout(bench, bench.chosen("identification"))
-    model = model_values(bench, bench.nominal, layout)
-    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+    (wanted,) = [
+        c for c in candidates(clean_bench) if c.label == "asymmetric_coulomb at load.flange"
+    ]
+    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    model = model_values(clean_bench, clean_bench.nominal, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
     assert probe.reach == (-1.0, 1.0)
     point = probe.problem.nominal
     for name, value in probe.values(0.02, asymmetry, {}).items():
         point[probe.problem.index(name)] = value
     seen = model_values(probe.problem, point, layout) - model
     probe.problem.close()
-    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
-    place = Bench(bench, bench.nominal, layout, model, seen, absorber)
+    absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
+    place = Bench(clean_bench, clean_bench.nominal, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted]))
     # linear in both to a few percent: the speed at which the sign is smoothed is passed elsewhere
     assert found.second == pytest.approx(asymmetry, abs=0.05)
@@ -139,12 +125,12 @@ def test_the_asymmetry_of_friction_is_found_without_a_search(
     assert found.value * found.score.amplitude == pytest.approx(0.02, rel=0.05)
 
 
-def test_cycles_per_revolution_are_tried(bench: Problem) -> None:
-    (wanted,) = [c for c in candidates(bench) if c.effect == "torque_ripple"]
-    layout = Layout(bench, bench.chosen("identification"))
-    theta = bench.nominal
-    model = model_values(bench, theta, layout)
-    (probe,) = Batch(None, ((wanted, None),)).probes(bench)
+def test_cycles_per_revolution_are_tried(clean_bench: Problem) -> None:
+    (wanted,) = [c for c in candidates(clean_bench) if c.effect == "torque_ripple"]
+    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    theta = clean_bench.nominal
+    model = model_values(clean_bench, theta, layout)
+    (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
     ((name, tried),) = probe.tries
     assert 7.0 in tried
     truth = probe.values(0.01, 0.7, {name: 7.0})
@@ -153,8 +139,8 @@ def test_cycles_per_revolution_are_tried(bench: Problem) -> None:
         point[probe.problem.index(full)] = value
     seen = model_values(probe.problem, point, layout) - model
     probe.problem.close()
-    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
-    place = Bench(bench, theta, layout, model, seen, absorber)
+    absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
+    place = Bench(clean_bench, theta, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted], thorough=True))
     assert found.fixed == {name: 7.0}
     assert found.second == pytest.approx(0.7, abs=0.02)  # linear in the strength to a percent
@@ -175,15 +161,15 @@ def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it() -> None:
 
 
 def test_a_simulation_that_runs_away_is_refused(
-    bench: Problem, monkeypatch: pytest.MonkeyPatch
+    clean_bench: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    layout = Layout(bench, bench.chosen("identification"))
+    layout = Layout(clean_bench, clean_bench.chosen("identification"))
     nothing = np.zeros(layout.size)
-    absorber = Absorber(np.zeros((layout.size, len(bench.parameters))), bench)
-    place = Bench(bench, bench.nominal, layout, nothing, nothing, absorber)
+    absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
+    place = Bench(clean_bench, clean_bench.nominal, layout, nothing, nothing, absorber)
     for value in (1e30, np.nan):
         monkeypatch.setattr(
             "cosim.diagnose.secant.model_values", lambda *_, v=value: np.full(layout.size, v)
         )
         with pytest.raises(CosimError, match="runs away"):
-            place.at(bench, {})
+            place.at(clean_bench, {})
