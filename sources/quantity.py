@@ -33,6 +33,8 @@ class Quantity:
             (effect = strength * (effect at 0 + value * derivative)).
         tries: values that a search should try, where a model with another one tells nothing of the
             right one (cycles per revolution); for a strength, values near which fits begin.
+        lattice: distance of the values at which the model is exact, 0 if it is everywhere (a held
+            signal is delayed by whole samples; between, its steps are smeared).
         visits: output of the component among whose values along a run the right value is, for a
             parameter that tells nothing where it is wrong (where a patch lies).
         variability: of a parameter; `fixed` ones can only be set before initialization.
@@ -49,6 +51,7 @@ class Quantity:
     strength: bool = False
     mix: Mix = ""
     tries: tuple[float, ...] = ()
+    lattice: float = 0.0
     visits: str = ""
     variability: Variability = "tunable"
 

@@ -128,6 +128,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     if confirm:
         scaled = profiled(run, normal, scaled, vectors[:, values < WEAK * values.max()])
     covariance = scaled * np.outer(scale, scale)
+    # any value between two of a lattice may do as well
+    covariance += np.diag([p.lattice**2 / 12.0 for p in problem.parameters])
     variances, directions = np.linalg.eigh(scaled)
     combinations = tuple(
         Combination(

@@ -51,6 +51,7 @@ class Parameter:
         span: size of a typical change; the distance of the bounds if not given.
         inverse: the targets get factor / value: a compliance that sets a stiffness.
         tries: values that a search should try; of a strength, where fits should begin, too.
+        lattice: distance of the values at which the model is exact, 0 if it is everywhere.
         visits: variable of the system among whose values along a run the right one is.
         mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
         late: held, and estimated run by run once a model explains the data (`nuisance.released`).
@@ -71,6 +72,7 @@ class Parameter:
     inverse: bool = False
     mix: str = ""
     tries: tuple[float, ...] = ()
+    lattice: float = 0.0
     visits: str = ""
     late: bool = False
 

@@ -313,7 +313,7 @@ class Problem:
             purpose: runs.
             columns: parameters, all if not given.
             central: differences on both sides.
-            relative: step over the span of a parameter.
+            relative: step over the span of a parameter, from its lattice on where it has one.
         """
         runs = self.chosen(purpose)
         self.system()
@@ -411,7 +411,7 @@ class Problem:
     ) -> tuple[float, float]:
         """The two changes between which a difference is taken; 0 is the point itself."""
         parameter, value = self.parameters[index], float(theta[index])
-        change = relative * parameter.scale
+        change = max(relative * parameter.scale, parameter.lattice)
         above, below = parameter.maximum - value, value - parameter.minimum
         if central and above >= change and below >= change:
             return -change, change
@@ -485,9 +485,10 @@ class Problem:
                 continue
             before = old.members[name].description.variables
             strengths = set(member.description.extra.get("strengths", ()))
-            mixes = member.description.extra.get("mixes", {})
-            tries = member.description.extra.get("tries", {})
-            visits = member.description.extra.get("visits", {})
+            mixes, tries, lattices, visits = (
+                member.description.extra.get(hints, {})
+                for hints in ("mixes", "tries", "lattices", "visits")
+            )
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
@@ -503,6 +504,7 @@ class Problem:
                             parameter,
                             mix=mixes.get(variable.name, ""),
                             tries=tuple(map(float, tries.get(variable.name, ()))),
+                            lattice=lattices.get(variable.name, 0.0),
                             visits=f"{name}.{place}"
                             if (place := visits.get(variable.name))
                             else "",

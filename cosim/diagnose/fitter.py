@@ -251,6 +251,15 @@ class Fitter(Judge):
             self.say(f"no fit from nominal values: {error}")
             return None
 
+    def unfitted(self, base: Fitted) -> Fitted:
+        """A model with its declared parameters at their nominal values."""
+        theta = base.problem.nominal
+        for name, value in self.effects(base).items():
+            theta[base.problem.index(name)] = value
+        found = self.judged(fit(base.problem, theta, limit=0, robust=False, polish=False))
+        found.effects, found.signature = base.effects, base.signature
+        return found
+
     def _cost(self, problem: Problem, theta: Vector) -> float:
         residuals = problem.residuals(theta, self.fitting.names)
         return cost_of(problem, theta, residuals, loss_for(problem.unstable))
@@ -308,6 +317,50 @@ class Fitter(Judge):
                 break
             least = PAYS
         return winner
+
+    def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model with its last effect's parameters at values where it is exact, if that is better.
+
+        See `Parameter.lattice`: steps that come a sample too late cost much, whatever the fraction
+        of a sample, so derivatives do not lead to the right one.
+        """
+        prefix = winner.effects[-1].prefix
+        for p in winner.problem.parameters if self.lacking(winner) else ():
+            if not (p.lattice and p.name.startswith(prefix)):
+                continue
+            place = winner.problem.index(p.name)
+            nearest = round(winner.estimate.theta[place] / p.lattice)
+            best, known = winner, {0}
+            while fresh := sorted({nearest - 1, nearest, nearest + 1} - known):
+                known |= set(fresh)
+                for count in fresh:
+                    value = count * p.lattice
+                    if not p.minimum <= value <= p.maximum:
+                        continue
+                    found = self._held(winner, p.name, value)
+                    if found is not None and self.gain(best, found) > GATE:
+                        best, nearest = found, count
+            if best is not winner:
+                self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * p.lattice:g} {p.unit}")
+                theta = winner.estimate.theta.copy()
+                theta[np.arange(theta.size) != place] = best.estimate.theta
+                theta[place] = nearest * p.lattice
+                whole = replace(winner, estimate=replace(winner.estimate, theta=theta))
+                found = self.sharpened(whole, base)
+                winner = found if self.gain(winner, found) > GATE else winner
+        return winner
+
+    def _held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:
+        """A model quickly fitted with one of its parameters held; None if it cannot be simulated."""
+        place = fitted.problem.index(name)
+        theta = fitted.estimate.theta.copy()
+        theta[place] = value
+        try:
+            problem = corrected(fitted.problem, theta, self.raw).hold({name: value})
+            return self.fitted(problem, np.delete(theta, place), fitted.estimate)
+        except CosimError as error:
+            self.say(f"{name} = {value:g}: {error}")
+            return None
 
     def refined(
         self, base: Fitted, fitted: Fitted, *, quick: bool = False, share: float = QUICKLY

@@ -263,16 +263,36 @@ class Search(Fitter):
         return chosen
 
     def round(self, base: Fitted) -> Round:
-        """Score, refit the best, choose."""
-        current = self.scored(base)
+        """Score, refit the best, choose.
+
+        Where that finds nothing for a model whose parameters were driven to their bounds, once more
+        around their nominal values: what was calibrated then hides what is missing.
+        """
+        current = self._round(base, base)
+        if current.winner is None and self.far(base):
+            self.say("parameters stand at their bounds: once more around their nominal values")
+            current = self._round(base, self.unfitted(base))
+        self.rounds.append(current)
+        if self.whole and current.winner is not None:
+            self.prepare(current.winner.problem)
+        return current
+
+    def _round(self, base: Fitted, start: Fitted) -> Round:
+        """A round whose candidates are scored, and fits begun, around another model's parameters.
+
+        Args:
+            base: from which gains count.
+            start: the same model with parameters to begin with.
+        """
+        current = self.scored(start)
+        current.base = base
         promising = self.promising(current)
         most = max((s.score.gain for s in promising), default=0.0)
         for item in promising:
             explained = self.explained(base, current.fitted)
             if not explained or item.score.gain >= RIVAL * most:
-                self.tried(base, current, item, again=not explained)
+                self.tried(start, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
-        self.rounds.append(current)
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         first = self.chosen(base, current.fitted)
         if first is not None and is_open(first.estimate):
@@ -282,7 +302,7 @@ class Search(Fitter):
             self.finish(base, current, LOOSE if self.far(base) else CLOSE)
             current.winner = self.chosen(base, current.fitted)
             if current.winner is not None:
-                self.follow(current, self.released(current.winner, base))
+                self.follow(current, self.snapped(self.released(current.winner, base), base))
         if current.winner is None:
             return current
         if not current.open:
@@ -290,8 +310,6 @@ class Search(Fitter):
             self.follow(current, self.sharpened(self.released(current.winner, base), base))
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
-        if self.whole:
-            self.prepare(current.winner.problem)
         return current
 
     def opened(self, base: Fitted, current: Round, first: Fitted) -> None:
@@ -301,8 +319,8 @@ class Search(Fitter):
         better = self.released(found, base)
         if better is found:
             better = self.sharpened(found, base, draft=True)
-        self.follow(current, better)
-        current.open = is_open(better.estimate)
+        self.follow(current, self.snapped(better, base))
+        current.open = is_open(current.winner.estimate)
 
     @staticmethod
     def follow(current: Round, better: Fitted) -> None:
@@ -310,9 +328,9 @@ class Search(Fitter):
         current.fitted = [better if f is current.winner else f for f in current.fitted]
         current.winner = better
 
-    def tried(self, base: Fitted, current: Round, item: Signature, *, again: bool) -> None:
-        """Refit a candidate and note what that gains."""
-        fitted = self.refit(base, item, again=again)
+    def tried(self, start: Fitted, current: Round, item: Signature, *, again: bool) -> None:
+        """Refit a candidate from a model's parameters and note what that gains."""
+        base, fitted = current.base, self.refit(start, item, again=again)
         if fitted is None:
             return
         fitted.p_value = current.corrected[item.candidate.label]

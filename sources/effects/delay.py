@@ -4,7 +4,9 @@
 
 The past is sampled on a grid of `period`, or t_d / 62 where that is longer, and interpolated
 linearly; at the grid points the delayed signal is exact. Before the start the signal is taken as
-constant. A signal that is held over a communication step is delayed as it is held.
+constant. A signal that is held over a communication step is delayed as it is held; one that is held
+and read in multiples of `period` is delayed exactly if t_d is such a multiple, and else its steps
+become ramps of a period.
 
 Not modelled: jitter, lost or reordered messages.
 
@@ -29,6 +31,7 @@ T_D = Quantity(
     minimum=0.0,
     maximum=100.0,
     strength=True,
+    lattice=PERIOD.starts()[0],
     variability="fixed",
 )
 

@@ -18,7 +18,7 @@ PERIOD = Quantity(
     "period",
     "s",
     "shortest distance of the samples of the past",
-    start=1e-3,
+    start=5e-4,
     minimum=1e-6,
     variability="fixed",
 )

@@ -96,15 +96,12 @@ def component_json(variant: Variant) -> bytes:
             if variable.of_effect and variable.quantity.strength
         ],
     }
-    mixes = {v.name: v.quantity.mix for v in model.of_role("parameter") if v.quantity.mix}
-    if mixes:
-        content["mixes"] = mixes
-    tries = {v.name: v.quantity.tries for v in model.of_role("parameter") if v.quantity.tries}
-    if tries:
-        content["tries"] = tries
-    visits = {v.name: v.quantity.visits for v in model.of_role("parameter") if v.quantity.visits}
-    if visits:
-        content["visits"] = visits
+    for hint, plural in (
+        ("mix", "mixes"), ("tries", "tries"), ("lattice", "lattices"), ("visits", "visits")
+    ):  # fmt: skip
+        hints = {v.name: getattr(v.quantity, hint) for v in model.of_role("parameter")}
+        if hints := {name: value for name, value in hints.items() if value}:
+            content[plural] = hints
     return (json.dumps(content, indent=2) + "\n").encode()
 
 
