@@ -102,7 +102,7 @@ def settled(
     return best
 
 
-def _starts(problem: Problem) -> list[float]:
+def starts(problem: Problem) -> list[float]:
     """Values at which late parameters are held."""
     known = {run.name: run.starts for run in problem.runs}
     return [
@@ -113,7 +113,7 @@ def _starts(problem: Problem) -> list[float]:
 
 def late_estimated(problem: Problem) -> bool:
     """Whether late values of a problem have been estimated."""
-    moved = np.subtract(_starts(problem), [p.nominal for p in problem.late])
+    moved = np.subtract(starts(problem), [p.nominal for p in problem.late])
     # values are divided by a factor and multiplied again
     return bool(np.any(np.abs(moved) > 1e-9 * np.array([p.scale for p in problem.late])))
 
@@ -130,7 +130,7 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
         The problem with these parameters held at what was found, all its values, and the fall of
         the cost [nats].
     """
-    start = _starts(problem)
+    start = starts(problem)
     whole = problem.with_parameters([*problem.parameters, *problem.late])
     whole.limits = problem.limits
     names = [run.name for run in problem.runs]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -16,7 +17,7 @@ from ..calibrate.normal import cost_of
 from ..calibrate.nuisance import late_estimated, released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
-from ..calibrate.staged import staged
+from ..calibrate.staged import jointly, staged
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .deferred import corrected, step_error
@@ -304,7 +305,8 @@ class Fitter(Judge):
                 problem.limits = limits
                 if not late_estimated(winner.problem):
                     problem, values = staged(problem, values)
-                found = self.judged(fit(problem, values, near=True, draft=True))
+                problem, values, known = jointly(problem, values)
+                found = self.judged(fit(problem, values, known=known))
             except CosimError as error:
                 self.say(f"start values of the runs could not be estimated: {error}")
                 break
@@ -319,26 +321,27 @@ class Fitter(Judge):
         return winner
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
-        """The model with its last effect's parameters at values where it is exact, if that is better.
+        """The model with its last effect's parameters at values where it is exact, if that does.
 
         See `Parameter.lattice`: steps that come a sample too late cost much, whatever the fraction
-        of a sample, so derivatives do not lead to the right one.
+        of a sample, so derivatives do not lead to the right one; and others may do as well.
         """
         prefix = winner.effects[-1].prefix
-        for p in winner.problem.parameters if self.lacking(winner) else ():
+        for p in winner.problem.parameters:
             if not (p.lattice and p.name.startswith(prefix)):
                 continue
             place = winner.problem.index(p.name)
-            nearest = round(winner.estimate.theta[place] / p.lattice)
+            nearest = math.floor(winner.estimate.theta[place] / p.lattice)
             best, known = winner, {0}
-            while fresh := sorted({nearest - 1, nearest, nearest + 1} - known):
+            while fresh := sorted({nearest, nearest + 1, nearest - (best is not winner)} - known):
                 known |= set(fresh)
                 for count in fresh:
                     value = count * p.lattice
                     if not p.minimum <= value <= p.maximum:
                         continue
                     found = self._held(winner, p.name, value)
-                    if found is not None and self.gain(best, found) > GATE:
+                    least = -GATE if best is winner else GATE
+                    if found is not None and self.gain(best, found) > least:
                         best, nearest = found, count
             if best is not winner:
                 self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * p.lattice:g} {p.unit}")
@@ -347,11 +350,11 @@ class Fitter(Judge):
                 theta[place] = nearest * p.lattice
                 whole = replace(winner, estimate=replace(winner.estimate, theta=theta))
                 found = self.sharpened(whole, base)
-                winner = found if self.gain(winner, found) > GATE else winner
+                winner = found if self.gain(winner, found) > -GATE else winner
         return winner
 
     def _held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:
-        """A model quickly fitted with one of its parameters held; None if it cannot be simulated."""
+        """A model quickly fitted with one parameter held; None if it cannot be simulated."""
         place = fitted.problem.index(name)
         theta = fitted.estimate.theta.copy()
         theta[place] = value

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.loss import loss_for, typical
+from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
 from .linear import MATERIAL, Layout, Score, score
 from .models import GATE, Fitted, compare, more_general
@@ -42,11 +46,31 @@ class Judge:
     def _data(self, layout: Layout) -> Vector:
         return layout.vector([run.data / self.raw.sigma for run in layout.runs])
 
-    def count_in_full(self) -> Problem:
-        """Let residuals count in full though runs may turn unstable; returns the problem."""
-        self.raw = self.raw._with(far=True)
+    def count_in_full(self, full: bool = True) -> Problem:
+        """Let residuals count in full though runs may turn unstable, or not again."""
+        self.raw = self.raw._with(far=full)
         self.fitting.problem = self.checking.problem = self.raw
         return self.raw
+
+    def recounted(self, fitted: Fitted, base: Fitted | None = None) -> Fitted:
+        """A fitted model whose residuals count as they do now.
+
+        Args:
+            fitted: the model.
+            base: without its last effect, recounted.
+        """
+        estimate = fitted.estimate
+        problem = estimate.problem._with(far=self.raw.far)
+        loss = loss_for(problem.unstable)
+        robust = cost_of(problem, estimate.theta, estimate.residuals, loss)
+        found = replace(fitted, estimate=replace(estimate, problem=problem, robust=robust))
+        if base is not None:
+            found.gate = compare(self.check_data, base.check, found.check, self.checking)
+        return found
+
+    def typical(self, fitted: Fitted) -> float:
+        """See `loss.typical`."""
+        return typical(self.fitting.by_run(self.fit_data - fitted.fit))
 
     def lacking(self, fitted: Fitted) -> bool:
         """Whether a channel still exceeds its noise."""

@@ -295,9 +295,12 @@ class Search(Fitter):
         current.fitted.sort(key=lambda f: -self.total(base, f))
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         first = self.chosen(base, current.fitted)
+        current.winner = first
         if first is not None and is_open(first.estimate):
-            self.opened(base, current, first)
+            self.opened(base, current)
+            base = current.base
         else:
+            base = self.recount(current)
             # quick fits are too far from their minima to be told apart
             self.finish(base, current, LOOSE if self.far(base) else CLOSE)
             current.winner = self.chosen(base, current.fitted)
@@ -312,15 +315,32 @@ class Search(Fitter):
             current.rivals = self.rivals(current.winner, wanted)
         return current
 
-    def opened(self, base: Fitted, current: Round, first: Fitted) -> None:
+    def opened(self, base: Fitted, current: Round) -> None:
         """Fit a model that evidently lacks more; if it still does, others are compared later."""
-        current.winner = first
-        found = self.refined(base, self.retried(first, base), quick=True)
+        assert current.winner is not None
+        self.follow(current, self.retried(current.winner, base))
+        base = self.recount(current)
+        found = self.refined(base, current.winner, quick=True)
         better = self.released(found, base)
         if better is found:
             better = self.sharpened(found, base, draft=True)
         self.follow(current, self.snapped(better, base))
         current.open = is_open(current.winner.estimate)
+
+    def recount(self, current: Round) -> Fitted:
+        """The base of a round; with a winner that is near, residuals count by logarithm again.
+
+        See `OFF`: what is far off is then a moment that comes too early, not the model.
+        """
+        if not self.raw.far or current.winner is None or self.typical(current.winner) > OFF:
+            return current.base
+        self.count_in_full(False)
+        current.base = base = self.recounted(current.base)
+        again = {id(f): self.recounted(f, base) for f in current.fitted}
+        current.winner = again[id(current.winner)]
+        current.fitted = sorted(again.values(), key=lambda f: -self.total(base, f))
+        current.quick = max(self.total(base, f) for f in current.fitted)
+        return base
 
     @staticmethod
     def follow(current: Round, better: Fitted) -> None:
