@@ -3,36 +3,46 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cosim.calibrate import staged as stages
 from cosim.calibrate.fit import fit
 from cosim.calibrate.parts import Parameter, Run
 from cosim.calibrate.problem import Problem
-from cosim.calibrate.staged import staged
+from cosim.calibrate.staged import jointly, staged
 
-SIZE, ANGLE = 2.0, 0.03
+SIZE, ANGLE, LIMIT = 2.0, 0.03, 1.0
 
 
 @pytest.fixture
 def unstable(short: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
-    """A size that one run tells, and another in which a start angle decides what comes of it."""
+    """A size that one run tells, and another in which a start angle decides what comes of it.
+
+    A limit is told by the latter only, and steeply after its first half.
+    """
+
+    turn = {run.name: run.times[run.times.size // 2] for run in short.runs}
 
     def simulate(self: Problem, theta: np.ndarray, run: Run | str) -> np.ndarray:
         run = self.run(run) if isinstance(run, str) else run
         found = self.values(theta, run)
         size, angle = found["encoder.size"], found["encoder.angle"]
-        early = run.times < run.times[run.times.size // 2]
+        limit = found["encoder.limit"]
+        early = run.times < turn[run.name]
         if run.name == "sines":
             values = size * np.sin(2.0 * run.times)
         else:
-            values = np.where(early, 0.1 * size + angle, 3.0 * np.sin(20.0 * size + 60.0 * angle))
+            turned = 0.3 * np.sin(20.0 * size + 60.0 * angle + 10.0 * limit)
+            values = np.where(early, 0.1 * size + angle + 0.1 * limit * run.times, turned)
         return np.tile(values, (len(self.channels), 1)).T
 
     monkeypatch.setattr(Problem, "simulate", simulate)
     monkeypatch.setattr(Problem, "_has", lambda *_: True)
     size = Parameter("size", "m", 1.0, 0.0, 4.0, (("encoder.size", 1.0),), span=1.0)
+    limit = Parameter("limit", "m", LIMIT, 0.0, 4.0, (("encoder.limit", 1.0),), span=1.0)
     late = [
         Parameter(
             f"angle@{run.name}", "rad", 0.0, -1.0, 1.0, (("encoder.angle", 1.0),), "nuisance",
@@ -42,8 +52,8 @@ def unstable(short: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
     ]  # fmt: skip
     runs = [replace(r, starts={**r.starts, "encoder.angle": ANGLE}) for r in short.runs]
     channels = [replace(c, sigma=1e-3) for c in short.channels]
-    problem = short.with_parameters([size])._with(runs=runs, channels=channels, late=late)
-    truth = {run.name: problem.simulate(np.array([SIZE]), run) for run in problem.runs}
+    problem = short.with_parameters([size, limit])._with(runs=runs, channels=channels, late=late)
+    truth = {run.name: problem.simulate(np.array([SIZE, LIMIT]), run) for run in problem.runs}
     random = np.random.default_rng(5)
     data = {name: v + 1e-3 * random.standard_normal(v.shape) for name, v in truth.items()}
     starts = [replace(r, starts={**r.starts, "encoder.angle": 0.0}) for r in problem.runs]
@@ -51,7 +61,7 @@ def unstable(short: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
 
 
 def test_the_calmer_run_leads_to_the_right_minimum(unstable: Problem) -> None:
-    begun = np.array([1.7])
+    begun = np.array([1.7, LIMIT])
     problem, theta = staged(unstable, begun)
     # the noise allows 1e-3 / sqrt(2000 samples of each channel): some 1e-5
     assert theta[0] == pytest.approx(SIZE, abs=1e-4)
@@ -63,5 +73,38 @@ def test_the_calmer_run_leads_to_the_right_minimum(unstable: Problem) -> None:
 
 
 def test_all_runs_at_once_end_elsewhere(unstable: Problem) -> None:
-    found = fit(unstable, np.array([1.7]), near=True, draft=True)
+    found = fit(unstable, np.array([1.7, LIMIT]), near=True, draft=True)
     assert 2.0 * found.robust > 2.0 * found.count
+
+
+def test_runs_are_fitted_up_to_where_the_model_leaves_them(
+    unstable: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As long as that gets farther, and in whole where it does not leave them."""
+    seen: list[dict[str, float]] = []
+
+    def noted(problem: Problem, theta: np.ndarray, purpose: str) -> Any:
+        runs = problem.chosen(purpose)
+        seen.append({r.name: len(r.times) / len(unstable.run(r.name).times) for r in runs})
+        return jointly(problem, theta, purpose)
+
+    monkeypatch.setattr(stages, "jointly", noted)
+    theta = np.array([SIZE, LIMIT + 0.05])  # 5 sigma at its end
+    _, theta = stages._advanced(unstable, theta, "identification")
+    assert seen[0] == {"sines": 1.0, "stairs": pytest.approx(0.5, abs=0.03)}
+    assert seen[-1] == {"sines": 1.0, "stairs": 1.0} and len(seen) < stages.ADVANCES
+    assert theta == pytest.approx([SIZE, LIMIT], abs=1e-2)  # drafts
+
+
+def test_late_values_and_common_ones_are_fitted_together(unstable: Problem) -> None:
+    close = {"encoder.angle": ANGLE + 2e-4}
+    runs = [replace(r, starts={**r.starts, **close}) for r in unstable.runs]
+    begun = np.array([SIZE + 1e-3, LIMIT + 1e-3])
+    problem, theta, known = jointly(unstable._with(runs=runs), begun)
+    # a draft: a hundredth of the span
+    assert theta == pytest.approx([SIZE, LIMIT], abs=1e-2)
+    assert problem.names == unstable.names and len(problem.late) == len(unstable.late)
+    assert problem.run("stairs").starts["encoder.angle"] == pytest.approx(ANGLE, abs=1e-3)
+    # no data of this run were used
+    assert problem.run("check").starts == runs[-1].starts
+    assert {"size", "limit", "angle@stairs"} <= set(known.place["stairs"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.search import OFF, Search
+from cosim.diagnose.search import OFF, Round, Search
 
 
 def test_typical_windows_are_those_in_the_middle() -> None:
@@ -47,3 +49,28 @@ def test_where_everything_is_far_off_residuals_count_in_full(
     for problem in (search.raw, search.declared, fitted.problem):
         assert problem.unstable != far
     assert search.fitting.unstable != far and search.checking.unstable != far
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_moments_count_little_again_once_the_model_is_near(
+    clean_bench: Problem, near: bool
+) -> None:
+    unstable = clean_bench._with(late=clean_bench.parameters[:1])
+    data = {
+        run.name: run.data + 40.0 * unstable.sigma * np.sign(np.sin(60.0 * run.times))[:, None]
+        for run in unstable.runs
+    }
+    search = Search(unstable.with_data(data), only=[])
+    base = search.calibrated()
+    search.close()
+    better = replace(base, fit=search.fit_data.copy(), check=search.check_data.copy())
+    winner = better if near else replace(base)
+    stage = Round(base, [], {}, fitted=[winner], winner=winner)
+    counted = search.recount(stage)
+    assert (counted is base) is not near
+    assert search.raw.unstable is near and search.fitting.unstable is near
+    assert counted.problem.unstable is near
+    assert stage.base is counted and stage.fitted == [stage.winner]
+    assert stage.winner is not None and stage.winner.problem.unstable is near
+    # what was far off costs less by its logarithm
+    assert (counted.estimate.robust < 0.1 * base.estimate.robust) is near
