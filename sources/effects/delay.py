@@ -2,7 +2,7 @@
 
     y(t) = v(t - t_d)
 
-The past is sampled on a grid of `period`, or t_d / 256 where that is longer, and interpolated
+The past is sampled on a grid of `period`, or t_d / 62 where that is longer, and interpolated
 linearly; at the grid points the delayed signal is exact. Before the start the signal is taken as
 constant. A signal that is held over a communication step is delayed as it is held; one that is held
 and read in multiples of `period` is delayed exactly if t_d is such a multiple, and else its steps
@@ -22,7 +22,7 @@ from ..effect_model import EffectModel
 from ..laws.history import NEVER, PERIOD, History
 from ..quantity import Quantity
 
-SAMPLES = 258
+SAMPLES = 64
 T_D = Quantity(
     "t_d",
     "s",
