@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 TICK = 5e-5
 COUNT = 2 * np.pi / 65536  # of the encoder [rad]
+K_PLAY, D_TWIST = 2e4, 1.5  # of the spring beside a gap, and of any spring [SI, output]
 RATIO, L_A, J_ROTOR, U_MAX, I_MAX, KP_I, KI_I = 10.167, 4e-4, 1.6e-4, 48.0, 30.0, 0.80, 560.0
 DECLARED = {
     "R_a": (0.338, 0.362), "K_t": (0.0915, 0.0985), "eta": (0.78, 0.86), "b": (0.02, 0.12),
@@ -41,6 +42,8 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "current_offset": (0.25, ("bias", "current_offset")),
     "current_gain": (0.03, ("gain", "current_gain")),
     "command_delay": (8e-3, ("delay",)),
+    "elastic_gear": (1e-3, ("elastic",)),
+    "backlash": (4e-3, ("backlash",)),
 }
 """Name -> size, and the names of the catalogue that are the same law."""
 
@@ -100,7 +103,13 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
 
     resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")
     kp, ki, acc = of("Kp_v"), of("Ki_v"), of("acc_max")
-    inertia = of("J_load") + RATIO**2 * J_ROTOR
+    rotor, load = np.full(len(benches), RATIO**2 * J_ROTOR), of("J_load")
+    inertia = load + rotor
+    gap, compliance = size("backlash"), size("elastic_gear")
+    elastic = (gap > 0.0) | (compliance > 0.0)
+    stiffness = np.where(
+        compliance > 0.0, 1.0 / np.where(compliance > 0.0, compliance, 1.0), K_PLAY
+    )
     coulomb, stribeck, drag = size("coulomb"), size("stribeck"), size("quadratic_drag")
     unbalance, hose, load_mu = size("unbalance"), size("hose_spring"), size("load_friction")
     sag, heating, saturation = size("supply_sag"), size("winding_heating"), size("saturation")
@@ -108,26 +117,39 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
     delay = np.rint(size("command_delay") / 1e-3).astype(int)
 
     n = len(benches)
-    i, w, heat = np.zeros(n), np.zeros(n), np.zeros(n)
+    i, heat = np.zeros(n), np.zeros(n)
+    w, w_out = np.zeros(n), np.zeros(n)
     angle = np.full(n, start_angle / RATIO)
+    angle_out = angle.copy()
     speed_integral, current_integral = np.zeros(n), np.zeros(n)
     w_set, i_set, u = np.zeros(n), np.zeros(n), np.zeros(n)
     rows: dict[str, list[Vector]] = {k: [] for k in ("speed", "current", "voltage", "angle")}
     last = RATIO * angle
 
-    def rates(i: Vector, w: Vector, angle: Vector) -> tuple[Vector, Vector]:
+    def rates(
+        i: Vector, w: Vector, angle: Vector, w_out: Vector, angle_out: Vector
+    ) -> tuple[Vector, Vector, Vector]:
         constant = k_t * (1 - saturation * i**2 / (i**2 + 20.0**2))
         hot = resistance * (1 + 0.00393 * heating * heat)
         supply = u * (1 - sag * (u * i / 48.0) / 48.0)
         i_rate = (supply - hot * i - constant * RATIO * w - drop * np.tanh(i / 0.2)) / L_A
         torque = RATIO * eta * constant * i
-        sign = np.tanh(w / 2e-3)
+        sign = np.tanh(w_out / 2e-3)
         friction = (
-            b * w + drag * w * np.abs(w) + (coulomb + load_mu * np.abs(torque)) * sign
-            + stribeck * np.exp(-((w / 0.5) ** 2)) * sign
+            b * w_out + drag * w_out * np.abs(w_out) + (coulomb + load_mu * np.abs(torque)) * sign
+            + stribeck * np.exp(-((w_out / 0.5) ** 2)) * sign
         )  # fmt: skip
-        springs = unbalance * np.sin(angle) + hose * angle
-        return i_rate, (torque - friction - springs) / inertia
+        springs = unbalance * np.sin(angle_out) + hose * angle_out
+        twist = angle - angle_out
+        pressed = twist - np.clip(twist, -gap / 2, gap / 2)
+        touching = np.abs(twist) >= gap / 2
+        through = touching * (stiffness * pressed + D_TWIST * (w - w_out))
+        together = (torque - friction - springs) / inertia
+        return (
+            i_rate,
+            np.where(elastic, (torque - through) / rotor, together),
+            np.where(elastic, (through - friction - springs) / load, together),
+        )
 
     for tick in range(w_ref.size * 20):
         if tick % 20 == 0:
@@ -150,10 +172,10 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
         current_integral = current_integral + np.where(free, KI_I * error * TICK, 0.0)
         u = np.clip(wanted, -U_MAX, U_MAX)
         # all rates at the tick's start; the current by the midpoint rule, its winding is fast
-        i_rate, w_rate = rates(i, w, angle)
-        i = i + TICK * rates(i + 0.5 * TICK * i_rate, w, angle)[0]
-        w = w + TICK * w_rate
-        angle = angle + TICK * w
+        i_rate, w_rate, out_rate = rates(i, w, angle, w_out, angle_out)
+        i = i + TICK * rates(i + 0.5 * TICK * i_rate, w, angle, w_out, angle_out)[0]
+        w, w_out = w + TICK * w_rate, w_out + TICK * out_rate
+        angle, angle_out = angle + TICK * w, angle_out + TICK * w_out
         heat = heat + TICK * (resistance * i**2 - heat) / 60.0
     return {name: np.array(values) for name, values in rows.items()}
 

@@ -134,8 +134,8 @@ class Builder:
         with _bad_names():
             return list(_sources("packaging.catalog").candidates(variant))
 
-    def refinements(self, variant: str) -> list[tuple[str, str, dict[str, float], str]]:
-        """(fidelity, parameter, held values, one line) of which a variant is the limit."""
+    def refinements(self, variant: str) -> list[dict[str, Any]]:
+        """Fidelities of which a variant is the limit, see the protocol `Catalogue`."""
         with _bad_names():
             return list(_sources("packaging.catalog").refinements(variant))
 
@@ -160,8 +160,8 @@ class Installed:
         """(effect, balance, one line) for every effect that could be added to a variant."""
         return Builder().candidates(variant)
 
-    def refinements(self, variant: str) -> list[tuple[str, str, dict[str, float], str]]:
-        """(fidelity, parameter, held values, one line) of which a variant is the limit."""
+    def refinements(self, variant: str) -> list[dict[str, Any]]:
+        """Fidelities of which a variant is the limit, see the protocol `Catalogue`."""
         return Builder().refinements(variant)
 
 

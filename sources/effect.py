@@ -72,6 +72,7 @@ KINDS: dict[str, Kind] = {
         _names(
             deflection="twist [rad]", rate="twist rate [rad/s]", stiffness="stiffness [N.m/rad]"
         ),
+        _names(damping="damping of the twist [N.m.s/rad]"),
     ),
     "signal": Kind(
         "",
@@ -145,6 +146,8 @@ class Effect:
         unit: unit of what it adds, where the kind leaves it open: the effect fits only balances
             with this unit ("" fits any).
         probe: whether it stands for no law of physics and is no explanation.
+        alone: whether it is looked for where its balance comes with a finer fidelity only, together
+            with that (play in a gear that is declared as rigid).
         general: effect with the same law for any unit, which need not be tried where this one fits.
     """
 
@@ -158,6 +161,7 @@ class Effect:
     unit: str = ""
     general: str = ""
     probe: bool = False
+    alone: bool = False
 
     def __post_init__(self) -> None:
         for kind in self.kinds:

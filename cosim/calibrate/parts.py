@@ -173,23 +173,6 @@ class Run:
     anchor: int = 0
 
 
-@dataclass(frozen=True)
-class Refinement:
-    """A fidelity of which another one is a limit.
-
-    Attributes:
-        fidelity: its name.
-        parameter: the one that is infinite in the limit.
-        held: parameters and their values without which the limit is another one.
-        text: one line.
-    """
-
-    fidelity: str
-    parameter: str
-    held: tuple[tuple[str, float], ...]
-    text: str = ""
-
-
 class Sensitivity(NamedTuple):
     """Derivatives of a run's model values over sigma.
 

@@ -35,7 +35,6 @@ from .parts import (
     Channel,
     Coarse,
     Parameter,
-    Refinement,
     Run,
     Sensitivity,
     adjustable,
@@ -44,9 +43,6 @@ from .parts import (
 from .pieces import relative_pose
 
 Vector = NDArray[np.float64]
-LIMIT = 1e-2
-"""A compliance this many times smaller than a typical one is as good as none; a stiffer spring
-would only ask for a finer exchange."""
 STEP = 1e-3
 """Step of differences over the span of a parameter."""
 
@@ -511,41 +507,6 @@ class Problem:
                         )
                     )
         return changed._with(parameters=[*self.parameters, *added])
-
-    def with_fidelity(self, instance: str, step: Refinement) -> Problem:
-        """The problem with one component in a fidelity that holds the present one as a limit.
-
-        Args:
-            instance: of the system.
-            step: the fidelity, and the parameter whose inverse vanishes in the limit.
-
-        Raises:
-            VariantError, UnknownNameError: it does not fit.
-        """
-        changed = self._with(
-            instances=apply(self.instances, {instance: step.fidelity}, self.provider)
-        )
-        variables = changed.system().members[instance].description.variables
-        before = self.system().members[instance].description.variables
-        constants = {f"{instance}.{n}": v for n, v in step.held}
-        prefix = f"{instance}.{step.fidelity}."
-        stiff = variables[step.parameter]
-        span = 1.0 / float((stiff.start or (1.0,))[0] or 1.0)
-        added = [
-            Parameter(
-                f"{prefix}1/{step.parameter}", f"1/({stiff.symbol})", LIMIT * span, LIMIT * span,
-                span / LIMIT, ((f"{instance}.{step.parameter}", 1.0),), "effect",
-                strength=True, span=span, text=f"inverse of: {stiff.text}", inverse=True,
-            )
-        ]  # fmt: skip
-        known = {*before, *dict(step.held), step.parameter}
-        for name, variable in variables.items():
-            if adjustable(variable) and name not in known:
-                full = f"{instance}.{name}"
-                added.append(free_parameter(variable, prefix + name, full, strength=False))
-        return changed._with(
-            parameters=[*self.parameters, *added], constants={**self.constants, **constants}
-        )
 
     def close(self) -> None:
         """Free the sessions; the problem can still be used."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-from ..calibrate.parts import Parameter, Refinement
+from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
+from ..calibrate.refinement import Refinement
 from ..variants import component
 
 _ELEMENT = re.compile(r"(.+)_(\d+)")
@@ -22,8 +23,8 @@ class Catalogue(Protocol):
         """(effect, balance, one line about it) for all that could be added to the variant."""
         ...
 
-    def refinements(self, variant: str) -> Sequence[tuple[str, str, Mapping[str, float], str]]:
-        """(fidelity, parameter, held values, one line) of which the variant is a limit."""
+    def refinements(self, variant: str) -> Sequence[Mapping[str, Any]]:
+        """Fidelities of which the variant is a limit; keys as `Refinement`, `held` as mapping."""
         ...
 
 
@@ -71,7 +72,7 @@ class Candidate:
     def added_to(self, problem: Problem) -> Problem:
         """The problem on the system with this effect, which is absent at the nominal values."""
         if self.refinement is not None:
-            return problem.with_fidelity(self.instance, self.refinement)
+            return self.refinement.added_to(problem, self.instance)
         return problem.with_effects(self.change)
 
 
@@ -89,9 +90,9 @@ def candidates(problem: Problem) -> list[Candidate]:
         for effect, port, text in provider.candidates(variant):
             if (instance, port) not in twins:
                 found.append(Candidate(instance, kind, effect, port, text))
-        for fidelity, parameter, held, text in provider.refinements(variant):
-            step = Refinement(fidelity, parameter, tuple(held.items()), text)
-            found.append(Candidate(instance, kind, fidelity, "", text, step))
+        for entry in provider.refinements(variant):
+            step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
+            found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
     return found
 
 

@@ -1,9 +1,11 @@
-"""Backlash: the spring transmits nothing within a gap.
+"""Backlash: the spring transmits nothing within a gap, and its damper only part.
 
-    f = k sat(x, gap / 2),   the spring's torque becomes k (x - sat(x, gap / 2))
+    f = k sat(x, gap / 2) + (1 - grease) d x' where |x| < gap / 2
+    the spring's torque becomes k (x - sat(x, gap / 2)) + d x' outside, grease d x' inside
     E = k ((x - sat)^2 - x^2) / 2, less than the spring without gap
+    P_loss = -(1 - grease) d x'^2 inside, less than the damper without gap
 
-Not modelled: impact losses; the damper of the spring acts in the gap, too, as grease would.
+Not modelled: impact losses beyond those of the damper.
 
 Source: Nordin, Galic, Gutman, New models for backlash and gear play, Int. J. Adaptive Control and
 Signal Processing 11(1), 1997 (dead-zone model).
@@ -20,6 +22,9 @@ from ..quantity import Quantity
 GAP = Quantity(
     "gap", "rad", "whole play, 0 = absent", start=3e-3, minimum=0.0, nominal=1e-3, strength=True
 )
+GREASE = Quantity(
+    "grease", "1", "share of the spring's damper that acts within the gap", minimum=0.0, maximum=1.0
+)
 
 EFFECT = Effect(
     "backlash",
@@ -27,15 +32,22 @@ EFFECT = Effect(
     ("compliance",),
     GAP,
     needs=("stiffness",),
+    alone=True,
     source="Nordin 1997",
 )
 
 
 def law(e: EffectModel) -> None:
-    """Add what the spring does not transmit."""
+    """Add what the spring and its damper do not transmit."""
     twist, half, stiffness = e.signal("deflection"), e.parameter(GAP) / 2, e.signal("stiffness")
     # strict: without a gap the derivative at rest is the spring's, too
-    inside = ca.if_else(ca.fabs(twist) < half, twist, half * ca.sign(twist))
+    within = ca.fabs(twist) < half
+    inside = ca.if_else(within, twist, half * ca.sign(twist))
     e.add(stiffness * inside)
     e.stored_energy(-stiffness * inside * (2 * twist - inside) / 2)
-    e.loss(0)
+    if not e.offers("damping"):
+        e.loss(0)
+        return
+    idle = within * (1 - e.parameter(GREASE)) * e.signal("damping") * e.signal("rate")
+    e.add(idle)
+    e.loss(-idle * e.signal("rate"))

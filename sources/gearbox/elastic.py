@@ -46,7 +46,7 @@ TWIST = Quantity(
 ROTOR_SPEED = Quantity("rotor_speed", "rad/s", "state: speed of the rotor", nominal=100.0)
 SMALLEST_ROTOR = 1e-9
 STIFF = K
-LIMITS = {"ratio": {"signed": 0.0}, "lossy": {"signed": 1.0}}
+LIMITS = {"ratio": {"signed": 0.0, "P_0": P_0.start}, "lossy": {"signed": 1.0}}
 """Fidelities that an infinite stiffness gives, and what has to be set for that."""
 
 
@@ -62,7 +62,9 @@ def equations(m: Model) -> None:
     ripple = m.balance("ratio", "coefficient", unit="1", value=nominal, speed=w_b)
     ratio = nominal + ripple.effort
     rate = w_a / ratio - w_b
-    spring = m.balance("spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness)
+    spring = m.balance(
+        "spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+    )
     tau_s = stiffness * twist + damping * rate - spring.effort
     flange_b = m.balance("flange_b", "rotation", velocity=w_b, load=tau_s)
     flange_a = m.balance("flange_a", "rotation", velocity=w_a, load=tau_a)

@@ -83,19 +83,48 @@ def _has_place(effect: str) -> bool:
     return any(isinstance(v, Quantity) and v.visits for v in values)
 
 
-def refinements(name: str) -> list[tuple[str, str, dict[str, float], str]]:
-    """(fidelity, its parameter, held values, sentence) of which a variant is the limit.
+def refinements(name: str) -> list[dict[str, Any]]:
+    """Fidelities of which a variant is the limit, with the variant's effects.
 
-    A fidelity's module says so by `LIMITS`: fidelity -> values without which the limit is another,
-    and `STIFF`: the quantity that is infinite there.
+    A fidelity's module says so by `LIMITS` (fidelity -> values without which the limit is another)
+    and by the quantity that is infinite there, `STIFF`, or the one that vanishes, `SOFT`. Elements
+    of the latter count one by one; they have the balances that its `PLACES` names. An effect that
+    is looked for `alone` comes with its fidelity.
+
+    Returns:
+        One mapping each: `effect` (what it is called), `fidelity` (short form), `parameter` (its
+        strength), `stiff` (that is infinite in the limit, or ""), `port` (the element's balance, or
+        ""), `held`, `text`.
     """
     parsed = parse_name(name)
+    carried = "".join(f"+{effect}" + (f"@{at}" if at else "") for effect, at in parsed.effects)
     found = []
     for fidelity, module in fidelities(parsed.component).items():
         limits = getattr(module, "LIMITS", {})
-        if parsed.fidelity in limits and not parsed.effects:
-            text = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
-            found.append((fidelity, module.STIFF.name, dict(limits[parsed.fidelity]), text))
+        if parsed.fidelity not in limits:
+            continue
+        text = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
+        known = {"held": dict(limits[parsed.fidelity]), "text": text}
+        short = fidelity + carried
+        if soft := getattr(module, "SOFT", None):
+            found += [
+                {**known, "effect": module.NAME, "fidelity": short, "stiff": "", "port": place,
+                 "parameter": f"{soft.name}[{i + 1}]"}
+                for i, place in enumerate(module.PLACES)
+            ]  # fmt: skip
+            continue
+        stiff = module.STIFF.name
+        known["stiff"] = stiff
+        found.append({**known, "effect": fidelity, "fidelity": short, "port": "",
+                      "parameter": stiff})  # fmt: skip
+        for balance in _plain(parsed.component)[fidelity].balances.values():
+            found += [
+                {**known, "effect": effect, "fidelity": f"{short}+{effect}@{balance.name}",
+                 "port": "", "parameter": f"{balance.name}.{effect}.{item.strength.name}",
+                 "text": item.text}
+                for effect, item in ((n, module.EFFECT) for n, module in effects().items())
+                if item.alone and not misfit(item, balance)
+            ]  # fmt: skip
     return found
 
 

@@ -49,7 +49,9 @@ def equations(m: Model) -> None:
     viscous = m.parameter(F_V) * v
     dry = m.parameter(F_C) * ca.tanh(v / m.parameter(V_0))
     offset = m.parameter(F_0)
-    spring = m.balance("spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness)
+    spring = m.balance(
+        "spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+    )
     tau_s = stiffness * twist + damping * rate - spring.effort
     turned = angle + m.parameter(X_0) / radius
     shaft = m.balance("screw", "rotation", velocity=carriage, angle=turned - twist, load=tau_s)

@@ -23,7 +23,7 @@ from ..quantity import Quantity
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 4
+LEVEL = 5
 # The last link on its gear swings at 1 kHz, sqrt(K/J) = 6e3 1/s; RK4 is stable up to 2.8e4 1/s.
 SOLVER = Solver("rk4", 1e-4)
 K = Quantity(
@@ -77,7 +77,9 @@ def equations(m: Model) -> None:
     q, qd = theta - twist, thetad - rate
     hub = added + m.parameter(J_HUB)
     driving = tau + joint_efforts(m, thetad, theta, tau)
-    gear = m.balance("gear", "compliance", deflection=twist, rate=rate, stiffness=stiffness)
+    gear = m.balance(
+        "gear", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+    )
     through = stiffness * twist + damping * rate - gear.effort
     arm = links(m, mount, q, qd)
     output = m.parameter(J_OUT) * ca.SX.ones(6)

@@ -24,7 +24,7 @@ from ..model import Model
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import joint_efforts, links, move_mount, output_motion, output_wrench, read_mount
 
-LEVEL = 3
+LEVEL = 4
 SOLVER = Solver("rk4", 1e-3)
 
 

@@ -176,7 +176,41 @@ def test_tick_is_a_semi_implicit_euler_step() -> None:
     np.testing.assert_array_equal(slope[:6], z[:6])  # the angle runs on at the new speed
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "rigid_moving", "elastic", "ticked", "kinematic"])
+def after_a_tick(fidelity: str, period: float, **values: np.ndarray) -> np.ndarray:
+    model = oracle(f"ur5_arm/{fidelity}")
+    arguments = model.arguments(named(**values) | {"T": period})
+    return np.asarray(model.functions.updates[0](*arguments)).ravel()
+
+
+def test_ticks_of_gears_that_yield() -> None:
+    """Both sides of each spring accelerate as its torque says, which is c f = x + t x'."""
+    rng = np.random.default_rng(7)
+    p, period = draw(rng), 1e-3
+    c, t_d = rng.uniform(1e-4, 1e-3, 6), rng.uniform(1e-4, 1e-3, 6)
+    twist, rate = 1e-3 * rng.normal(size=6), 0.1 * rng.normal(size=6)
+    state = {**p, "angle": p["angle"] + twist, "speed": p["speed"] + rate, "twist": twist}
+    state |= {"held_speed": state["speed"], "held_rate": rate, "c": c, "t_d": t_d}
+    z = after_a_tick("ticked_elastic", period, **state)
+    turning, twisting, new_rate = z[6:12], z[18:24], z[12:18]
+    least = np.array([0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4])  # as the module says
+    through = (twist + (t_d + period / (1 + (c * least / period**2) ** 2)) * new_rate) / c
+    links = named(**p) | named(tau=through, J_added=np.zeros(6))
+    rigid = vector(oracle("ur5_arm/rigid").derivatives(links), "speed")
+    close(turning - twisting, rigid)
+    close(p["J_added"] * turning, p["tau"] - through)
+
+
+def test_ticks_of_rigid_gears_are_a_limit_of_those_that_yield() -> None:
+    p, period = draw(np.random.default_rng(8)), 5e-4
+    rigid = after_a_tick("ticked", period, **p, held_speed=p["speed"])
+    stiff = {**p, "held_speed": p["speed"], "c": np.zeros(6)}
+    # the same sums in another order
+    close(after_a_tick("ticked_elastic", period, **stiff)[:12], rigid)
+
+
+@pytest.mark.parametrize(
+    "fidelity", ["rigid", "rigid_moving", "elastic", "ticked", "ticked_elastic", "kinematic"]
+)
 def test_finite_at_rest(fidelity: str) -> None:
     """Start values, zero inputs: every function and derivative is a number."""
     model = oracle(f"ur5_arm/{fidelity}")

@@ -176,7 +176,9 @@ def test_unknown_place_is_explained() -> None:
         build_model("ur5_arm/kinematic+payload")
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "rigid_moving", "elastic", "ticked"])
+@pytest.mark.parametrize(
+    "fidelity", ["rigid", "rigid_moving", "elastic", "ticked", "ticked_elastic"]
+)
 def test_payload_of_0_leaves_every_bit(fidelity: str) -> None:
     """Numbers that the chain folds at build time round as they do beside a mass of 0."""
     plain = Oracle(build_model(f"ur5_arm/{fidelity}"))

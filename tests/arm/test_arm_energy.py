@@ -17,6 +17,7 @@ from tests.arm.chains import vector
 # highest fidelities.
 PLAIN = [
     *(f"ur5_arm/{f}" for f in ("kinematic", "rigid", "ticked", "rigid_moving", "elastic")),
+    "ur5_arm/ticked_elastic",
     "ur5_arm.ur5e/rigid_moving",
     "ur5_arm.lab/ticked",
     *(f"ur5_drive/{f}" for f in ("perfect", "servo", "servo_lossy", "sampled")),
@@ -30,6 +31,7 @@ SOME = (
     "ur5_arm/rigid_moving+hose_spring@joint_2+bristle@joint_6+harmonic_ripple+base_tilt",
     "ur5_arm/ticked+hose_spring+bristle@joint_2+coulomb",
     "ur5_arm/elastic+backlash+coulomb@joint_1+temperature_drift+base_tilt",
+    "ur5_arm/ticked_elastic+payload+coulomb@joint_2",
     "ur5_arm/elastic+hysteresis+cubic_stiffness",
     "ur5_drive/perfect+coulomb+hose_spring@joint_2",
     "ur5_drive/servo+stribeck@joint_4+winding_heating@winding_2+encoder_offset@encoder_3",

@@ -190,7 +190,9 @@ def test_torques_and_wrench_on_a_moving_mount(device: str, pose: str) -> None:
     np.testing.assert_allclose(given, forces, rtol=0, atol=HALF_DIGIT)
 
 
-@pytest.mark.parametrize("fidelity", ["kinematic", "rigid", "ticked", "rigid_moving", "elastic"])
+@pytest.mark.parametrize(
+    "fidelity", ["kinematic", "rigid", "ticked", "ticked_elastic", "rigid_moving", "elastic"]
+)
 @pytest.mark.parametrize(("device", "pose"), PLACES)
 def test_tool_and_energy(device: str, pose: str, fidelity: str) -> None:
     position, rotation, energy, _ = PLACES[device, pose]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cosim.calibrate.parts import Refinement
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.refinement import Refinement
 from cosim.diagnose.candidates import candidates
 
-ELASTIC = Refinement("elastic", "k", (("signed", 0.0),))
+HELD = (("signed", 0.0),)
+ELASTIC = Refinement("elastic", "elastic", "k", "k", held=HELD)
+PLAY = Refinement("backlash", "elastic+backlash@spring", "spring.backlash.gap", "k", held=HELD)
 
 
 def residual_size(problem: Problem, theta: np.ndarray, data: np.ndarray) -> float:
@@ -18,7 +20,7 @@ def residual_size(problem: Problem, theta: np.ndarray, data: np.ndarray) -> floa
 
 def test_the_stiff_limit_is_the_declared_gearbox(short: Problem, truth: np.ndarray) -> None:
     rigid = short.simulate(truth, "sines")
-    elastic = short.with_fidelity("gearbox", ELASTIC)
+    elastic = ELASTIC.added_to(short, "gearbox")
     (compliance,) = [p for p in elastic.parameters if p.inverse]
     theta = elastic.nominal
     theta[: truth.size] = truth
@@ -33,5 +35,16 @@ def test_the_stiff_limit_is_the_declared_gearbox(short: Problem, truth: np.ndarr
 def test_it_is_a_candidate_with_a_place_of_its_own(measured: Problem) -> None:
     found = [c for c in candidates(measured) if c.refinement is not None]
     assert [(c.label, c.prefix, c.change) for c in found] == [
-        ("elastic at gearbox", "gearbox.elastic.", {"gearbox": "elastic"})
+        ("elastic at gearbox", "gearbox.elastic.", {"gearbox": "elastic"}),
+        ("backlash at gearbox", "gearbox.backlash.", {"gearbox": "elastic+backlash@spring"}),
     ]
+
+
+def test_play_comes_with_the_spring_that_it_needs(short: Problem) -> None:
+    problem = PLAY.added_to(short, "gearbox")
+    added = problem.parameters[len(short.parameters) :]
+    assert [p.name for p in added if p.strength] == ["gearbox.backlash.gap"]
+    assert {p.name for p in added} >= {"gearbox.backlash.1/k", "gearbox.backlash.d"}
+    (compliance,) = [p for p in added if p.inverse]
+    # a rigid gear with play still has a stiffness to be found: it begins at the gear's own
+    assert compliance.nominal == compliance.span > compliance.minimum

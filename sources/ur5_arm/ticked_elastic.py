@@ -1,0 +1,117 @@
+"""Rigid links behind gears that yield, on a mount at rest, advanced in ticks of a fixed period.
+
+    every T:  theta' += T theta'',  q' += T q'',   then theta and q run on until the next tick
+    J_added theta'' = tau - f,   M(q) q'' + C(q, q') q' + g(q) = f,   c f = x + t_d x'
+
+theta is the gear's output without its twist x = theta - q, as the motor encoder sees it: the
+outputs `q`, `qd` and the port of the joints belong to it. c is a gear's compliance; without
+compliance it is `ticked`, exactly. The spring acts with the twist at a tick's start and the damper
+with the rate at its end (semi-implicit Euler), which needs no solver that is stable for stiff
+springs: where a spring is too stiff for the ticks, c < T^2 / J_least, the damping time grows by up
+to T.
+
+For the account of energy speeds run linearly from one tick's value to the next, and the power that
+the scheme invents enters `P_in`. `speed` and `held_speed` start alike.
+
+Not modelled: hysteresis, stiffening and play of the gears.
+
+Source: Spong, J. Dyn. Sys. Meas. Control 109, 1987, 310-319; Hairer, Lubich, Wanner, Geometric
+Numerical Integration, 2006, ch. VI.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+
+from ..component import Solver
+from ..model import Model
+from ..quantity import Quantity
+from . import ANGLE, J_ADDED, SPEED, TAU
+from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+from .ticked import HELD_ACCELERATION, HELD_SPEED, T
+
+LEVEL = 3
+SOLVER = Solver("rk4", 1e-3)
+C = Quantity(
+    "c",
+    "rad/(N.m)",
+    "torsional compliance of the gears, 0 = rigid",
+    minimum=0.0,
+    nominal=1e-4,
+    size=6,
+    strength=True,
+)
+T_D = Quantity(
+    "t_d",
+    "s",
+    "damping of the gears' twist over their stiffness",
+    start=2e-4,
+    minimum=1e-5,
+    maximum=0.1,
+    nominal=1e-4,
+    size=6,
+)
+TWIST = Quantity(
+    "twist", "rad", "state: twist of the gears, motor's side less link", nominal=1e-3, size=6
+)
+TWIST_RATE = Quantity("twist_rate", "rad/s", "state: rate of the twist", nominal=0.1, size=6)
+HELD_RATE = Quantity("held_rate", "rad/s", "rates of the twist from one tick to the next", size=6)
+HELD_TWISTING = Quantity(
+    "held_twisting", "rad/s2", "accelerations of the twist at the last tick", size=6
+)
+NAME, SOFT, PLACES = "elastic", C, tuple(f"joint_{i + 1}" for i in range(6))
+LIMITS: dict[str, dict[str, float]] = {"ticked": {}, "ticked_elastic": {}}
+"""Fidelities that no compliance at an element gives, and what has to be set for that."""
+J_LEAST = (0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4)
+"""Least inertia [kg.m2] that a joint has to move, all others free, in any pose of the UR5."""
+NO_SPRING = 1e-12
+"""Compliance [rad/(N.m)] below which the energy of a spring does not count."""
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    mount = at_rest(read_mount(m))
+    tau, hub = m.input(TAU), m.input(J_ADDED)
+    compliance, period = m.parameter(C), m.parameter(T)
+    tick = m.clock("mechanics", period)
+    theta, speed = m.state(ANGLE), m.state(SPEED)
+    twist, rate = m.state(TWIST), m.state(TWIST_RATE)
+    thetad, thetadd = m.discrete(HELD_SPEED), m.discrete(HELD_ACCELERATION)
+    twistd, twistdd = m.discrete(HELD_RATE), m.discrete(HELD_TWISTING)
+    driving = tau + joint_efforts(m, thetad, theta, tau)
+    q, qd = theta - twist, thetad - twistd
+    arm = links(m, mount, q, qd)
+
+    limit = period**2 / ca.SX(J_LEAST)
+    declared = m.parameter(T_D)
+    damping = declared + period / (1 + (compliance / limit) ** 2)
+    # the hub eliminated: the links feel it through the spring as an inertia and a torque
+    stiff = damping * period / (compliance * hub + damping * period)
+    carried = stiff * hub
+    passed = stiff * driving + carried * (twist / damping + twistd) / period
+    dynamics = arm.accelerate(passed, carried)
+    torque = passed - carried * dynamics.acceleration
+    twisting = ((compliance * torque - twist) / damping - twistd) / period
+    turning = dynamics.acceleration + twisting
+    m.update(tick, thetad, thetad + period * turning)
+    m.update(tick, thetadd, turning)
+    m.update(tick, twistd, twistd + period * twisting)
+    m.update(tick, twistdd, twisting)
+    m.derivative(theta, thetad)
+    m.derivative(speed, thetadd)
+    m.derivative(twist, twistd)
+    m.derivative(rate, twistdd)
+    output_motion(m, mount, theta, thetad, arm.posture, tau)
+    locked = arm.posture.mass_properties().matrix()
+    output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
+    kinetic, potential = replace(arm, qd=speed - rate).energy()
+    springs = ca.dot(twist, twist / (compliance + NO_SPRING)) / 2
+    stored = kinetic + potential + ca.dot(hub, speed**2) / 2 + springs
+    states = ca.vertcat(theta, speed, twist, rate)
+    rates = ca.jtimes(stored, states, ca.vertcat(thetad, thetadd, twistd, twistdd))
+    heat = ca.dot(declared / (compliance + NO_SPRING), rate**2)
+    m.stored_energy(stored)
+    m.loss("gears", heat)
+    m.supply(rates + heat - ca.dot(driving, thetad) - ca.dot(arm.load, arm.tool_twist))

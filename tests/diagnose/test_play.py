@@ -1,0 +1,56 @@
+"""Play in a gear that is declared as rigid is named at once, and not for one that only yields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.motor_plant import Bench, draw, write_sets
+from cosim.calibrate.mapping import read_problem
+from cosim.diagnose.candidates import candidates
+from cosim.diagnose.search import Round, Search
+
+SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
+CHOICE = {"backlash at gearbox", "elastic at gearbox", "coulomb at gearbox.flange_b"}
+GAP, COMPLIANCE = 3e-3, 1e-3
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
+    """An independent bench with play, and the same one with a soft gear."""
+    folder = tmp_path_factory.mktemp("benches")
+    plain = draw(np.random.default_rng(3)).parameters
+    sizes = {"backlash": GAP, "elastic_gear": COMPLIANCE}
+    benches = [Bench(plain, effect, size) for effect, size in sizes.items()]
+    yield dict(
+        zip(sizes, write_sets(folder, benches, SHEET, 5, 2.0, ("ST", "MS", "LW")), strict=True)
+    )
+
+
+def searched(folder: Path) -> Round:
+    problem = read_problem(folder, workers=2)
+    chosen = [c for c in candidates(problem) if c.label in CHOICE]
+    search = Search(problem, only=chosen)
+    found = search.round(search.calibrated())
+    search.close()
+    return found
+
+
+def test_play_is_named_with_its_size(sets: dict[str, Path]) -> None:
+    winner = searched(sets["backlash"]).winner
+    assert winner is not None
+    assert [e.label for e in winner.effects] == ["backlash at gearbox"]
+    # the plant moves in ticks, the model does not: a twentieth
+    assert winner.estimate.values["gearbox.backlash.gap"] == pytest.approx(GAP, rel=0.05)
+
+
+def test_a_soft_gear_has_no_play(sets: dict[str, Path]) -> None:
+    winner = searched(sets["elastic_gear"]).winner
+    assert winner is not None
+    assert [e.label for e in winner.effects] == ["elastic at gearbox"]
+    value = winner.estimate.values["gearbox.elastic.1/k"]
+    # as above
+    assert value == pytest.approx(COMPLIANCE, rel=0.05)
