@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FmuCallError
 from .loss import loss_for
 from .parts import Sensitivity
 from .problem import Problem
@@ -141,7 +142,13 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     before = sum(costs.values())
 
     def tried(theta: Vector, runs: list[str], horizons: tuple[float, ...]) -> None:
-        found = _followed(whole, theta, runs, horizons)
+        try:
+            found = _followed(whole, theta, runs, horizons)
+        except FmuCallError:
+            if len(runs) > 1:  # one run that cannot be simulated there keeps what it has
+                for name in runs:
+                    tried(theta, [name], horizons)
+            return
         for name, cost in _costs(whole, found, runs).items():
             if cost < costs[name]:
                 own = concerned(whole, [name])

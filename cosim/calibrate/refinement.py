@@ -12,6 +12,9 @@ from .problem import Problem
 LIMIT = 1e-2
 """A compliance this many times smaller than a typical one is as good as none; a stiffer spring
 would only ask for a finer exchange."""
+STIFFER = (0.3, 0.1)
+"""Shares of a typical compliance that are tried where it is not what is looked for: play with a
+spring that is too soft leads fits elsewhere."""
 _ELEMENT = re.compile(r"\[\d+\]$")
 
 

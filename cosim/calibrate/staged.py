@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FmuCallError
 from .fit import PURPOSE, Known, fit
 from .loss import loss_for, mean_squares
 from .nuisance import released, starts
@@ -85,7 +86,10 @@ def _advanced(problem: Problem, theta: Vector, purpose: str) -> tuple[Problem, V
         count = sum(run.times.size for run in part.chosen(purpose))
         if count < FARTHER * before:
             break
-        part, theta, _ = jointly(part, late, purpose)
+        try:
+            part, theta, _ = jointly(part, late, purpose)
+        except FmuCallError:  # too steep for derivatives: what follows begins here
+            break
         problem, before = _begun(problem, part), count
         if count == sum(run.times.size for run in problem.chosen(purpose)):
             break

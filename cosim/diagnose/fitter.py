@@ -18,7 +18,7 @@ from ..calibrate.nuisance import late_estimated, released, settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
 from ..calibrate.staged import jointly, staged
-from ..errors import CosimError
+from ..errors import CosimError, FmuCallError
 from .candidates import Candidate, new_parameters
 from .deferred import corrected, step_error
 from .exchange import absent, is_open
@@ -305,8 +305,7 @@ class Fitter(Judge):
                 problem.limits = limits
                 if not late_estimated(winner.problem):
                     problem, values = staged(problem, values)
-                problem, values, known = jointly(problem, values)
-                found = self.judged(fit(problem, values, known=known))
+                found = self._with_late(problem, values)
             except CosimError as error:
                 self.say(f"start values of the runs could not be estimated: {error}")
                 break
@@ -319,6 +318,15 @@ class Fitter(Judge):
                 break
             least = PAYS
         return winner
+
+    def _with_late(self, problem: Problem, theta: Vector) -> Fitted:
+        """A model fitted together with late values; beside them, if that cannot be simulated."""
+        try:
+            held, values, known = jointly(problem, theta)
+        except FmuCallError as error:
+            self.say(f"start values of the runs are held: {error}")
+            return self.judged(fit(problem, theta, near=True, draft=True))
+        return self.judged(fit(held, values, known=known))
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.

@@ -11,6 +11,7 @@ from cosim.calibrate.loss import Windowed
 from cosim.calibrate.nuisance import HORIZONS, released, settled, slopes
 from cosim.calibrate.parts import Parameter, Run
 from cosim.calibrate.problem import Problem
+from cosim.errors import FmuCallError
 
 SHIFT = 0.02
 
@@ -67,6 +68,31 @@ def test_late_values_are_held_at_what_each_run_says(short: Problem, truth: np.nd
     again, _, more = released(result, values)
     assert again.run("check").starts["encoder.theta"] == pytest.approx(SHIFT, rel=1e-3)
     assert abs(more) < 1e-3 * fall
+
+
+def test_a_run_that_cannot_be_simulated_elsewhere_keeps_its_value(
+    short: Problem, truth: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the others are estimated all the same."""
+    problem, theta = shifted(short, truth, 0.1)
+    own = problem.parameters[-1]
+    other = replace(own, name="theta_0@sines", run="sines")
+    runs = [replace(r, starts={**r.starts, "encoder.theta": 0.0}) for r in problem.runs]
+    waiting = problem.with_parameters(problem.parameters[:-1])._with(late=[own, other], runs=runs)
+    simulate = Problem.simulate
+
+    def strict(self: Problem, theta: np.ndarray, run: Run | str) -> np.ndarray:
+        run = self.run(run) if isinstance(run, str) else run
+        if run.name == "sines" and self.values(theta, run).get("encoder.theta"):
+            raise FmuCallError("it took too long")
+        return simulate(self, theta, run)
+
+    monkeypatch.setattr(Problem, "simulate", strict)
+    result, _, fall = released(waiting, theta[:-1])
+    # as above
+    assert result.run("check").starts["encoder.theta"] == pytest.approx(SHIFT, rel=1e-3)
+    assert result.run("sines").starts["encoder.theta"] == 0.0
+    assert fall > 0.0
 
 
 def test_a_step_that_makes_a_run_worse_is_shortened(short: Problem, truth: np.ndarray) -> None:

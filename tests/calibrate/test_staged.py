@@ -13,6 +13,7 @@ from cosim.calibrate.fit import fit
 from cosim.calibrate.parts import Parameter, Run
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.staged import jointly, staged
+from cosim.errors import FmuCallError
 
 SIZE, ANGLE, LIMIT = 2.0, 0.03, 1.0
 
@@ -94,6 +95,18 @@ def test_runs_are_fitted_up_to_where_the_model_leaves_them(
     assert seen[0] == {"sines": 1.0, "stairs": pytest.approx(0.5, abs=0.03)}
     assert seen[-1] == {"sines": 1.0, "stairs": 1.0} and len(seen) < stages.ADVANCES
     assert theta == pytest.approx([SIZE, LIMIT], abs=1e-2)  # drafts
+
+
+def test_what_was_reached_is_kept_where_derivatives_cannot_be_simulated(
+    unstable: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any) -> Any:
+        raise FmuCallError("it took too long")
+
+    monkeypatch.setattr(stages, "jointly", refused)
+    begun = np.array([SIZE, LIMIT + 0.05])
+    problem, theta = stages._advanced(unstable, begun, "identification")
+    assert theta == pytest.approx(begun) and problem.names == unstable.names
 
 
 def test_late_values_and_common_ones_are_fitted_together(unstable: Problem) -> None:
