@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..variants import apply
 from .parts import Parameter, adjustable, free_parameter
@@ -12,9 +12,6 @@ from .problem import Problem
 LIMIT = 1e-2
 """A compliance this many times smaller than a typical one is as good as none; a stiffer spring
 would only ask for a finer exchange."""
-STIFFER = (0.3, 0.1)
-"""Shares of a typical compliance that are tried where it is not what is looked for: play with a
-spring that is too soft leads fits elsewhere."""
 _ELEMENT = re.compile(r"\[\d+\]$")
 
 
@@ -67,17 +64,19 @@ class Refinement:
             full = f"{instance}.{name}"
             if name == self.stiff:
                 span = 1.0 / float((variable.start or (1.0,))[0] or 1.0)
-                strength = name == self.parameter
+                own = name == self.parameter
                 low = LIMIT * span
                 added.append(
                     Parameter(
-                        f"{prefix}1/{name}", f"1/({variable.symbol})", low if strength else span,
-                        low, span / LIMIT, ((full, 1.0),), "effect", strength=strength, span=span,
+                        f"{prefix}1/{name}", f"1/({variable.symbol})", low if own else span,
+                        low, span / LIMIT, ((full, 1.0),), "effect", strength=own, span=span,
                         text=f"inverse of: {variable.text}", inverse=True,
                     )
                 )  # fmt: skip
             elif name == self.parameter:
-                added.append(free_parameter(variable, prefix + _own(name), full, strength=True))
+                usual = changed.system().members[instance].description.extra.get("tries", {})
+                strength = free_parameter(variable, prefix + _own(name), full, strength=True)
+                added.append(replace(strength, tries=tuple(map(float, usual.get(name, ())))))
             elif adjustable(variable) and name not in before and name not in dict(self.held):
                 other = _ELEMENT.search(name)
                 if other is None or element is None or other[0] == element[0]:

@@ -37,6 +37,8 @@ USUAL = 2.1
 order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
+DOUBLINGS = 6
+"""Times at most that a strength to begin with is doubled."""
 RELEASES, PAYS = 4, 0.01
 """Times at most that late values and all others are estimated in turn, and the share of what a
 model leaves beyond noise that another turn must remove."""
@@ -196,7 +198,10 @@ class Fitter(Judge):
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self._cost(problem, theta) for theta in starts]
-            result = self.fitted(problem, starts[int(np.argmin(costs))], base.estimate)
+            start = starts[int(np.argmin(costs))]
+            if is_open(base.estimate):
+                start = self._doubled(problem, start, min(costs), item.strength.name)
+            result = self.fitted(problem, start, base.estimate)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
@@ -209,6 +214,21 @@ class Fitter(Judge):
         result.effects = (*base.effects, item.candidate)
         result.signature = item
         return result
+
+    def _doubled(self, problem: Problem, theta: Vector, cost: float, name: str) -> Vector:
+        """A place to begin with a larger strength, as long as that is better.
+
+        First orders ask for too little of what shifts oscillations, such as play.
+        """
+        place = problem.index(name)
+        for _ in range(DOUBLINGS):
+            trial = theta.copy()
+            trial[place] = np.clip(2.0 * theta[place], problem.lower[place], problem.upper[place])
+            now = self._cost(problem, trial)
+            if not now < cost - GATE:
+                break
+            theta, cost = trial, now
+        return theta
 
     @staticmethod
     def effects(fitted: Fitted) -> dict[str, float]:

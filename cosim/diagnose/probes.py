@@ -61,6 +61,11 @@ class Probe:
         }  # fmt: skip
 
     @property
+    def scanned(self) -> bool:
+        """Whether all usual values of its strength are tried: a spring, whose mass oscillates."""
+        return self.candidate.refinement is not None and bool(self.strength.tries)
+
+    @property
     def own(self) -> int:
         """Number of parameters of the effect, 0 of one on a whole vector."""
         prefix = self.candidate.prefix

@@ -134,6 +134,9 @@ class Bench:
                     trials = _shared(trials)
             else:
                 for one in trials:
+                    if thorough and one.probe.scanned:
+                        self._scanned(one)
+                        continue
                     self._alone(one)
                     if thorough and one.best is not None:
                         self._varied([one], {})
@@ -156,6 +159,23 @@ class Bench:
             trials.tried, trials.open = trials.tried[-1:], True
             trials.value = trials.tried[-1] * float(np.sqrt(max(abs(trials.wish), 1.0 / RUNAWAY)))
             self.more(trials)
+
+    def _scanned(self, trials: Trials) -> None:
+        """The best of its usual strengths: the residual leads from none of them to the right one.
+
+        An oscillation at a frequency that is off by a few periods over the run is as good as none.
+        """
+        for value in trials.probe.strength.tries:
+            try:
+                values = trials.probe.values(value, trials.second, trials.fixed)
+                found = self._measure(
+                    trials, value, self.at(trials.probe.problem, values) - self.model
+                )
+            except CosimError:
+                continue
+            if trials.best is None or found.score.gain > trials.best.score.gain:
+                trials.best = found
+        trials.open = False
 
     def _beyond(self, trials: Trials) -> bool:
         """Whether a trial was far too strong to say how strong it should be."""
@@ -274,12 +294,14 @@ class Bench:
         def simulated(group: list[Trials]) -> list[Trials]:
             for trials in group:
                 self._alone(trials)
+                trials.open = trials.open and not trials.probe.scanned
             return group
 
         again = [
             Trials(
-                item.probe, item.value * (item.score.amplitude or 1.0), second=item.second,
-                fixed=item.fixed, known=True,
+                item.probe,
+                item.value * (1.0 if item.probe.scanned else item.score.amplitude or 1.0),
+                second=item.second, fixed=item.fixed, known=True,
             )
             for item in found
         ]  # fmt: skip

@@ -34,6 +34,9 @@ from .ticked import HELD_ACCELERATION, HELD_SPEED, T
 
 LEVEL = 3
 SOLVER = Solver("rk4", 1e-3)
+COMPLIANCES = tuple(3e-5 * 1.5**k for k in range(12))
+"""Compliances of gears, 3e-5 to 2.6e-3 rad/(N.m), close enough together that the oscillation of a
+damped joint at one of them resembles that in between."""
 C = Quantity(
     "c",
     "rad/(N.m)",
@@ -42,12 +45,13 @@ C = Quantity(
     nominal=1e-4,
     size=6,
     strength=True,
+    tries=COMPLIANCES,
 )
 T_D = Quantity(
     "t_d",
     "s",
     "damping of the gears' twist over their stiffness",
-    start=2e-4,
+    start=1e-3,
     minimum=1e-5,
     maximum=0.1,
     nominal=1e-4,
