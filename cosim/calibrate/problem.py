@@ -331,7 +331,18 @@ class Problem:
                 moved[index] = np.clip(moved[index] + change, self.lower[index], self.upper[index])
             return self.simulate(moved, run)
 
-        results = self._map(simulate, tasks)
+        def beside(task: tuple[Run, int, float]) -> tuple[float, Vector]:
+            """The change that was made, and what it gave: where it cannot be, the opposite."""
+            run, index, change = task
+            try:
+                return change, simulate(task)
+            except FmuCallError:
+                room = self.lower[index] - theta[index], self.upper[index] - theta[index]
+                if index < 0 or not room[0] <= -change <= room[1]:
+                    raise
+                return -change, simulate((run, index, -change))
+
+        results = self._map(beside, tasks)
         found = {(t[0].name, t[1], t[2]): r for t, r in zip(tasks, results, strict=True)}
         output = []
         for run in runs:
@@ -340,12 +351,14 @@ class Problem:
             values = np.empty((*run.data.shape, len(mine)))
             rough = np.zeros_like(values)
             for place, i in enumerate(mine):
-                low, high = sides[i]
-                first = found[run.name, i if low else -1, low]
-                second = found[run.name, i if high else -1, high]
+                (low, first), (high, second) = (
+                    found[run.name, i if change else -1, change] for change in sides[i]
+                )
+                if low == high:  # one of both sides cannot be simulated
+                    low, first = found[run.name, -1, 0.0]
                 values[:, :, place] = (second - first) / (high - low) / self.sigma + gap
                 if low and high:
-                    bend = first + second - 2.0 * found[run.name, -1, 0.0]
+                    bend = first + second - 2.0 * found[run.name, -1, 0.0][1]
                     rough[:, :, place] = bend / (high - low) / self.sigma + gap
             output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))
         return output

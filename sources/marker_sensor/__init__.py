@@ -41,4 +41,6 @@ def markers(m: Model) -> tuple[SX, SX]:
     phi_frame = m.parameter(PHI_FRAME)
     x, y = rotated(pose[2], m.parameter(X_B), m.parameter(Y_B))
     x, y = rotated(phi_frame, pose[0] + x, pose[1] + y)
-    return x + m.parameter(X_FRAME), y + m.parameter(Y_FRAME)
+    x, y = x + m.parameter(X_FRAME), y + m.parameter(Y_FRAME)
+    scale = 1 + m.balance("scale", "scale", unit="1", value=ca.SX(1)).effort
+    return scale * x, scale * y

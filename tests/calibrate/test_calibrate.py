@@ -7,8 +7,10 @@ import pytest
 
 from cosim.calibrate.estimate import channel_rms
 from cosim.calibrate.fit import fit
+from cosim.calibrate.problem import Problem
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
 from cosim.calibrate.validate import check_machines
+from cosim.errors import FmuCallError
 
 
 def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
@@ -89,6 +91,38 @@ def test_directional_derivatives_are_those_of_the_jacobian(short, truth) -> None
     difference = np.linalg.norm((jacobian.values - other.values) * short.scale)
     # both are differences over 1 % of the spans; limits and ticks make them scatter
     assert difference < 0.05 * np.linalg.norm(jacobian.values * short.scale)
+
+
+@pytest.mark.parametrize("central", [False, True])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_difference_that_cannot_be_simulated_is_taken_on_the_other_side(
+    short, truth, monkeypatch, sign, central
+) -> None:
+    """One simulation of hundreds that a solver gives up must not end a fit."""
+    whole = short.jacobian(truth, ["sines"], central=central)[0].values
+    simulate = Problem.simulate
+
+    def strict(self, theta, run):
+        if sign * (theta[2] - truth[2]) > 0.0:
+            raise FmuCallError("it took too long")
+        return simulate(self, theta, run)
+
+    monkeypatch.setattr(Problem, "simulate", strict)
+    found = short.jacobian(truth, ["sines"], central=central)[0].values
+    others = [i for i in range(truth.size) if i != 2]
+    assert np.array_equal(found[:, :, others], whole[:, :, others])
+    # one-sided differences over a thousandth of the span
+    error = np.abs(found[:, :, 2] - whole[:, :, 2])
+    assert 0.0 <= np.nanmax(error) < 0.01 * np.nanmax(np.abs(whole[:, :, 2]))
+
+    def refused(self, theta, run):
+        if theta[2] != truth[2]:
+            raise FmuCallError("it took too long")
+        return simulate(self, theta, run)
+
+    monkeypatch.setattr(Problem, "simulate", refused)
+    with pytest.raises(FmuCallError, match="too long"):
+        short.jacobian(truth, ["sines"], central=central)
 
 
 def test_held_parameters_leave(short, truth) -> None:

@@ -210,6 +210,15 @@ def test_share_selects_an_element_of_a_vector() -> None:
     assert out["w_r_ref"] == pytest.approx(1.1 * 101.67, rel=1e-14)
 
 
+def test_scale_error_stretches_way_and_body() -> None:
+    """All distances between measured points grow alike, from the frame's origin on."""
+    values = {"x": 2.0, "y": 1.0, "phi": 0.5, "scale_error.error": 0.01}
+    plain = outputs("marker_sensor/ideal", {k: values[k] for k in ("x", "y", "phi")})
+    out = outputs("marker_sensor/ideal+scale_error", values)
+    for name in (f"{axis}_m[{k}]" for axis in "xy" for k in range(1, 6)):
+        assert out[name] == pytest.approx(1.01 * plain[name], rel=1e-14)  # rounding
+
+
 def test_frame_rotation_turns_position_and_heading() -> None:
     values = {"x": 2.0, "y": 1.0, "phi": 0.5, "frame_rotation.angle": math.pi / 2}
     out = outputs("pose_sensor/ideal+frame_rotation", values)
