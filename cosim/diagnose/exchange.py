@@ -7,8 +7,12 @@ are: each rival takes the effect's place in the last model, is refitted, and sta
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY
@@ -21,6 +25,7 @@ from .signature import Signature
 if TYPE_CHECKING:
     from .search import Round, Search
 
+Vector = NDArray[np.float64]
 OPEN = 4.0
 """Mean square over the noise's from which the best model of a round evidently lacks more."""
 NEARLY = 0.8
@@ -31,6 +36,8 @@ not fitted further."""
 CHANGED = 0.01
 """Share of what the best quick fit gained by which a challenger must be better for all others to be
 fitted from its parameters again."""
+TENTHS = 4
+"""Powers of a tenth of a law's usual smoothing that are tried, the first being 1."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
@@ -244,16 +251,53 @@ def exchanged(
         mine = {n.removeprefix(old): v for n, v in fitted.estimate.values.items()}
         values |= {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
     fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in others if p.name not in values}
-    problem = whole.with_parameters(
+    whole = whole.with_parameters(
         [replace(p, span=abs(values[p.name]) or p.span) if p.strength and p.name in values else p
          for p in whole.parameters]
-    ).hold(fixed)  # fmt: skip
-    theta = problem.nominal
-    for name, value in {**fitted.estimate.values, **values}.items():
-        if name in problem.names:
-            theta[problem.index(name)] = value
-    start = theta.clip(problem.lower, problem.upper)
+    )  # fmt: skip
+    known_values = {**fitted.estimate.values, **values}
+    if fitted.effects[-1].place == item.candidate.place:
+        fixed = _sharpest(search, whole, known_values, fixed)
+    problem, start = _begun(whole, known_values, fixed)
     result = search.fitted(problem, start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
-    result.signature = item
+    result.signature = replace(item, fixed={**item.fixed, **fixed})
     return result
+
+
+def _begun(
+    whole: Problem, values: dict[str, float], fixed: dict[str, float]
+) -> tuple[Problem, Vector]:
+    """A problem with some parameters held, and the values of the others."""
+    problem = whole.hold(fixed)
+    problem.limits = whole.limits
+    theta = problem.nominal
+    for name, value in values.items():
+        if name in problem.names:
+            theta[problem.index(name)] = value
+    return problem, theta.clip(problem.lower, problem.upper)
+
+
+def _sharpest(
+    search: Search, whole: Problem, values: dict[str, float], fixed: dict[str, float]
+) -> dict[str, float]:
+    """Held parameters with those that smooth a law as small as the data want them.
+
+    A law that creeps at rest is far off where the one before it sticks, and derivatives there do
+    not lead to where it hardly creeps.
+    """
+    for p in whole.parameters:
+        if p.name not in fixed or not p.minimum > 0.0:
+            continue
+        best = math.inf
+        for power in range(TENTHS):
+            trial = {**fixed, p.name: max(fixed[p.name] * 0.1**power, p.minimum)}
+            try:
+                cost = search.cost(*_begun(whole, values, trial))
+            except CosimError:
+                break
+            if not cost < best:
+                break
+            best, kept = cost, trial
+        fixed = kept if best < math.inf else fixed
+    return fixed

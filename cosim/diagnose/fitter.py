@@ -197,7 +197,7 @@ class Fitter(Judge):
                 theta[problem.index(item.probe.second)] = item.second
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
-            costs = [self._cost(problem, theta) for theta in starts]
+            costs = [self.cost(problem, theta) for theta in starts]
             start = starts[int(np.argmin(costs))]
             if is_open(base.estimate):
                 start = self._doubled(problem, start, min(costs), item.strength.name)
@@ -224,7 +224,7 @@ class Fitter(Judge):
         for _ in range(DOUBLINGS):
             trial = theta.copy()
             trial[place] = np.clip(2.0 * theta[place], problem.lower[place], problem.upper[place])
-            now = self._cost(problem, trial)
+            now = self.cost(problem, trial)
             if not now < cost - GATE:
                 break
             theta, cost = trial, now
@@ -281,7 +281,8 @@ class Fitter(Judge):
         found.effects, found.signature = base.effects, base.signature
         return found
 
-    def _cost(self, problem: Problem, theta: Vector) -> float:
+    def cost(self, problem: Problem, theta: Vector) -> float:
+        """Cost over the identification runs."""
         residuals = problem.residuals(theta, self.fitting.names)
         return cost_of(problem, theta, residuals, loss_for(problem.unstable))
 

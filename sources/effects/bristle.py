@@ -28,7 +28,8 @@ TAU_C = Quantity(
 )
 EXCESS = Quantity("r", "1", "breakaway torque over the sliding one, less 1", start=0.3, minimum=0.0)
 W_S = Quantity("w_s", "rad/s", "speed over which that excess decays", start=0.1, minimum=1e-6)
-LENGTH = Quantity("x_0", "rad", "deflection at the sliding torque", start=5e-4, minimum=1e-9)
+# No encoder sees less than the least length, and a solver's steps shrink with it.
+LENGTH = Quantity("x_0", "rad", "deflection at the sliding torque", start=5e-4, minimum=1e-6)
 DAMPING = Quantity(
     "t_d", "s", "damping of the stuck bristle over its stiffness", start=2e-3, minimum=0.0
 )
