@@ -1,0 +1,67 @@
+"""Where fits and trials begin when first orders do not lead to what is missing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.calibrate.parts import Parameter
+from cosim.diagnose import exchange
+from cosim.diagnose.fitter import Fitter
+from cosim.diagnose.secant import Bench
+from cosim.errors import FmuCallError
+
+
+def search(best: float, place: int = 0) -> Any:
+    """Costs that are least at one value, as of play or of a smoothed sign."""
+    cost = lambda _, theta: 1e3 * abs(np.log(theta[place] / best))  # noqa: E731
+    return SimpleNamespace(cost=cost)
+
+
+@pytest.mark.parametrize(("best", "found"), [(9.0, 8.0), (0.5, 1.0), (1e9, 16.0)])
+def test_a_strength_is_doubled_as_long_as_that_is_better(best: float, found: float) -> None:
+    """And never past its bound; not at all where the first order was right or asked for more."""
+    problem: Any = SimpleNamespace(index=lambda _: 0, lower=np.array([0.0]), upper=np.array([16.0]))
+    start, it = np.array([1.0]), search(best)
+    end = Fitter._doubled(it, problem, start, it.cost(None, start), "gap")
+    assert end[0] == found and start[0] == 1.0
+
+
+@pytest.mark.parametrize(("best", "power"), [(2e-3, 0), (1e-5, 2), (1e-9, 3)])
+def test_a_law_begins_as_sharp_as_the_data_want_it(
+    monkeypatch: pytest.MonkeyPatch, best: float, power: int
+) -> None:
+    w_0 = Parameter("w_0", "rad/s", 2e-3, 1e-6, 1.0, ())
+    angle = Parameter("angle", "rad", 0.1, -1.0, 1.0, ())  # smooths nothing: its bound is not 0
+    whole: Any = SimpleNamespace(parameters=[w_0, angle])
+    monkeypatch.setattr(
+        exchange, "_begun", lambda _, values, fixed: (None, np.array([fixed["w_0"]]))
+    )
+    fixed = {"w_0": 2e-3, "angle": 0.1}
+    found = exchange._sharpest(search(best), whole, {}, fixed)
+    assert found == {"w_0": pytest.approx(2e-3 * 0.1**power), "angle": 0.1}
+
+
+def test_of_usual_strengths_the_best_is_kept_though_none_leads_there() -> None:
+    """A residual that swings at one frequency says nothing at another."""
+    gains = {1.0: 0.1, 2.0: 50.0, 4.0: 0.2}
+
+    def measured(_: Any, value: float, change: float) -> Any:
+        return SimpleNamespace(value=value, score=SimpleNamespace(gain=gains[value]))
+
+    def simulated(_: Any, values: dict[str, float]) -> float:
+        if values["c"] == 8.0:
+            raise FmuCallError("it took too long")
+        return 0.0
+
+    probe = SimpleNamespace(
+        strength=SimpleNamespace(tries=(1.0, 2.0, 4.0, 8.0)), problem=None,
+        values=lambda value, *_: {"c": value},
+    )  # fmt: skip
+    trials: Any = SimpleNamespace(probe=probe, second=0.0, fixed={}, best=None, open=True)
+    bench: Any = SimpleNamespace(_measure=measured, at=simulated, model=0.0)
+    Bench._scanned(bench, trials)
+    assert trials.best.value == 2.0 and not trials.open
