@@ -25,6 +25,7 @@ class Refinement:
         parameter: that vanishes in the limit, or is infinite there.
         stiff: the parameter that is infinite in the limit, "" if none is.
         port: element that it stands for, "" for the whole component.
+        others: further parameters of the element.
         held: parameters and their values without which the limit is another one.
         text: one line.
     """
@@ -34,14 +35,15 @@ class Refinement:
     parameter: str
     stiff: str = ""
     port: str = ""
+    others: tuple[str, ...] = ()
     held: tuple[tuple[str, float], ...] = ()
     text: str = ""
 
     def added_to(self, problem: Problem, instance: str) -> Problem:
         """The problem with a component in this fidelity.
 
-        The strength begins at its limit; the fidelity's other parameters, as far as they concern
-        the same element, become parameters of the problem, too.
+        The strength begins at its limit; the fidelity's other parameters, of an element those that
+        belong to it, become parameters of the problem, too.
 
         Args:
             problem: with the component in a fidelity that is the limit.
@@ -58,7 +60,6 @@ class Refinement:
         constants = {f"{instance}.{name}": value for name, value in self.held}
         place = f"{instance}.{self.port}" if self.port else instance
         prefix = f"{place}.{self.effect}."
-        element = _ELEMENT.search(self.parameter)
         added = []
         for name, variable in variables.items():
             full = f"{instance}.{name}"
@@ -77,12 +78,13 @@ class Refinement:
                 usual = changed.system().members[instance].description.extra.get("tries", {})
                 strength = free_parameter(variable, prefix + _own(name), full, strength=True)
                 added.append(replace(strength, tries=tuple(map(float, usual.get(name, ())))))
-            elif adjustable(variable) and name not in before and name not in dict(self.held):
-                other = _ELEMENT.search(name)
-                if other is None or element is None or other[0] == element[0]:
-                    added.append(
-                        free_parameter(variable, prefix + _own(name), full, strength=False)
-                    )
+            elif name in self.others or (
+                not self.port
+                and adjustable(variable)
+                and name not in before
+                and name not in dict(self.held)
+            ):
+                added.append(free_parameter(variable, prefix + _own(name), full, strength=False))
         return changed._with(
             parameters=[*problem.parameters, *added], constants={**problem.constants, **constants}
         )

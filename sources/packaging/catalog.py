@@ -87,14 +87,14 @@ def refinements(name: str) -> list[dict[str, Any]]:
     """Fidelities of which a variant is the limit, with the variant's effects.
 
     A fidelity's module says so by `LIMITS` (fidelity -> values without which the limit is another)
-    and by the quantity that is infinite there, `STIFF`, or the one that vanishes, `SOFT`. Elements
-    of the latter count one by one; they have the balances that its `PLACES` names. An effect that
-    is looked for `alone` comes with its fidelity.
+    and by the quantity that is infinite there, `STIFF`, or the one that vanishes, the first of
+    `SOFT`; the others mean nothing there. Elements of these count one by one; they have the
+    balances that its `PLACES` names. An effect that is looked for `alone` comes with its fidelity.
 
     Returns:
         One mapping each: `effect` (what it is called), `fidelity` (short form), `parameter` (its
         strength), `stiff` (that is infinite in the limit, or ""), `port` (the element's balance, or
-        ""), `held`, `text`.
+        ""), `others` (further parameters of the element), `held`, `text`.
     """
     parsed = parse_name(name)
     carried = "".join(f"+{effect}" + (f"@{at}" if at else "") for effect, at in parsed.effects)
@@ -109,7 +109,8 @@ def refinements(name: str) -> list[dict[str, Any]]:
         if soft := getattr(module, "SOFT", None):
             found += [
                 {**known, "effect": module.NAME, "fidelity": short, "stiff": "", "port": place,
-                 "parameter": f"{soft.name}[{i + 1}]"}
+                 "parameter": f"{soft[0].name}[{i + 1}]",
+                 "others": tuple(f"{q.name}[{i + 1}]" for q in soft[1:])}
                 for i, place in enumerate(module.PLACES)
             ]  # fmt: skip
             continue

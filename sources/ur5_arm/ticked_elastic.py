@@ -65,7 +65,7 @@ HELD_RATE = Quantity("held_rate", "rad/s", "rates of the twist from one tick to 
 HELD_TWISTING = Quantity(
     "held_twisting", "rad/s2", "accelerations of the twist at the last tick", size=6
 )
-NAME, SOFT, PLACES = "elastic", C, tuple(f"joint_{i + 1}" for i in range(6))
+NAME, SOFT, PLACES = "elastic", (C, T_D), tuple(f"joint_{i + 1}" for i in range(6))
 LIMITS: dict[str, dict[str, float]] = {"ticked": {}, "ticked_elastic": {}}
 """Fidelities that no compliance at an element gives, and what has to be set for that."""
 J_LEAST = (0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4)

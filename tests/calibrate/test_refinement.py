@@ -7,6 +7,7 @@ import numpy as np
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.refinement import Refinement
 from cosim.diagnose.candidates import candidates
+from sources.packaging.catalog import refinements
 
 HELD = (("signed", 0.0),)
 ELASTIC = Refinement("elastic", "elastic", "k", "k", held=HELD)
@@ -48,3 +49,14 @@ def test_play_comes_with_the_spring_that_it_needs(short: Problem) -> None:
     (compliance,) = [p for p in added if p.inverse]
     # a rigid gear with play still has a stiffness to be found: it begins at the gear's own
     assert compliance.nominal == compliance.span > compliance.minimum
+
+
+def test_joints_yield_one_by_one_and_keep_what_was_found_before() -> None:
+    found = refinements("ur5_arm/ticked+payload@tool")
+    assert [entry["port"] for entry in found] == [f"joint_{k}" for k in range(1, 7)]
+    assert {entry["fidelity"] for entry in found} == {"ticked_elastic+payload@tool"}
+    assert (found[2]["parameter"], found[2]["others"]) == ("c[3]", ("t_d[3]",))
+    # another joint may yield, too
+    again = refinements("ur5_arm/ticked_elastic+payload@tool")
+    assert again == found
+    assert refinements("ur5_arm/elastic") == []
