@@ -70,8 +70,9 @@ LIMITS: dict[str, dict[str, float]] = {"ticked": {}, "ticked_elastic": {}}
 """Fidelities that no compliance at an element gives, and what has to be set for that."""
 J_LEAST = (0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4)
 """Least inertia [kg.m2] that a joint has to move, all others free, in any pose of the UR5."""
-NO_SPRING = 1e-12
-"""Compliance [rad/(N.m)] below which the energy of a spring does not count."""
+NO_SPRING = 0.01
+"""Share of the compliance that the ticks can follow below which a spring's energy fades out: it has
+none without compliance, where nothing twists."""
 
 
 def equations(m: Model) -> None:
@@ -111,11 +112,12 @@ def equations(m: Model) -> None:
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
     kinetic, potential = replace(arm, qd=speed - rate).energy()
-    springs = ca.dot(twist, twist / (compliance + NO_SPRING)) / 2
+    stiffness = compliance / (compliance**2 + (NO_SPRING * limit) ** 2)
+    springs = ca.dot(stiffness, twist**2) / 2
     stored = kinetic + potential + ca.dot(hub, speed**2) / 2 + springs
     states = ca.vertcat(theta, speed, twist, rate)
     rates = ca.jtimes(stored, states, ca.vertcat(thetad, thetadd, twistd, twistdd))
-    heat = ca.dot(declared / (compliance + NO_SPRING), rate**2)
+    heat = ca.dot(declared * stiffness, rate**2)
     m.stored_energy(stored)
     m.loss("gears", heat)
     m.supply(rates + heat - ca.dot(driving, thetad) - ca.dot(arm.load, arm.tool_twist))
