@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +82,6 @@ class Execution:
         self.bond_energy = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.index = 0
-        self.instants: list[float] = times.tolist()
         self.bound: kernel.Kernel | None = None
         self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
         self.history = np.zeros((len(plan.means), 4))
@@ -94,6 +94,11 @@ class Execution:
         self.control: StepControl | None = None
         self.started = False
         self._advance: Callable[[int], None] | None = None
+
+    @cached_property
+    def instants(self) -> list[float]:
+        """Communication points as the executor in Python takes them: a compiled one needs none."""
+        return list(self.times.tolist())
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -203,12 +208,23 @@ class Execution:
         self.bound = bound
 
         def advance(last: int) -> None:
-            status = bound.advance(last)
-            self.index, self.row = int(bound.run.index), int(bound.run.row)
-            if status:
-                self.fail(bound, status)
+            self._ended(bound.advance(last))
 
         return advance
+
+    def advance_within(self, last: int, limit: float, most: float) -> int:
+        """Steps up to `last` by the compiled executor, and what ended them early (see `Kernel`)."""
+        assert self.bound is not None
+        return self._ended(self.bound.advance_within(last, limit, most))
+
+    def _ended(self, status: int) -> int:
+        """Where the compiled executor is; what has not failed goes through."""
+        bound = self.bound
+        assert bound is not None
+        self.index, self.row = int(bound.run.index), int(bound.run.row)
+        if status and status not in (kernel.TOO_LONG, kernel.TOO_LARGE):
+            self.fail(bound, status)
+        return status
 
     def fail(self, bound: kernel.Kernel, status: int) -> None:
         """Raise what the executor in Python would have raised."""

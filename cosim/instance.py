@@ -43,6 +43,7 @@ from .fmi3 import Fmi3
 Vector = NDArray[np.float64]
 
 _libraries: dict[str, Any] = {}
+_functions: dict[tuple[str, int], dict[str, Any]] = {}
 _single: set[str] = set()
 
 
@@ -65,6 +66,34 @@ def _library(fmu: Fmu) -> Any:
         if finalize is not None:
             atexit.register(finalize)
     return _libraries[path]
+
+
+def _bound(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
+    """A binding to an FMU's library, and its functions, made once for all instances."""
+    library = _library(fmu)
+    key = str(fmu.binary), fmu.description.fmi
+    try:
+        binding = Fmi2(library) if fmu.description.fmi == 2 else Fmi3(library)
+        if key not in _functions:
+            functions = {
+                name: _prototype(library, name, signature)
+                for name, signature in binding.SIGNATURES.items()
+            }
+            for name, signature in binding.OPTIONAL.items():
+                if hasattr(library, name):
+                    functions[name] = _prototype(library, name, signature)
+            _functions[key] = functions
+    except AttributeError as error:
+        raise FmuFileError(
+            f"{fmu.path}: its binary lacks a function of FMI {fmu.description.fmi}.0 ({error})"
+        ) from error
+    return binding, _functions[key]
+
+
+def _prototype(library: Any, name: str, signature: tuple[Any, ...]) -> Any:
+    function = library[name]  # a fresh object: prototypes are not shared between bindings
+    function.argtypes, function.restype = list(signature), ct.c_int
+    return function
 
 
 @dataclass(frozen=True)
@@ -101,22 +130,8 @@ class Instance:
                 f"{self.label}: the FMU says that it can be instantiated only once per process, "
                 "and it already is; run the other instance in a process of its own"
             )
-        library = _library(fmu)
-        try:
-            self.binding: Fmi2 | Fmi3 = (
-                Fmi2(library) if self.description.fmi == 2 else Fmi3(library)
-            )
-            self._functions = {
-                name: self._prototype(library, name, signature)
-                for name, signature in self.binding.SIGNATURES.items()
-            }
-        except AttributeError as error:
-            raise FmuFileError(
-                f"{fmu.path}: its binary lacks a function of FMI {self.description.fmi}.0 ({error})"
-            ) from error
-        for name, signature in self.binding.OPTIONAL.items():
-            if hasattr(library, name):
-                self._functions[name] = self._prototype(library, name, signature)
+        self.binding: Fmi2 | Fmi3
+        self.binding, self._functions = _bound(fmu)
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments()
         self._key = logs.new_key()
@@ -136,12 +151,6 @@ class Instance:
             self, _free, self.binding.free_, address, self._key, self._dead, self._alive,
             fmu.digest,
         )  # fmt: skip
-
-    @staticmethod
-    def _prototype(library: Any, name: str, signature: tuple[Any, ...]) -> Any:
-        function = library[name]  # a fresh object: prototypes are not shared between bindings
-        function.argtypes, function.restype = list(signature), ct.c_int
-        return function
 
     def __repr__(self) -> str:
         return f"<Instance {self.label}, FMI {self.description.fmi}, t = {self.time}>"

@@ -20,6 +20,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from . import kernel
 from .block import Block, check_values
 from .errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
 from .execution import Execution
@@ -29,7 +30,8 @@ from .start import find_past
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
-"""Communication steps after which a limited run looks at the clock, and at what it has recorded."""
+"""Communication steps after which a limited run looks at the clock, and at what it has recorded; as
+in the compiled executor."""
 RUNAWAY = 1e30
 """Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
 and solvers crawl long before squares overflow."""
@@ -124,23 +126,33 @@ class Session:
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):
             self._advance(self.count)
-            return
-        begun = time.thread_time()
-        for last in [*range(LOOK, self.count, LOOK), self.count]:
-            self._advance(last)
-            if time.thread_time() - begun > limit:
-                raise FmuCallError(
-                    f"it took more than {limit:.3g} s of processor time: with these values a "
-                    "solver takes very small steps"
-                )
-            if last % CHECK:
-                continue
-            newest = np.abs(self._run.rows[max(self._run.row - 1, 0)])
-            if np.max(newest, initial=0.0) > RUNAWAY:
-                raise FmuCallError(
-                    f"{self.names[int(np.argmax(newest))]} passed {RUNAWAY:g}: with these values "
-                    "the system is unstable"
-                )
+        elif self._run.bound is not None:
+            status = self._run.advance_within(self.count, limit, RUNAWAY)
+            self._stopped(limit, status == kernel.TOO_LONG, status == kernel.TOO_LARGE)
+        else:
+            begun = time.thread_time()
+            for last in [*range(LOOK, self.count, LOOK), self.count]:
+                self._advance(last)
+                late = time.thread_time() - begun > limit
+                self._stopped(limit, late, last % CHECK == 0 and self._largest()[1] > RUNAWAY)
+
+    def _largest(self) -> tuple[str, float]:
+        """Name and size of the largest value recorded last."""
+        newest = np.abs(self._run.rows[max(self._run.row - 1, 0)])
+        place = int(np.argmax(newest)) if newest.size else -1
+        return (self.names[place], float(newest[place])) if newest.size else ("", 0.0)
+
+    def _stopped(self, limit: float, late: bool, large: bool) -> None:
+        """Raise if a run took too long or ran away."""
+        if late:
+            raise FmuCallError(
+                f"it took more than {limit:.3g} s of processor time: with these values a solver "
+                "takes very small steps"
+            )
+        if large:
+            raise FmuCallError(
+                f"{self._largest()[0]} passed {RUNAWAY:g}: with these values the system is unstable"
+            )
 
     def record(self, progress: Callable[[float], None] | None = None) -> Recording:
         """Run with the values that the system has now: change them by `master.system.set`.

@@ -159,7 +159,6 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     count = {run.name: np.count_nonzero(np.isfinite(run.data)) for run in problem.runs}
     off = [n for n in names if n not in moved or 2.0 * costs[n] > OFF * count[n]]
     tried(anew, off, HORIZONS)
-    whole.close()
     kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
     return whole.hold(kept), values[: theta.size], before - sum(costs.values())
 
@@ -179,7 +178,6 @@ def _followed(
             if not after < cost - RELEASED * begun:
                 break
             cost = after
-        part.close()
     return theta
 
 

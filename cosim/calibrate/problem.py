@@ -15,9 +15,10 @@ import math
 import os
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from .parts import (
     free_parameter,
 )
 from .pieces import relative_pose
+from .pool import Key, Pool
 
 Vector = NDArray[np.float64]
 STEP = 1e-3
@@ -66,6 +68,7 @@ class Problem:
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
         late: parameters of single runs that are held until `nuisance.released` estimates them.
         far: whether all residuals count in full, since nearly all are large (see `unstable`).
+        pool: sessions shared with problems that this one was made from.
 
     Attributes:
         evaluations: simulated runs so far.
@@ -93,6 +96,7 @@ class Problem:
         relative: Sequence[Sequence[str]] = (),
         late: Sequence[Parameter] = (),
         far: bool = False,
+        pool: Pool | None = None,
     ) -> None:
         self.ticks, self.search = ticks, search or Coarse(step)
         self.search_step = self.search.step
@@ -108,9 +112,11 @@ class Problem:
         self.costs: dict[str, float] = {}
         self.limits: dict[str, float] = {}
         self._by_name = {run.name: run for run in self.runs}
-        self._idle: dict[str, list[Session]] = {run.name: [] for run in self.runs}
+        self._pool = pool or Pool()
         self._lock = threading.Lock()
         self._system: System | None = None
+        self._fixed: dict[str, float] | None = None
+        self._keys: dict[str, Key] = {}
         self._known = {p.name: index for index, p in enumerate(self.parameters)}
 
     @property
@@ -187,33 +193,69 @@ class Problem:
 
     # -- simulation --------------------------------------------------------------------------------
 
+    @property
+    def _coarse(self) -> Mapping[str, float]:
+        return self.search.parameters if self._coarse_step else {}
+
     def system(self) -> System:
         """The system with the constants set; parameters that a variant lacks are left out."""
         if self._system is None:
-            file = replace(self.file, instances=self.instances, parameters={})
-            system = file.build(self.provider)
-            coarse = self.search.parameters if self.step == self.search.step else {}
-            for name, value in {**self.file.parameters, **self.constants, **coarse}.items():
-                if name.partition(".")[0] in self.instances:
-                    try:
-                        system.set(name, value)
-                    except UnknownNameError:
-                        if self.instances == self.file.instances:
-                            raise
+            system = self._built({**self.file.parameters, **self.constants, **self._coarse})
             self._system = system
         return self._system
 
+    def _built(self, values: Mapping[str, float]) -> System:
+        system = replace(self.file, instances=self.instances, parameters={}).build(self.provider)
+        for name, value in values.items():
+            if name.partition(".")[0] in self.instances:
+                try:
+                    system.set(name, value)
+                except UnknownNameError:
+                    if self.instances == self.file.instances:
+                        raise
+        return system
+
+    def _plain(self) -> System:
+        """The system as sessions run it: they get the constants with the other values."""
+        kind = self._kind
+        system = self._pool.system(kind)
+        if system is None:
+            values = {**self.file.parameters, **self._coarse}
+            system = self._pool.keep(kind, self._built(values))
+        return system
+
+    @cached_property
+    def _kind(self) -> Hashable:
+        options = self.search.options if self._coarse_step else {}
+        return (
+            *(tuple(sorted(items.items())) for items in (self.instances, self._coarse, options)),
+            self.step, self.algorithm, self.period,
+            tuple((c.signal, c.shift) for c in self.channels),
+        )  # fmt: skip
+
+    @property
+    def _coarse_step(self) -> bool:
+        return self.step == self.search.step
+
+    def _key(self, run: Run) -> Key:
+        if run.name not in self._keys:
+            times = run.times
+            interval = float(np.median(np.diff(times)))
+            spans = (float(times[0]), float(times[-1]), interval, run.lead)
+            self._keys[run.name] = Key(self._kind, (run.name, spans, id(run.inputs)))
+        return self._keys[run.name]
+
     def _has(self, name: str) -> bool:
         try:
-            self.system().variables(name)
+            self._plain().variables(name)
         except UnknownNameError:
             return False
         return True
 
     def session(self, run: Run) -> Session:
         """A new prepared run."""
-        system = self.system()
-        options = self.search.options if self.step == self.search.step else {}
+        system = self._plain()
+        options = self.search.options if self._coarse_step else {}
         master = Master(system, self.algorithm, self.step, options=options)
         interval = self.period or float(np.median(np.diff(run.times)))
         every = max(round(interval / self.step), 1)
@@ -233,7 +275,13 @@ class Problem:
     def values(self, theta: Vector, run: Run | str) -> dict[str, float]:
         """Full variable name -> value for a run."""
         run = self.run(run) if isinstance(run, str) else run
-        found = {name: value for name, value in run.starts.items() if self._has(name)}
+        if self._fixed is None:
+            known = {n: v for n, v in self.constants.items() if self._has(n)}
+            if len(known) < len(self.constants):
+                self.system()  # says which one it does not know
+            self._fixed = {n: v for n, v in known.items() if n not in self._coarse}
+        found = dict(self._fixed)
+        found.update((name, value) for name, value in run.starts.items() if self._has(name))
         for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
             if parameter.run in ("", run.name):
                 found.update(parameter.set(value))
@@ -247,10 +295,10 @@ class Problem:
             ValueRangeError: a value outside the bounds that its FMU declares.
         """
         run = self.run(run) if isinstance(run, str) else run
+        key = self._key(run)
         with self._lock:
             self.evaluations += 1
-            idle = self._idle[run.name]
-            session = idle.pop() if idle else self.session(run)
+            session = self._pool.take(key) or self.session(run)
         begun = time.thread_time()
         try:
             limit = self.limits.get(run.name, math.inf)
@@ -260,7 +308,7 @@ class Problem:
             raise
         with self._lock:
             self.costs[run.name] = time.thread_time() - begun
-            self._idle[run.name].append(session)
+        self._pool.give(key, session, run.inputs)
         place = {name: column for column, name in enumerate(session.names)}
         read = np.column_stack(
             [c.of(run.times, times, rows[:, place[c.signal]]) for c in self.channels]
@@ -286,7 +334,7 @@ class Problem:
     ) -> list[tuple[str, Vector]]:
         """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all)."""
         runs = self.chosen(purpose)
-        self.system()
+        self._plain()
         models = self._map(lambda run: self.simulate(theta, run), runs)
         return [
             (run.name, (run.data - model) / self.sigma)
@@ -312,7 +360,7 @@ class Problem:
             relative: step over the span of a parameter, from its lattice on where it has one.
         """
         runs = self.chosen(purpose)
-        self.system()
+        self._plain()
         tasks: list[tuple[Run, int, float]] = []
         wanted = set(range(len(self.parameters)) if columns is None else columns)
         owned = {
@@ -435,7 +483,7 @@ class Problem:
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
             "ticks": self.ticks, "search": self.search, "relative": self.relative,
-            "late": self.late, "far": self.far,
+            "late": self.late, "far": self.far, "pool": self._pool,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)
@@ -487,7 +535,7 @@ class Problem:
         """
         instances = apply(self.instances, changes, self.provider)
         changed = self._with(instances=instances)
-        old, new = self.system(), changed.system()
+        old, new = self._plain(), changed._plain()
         added: list[Parameter] = []
         for name, member in new.members.items():
             if instances[name] == self.instances[name]:
@@ -522,8 +570,5 @@ class Problem:
         return changed._with(parameters=[*self.parameters, *added])
 
     def close(self) -> None:
-        """Free the sessions; the problem can still be used."""
-        with self._lock:
-            for idle in self._idle.values():
-                while idle:
-                    idle.pop().close()
+        """Free the idle sessions of this kind of problem; it can still be used."""
+        self._pool.close(self._kind)

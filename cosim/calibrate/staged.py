@@ -65,7 +65,6 @@ def staged(problem: Problem, theta: Vector, purpose: str = PURPOSE) -> tuple[Pro
         before = beyond
     theta = theta.copy()
     theta[[problem.index(name) for name in part.names]] = values
-    part.close()
     runs = [part.run(run.name) if run.name in calm else run for run in problem.runs]
     whole = problem._with(runs=runs)
     whole.limits = limits

@@ -26,11 +26,7 @@ def step_error(problem: Problem, theta: Vector, step: float) -> dict[str, Vector
         return {run.name: np.zeros(run.data.shape) for run in problem.runs}
     factor, fine = (1.0, problem.step) if problem.ticks else (2.0, step / 2.0)
     first, second = problem._with(step=step), problem._with(step=fine)
-    try:
-        coarse, exact = first.residuals(theta, None), second.residuals(theta, None)
-    finally:
-        first.close()
-        second.close()
+    coarse, exact = first.residuals(theta, None), second.residuals(theta, None)
     return {
         name: factor * (b - a) * problem.sigma
         for (name, a), (_, b) in zip(coarse, exact, strict=True)

@@ -137,7 +137,6 @@ class Fitter(Judge):
             name: (data[name] - errors[name]) / problem.sigma - residual
             for name, residual in real.residuals(theta, None)
         }
-        real.close()
         return values
 
     def absorber(self, fitted: Fitted, layout: Layout, root: Vector | None = None) -> Absorber:
@@ -248,7 +247,6 @@ class Fitter(Judge):
             for name, value in self.effects(base).items():
                 theta[problem.index(name)] = value
             self._begun = base, Known.at(problem, theta)
-            problem.close()
         return self._begun[1]
 
     def anew(

@@ -39,8 +39,9 @@ SHARED, WHOLES = 0.5, 3
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most so many: members must not crowd it out."""
 EXTRA = 2
-"""Where the model is far off, so many that gain half as much as the best one are refitted though
-not significant: the blocks' variance is then that of what is missing."""
+"""Where something is evidently missing, so many that gain more than the best one are refitted
+though not significant: the blocks' variance is then that of what is missing. Half as much will do
+where the model is far off."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
@@ -131,7 +132,6 @@ class Search(Fitter):
         coarse = raw._with(step=raw.search_step)
         exact = raw.ticks and raw.search_step == raw.step
         first = fit(coarse, None, limit=6, robust=True, polish=exact, rough=not exact)
-        coarse.close()
         if raw.late and typical(r for _, r in first.residuals) > OFF:
             raw = self.count_in_full()
         self.evaluations += first.evaluations
@@ -142,7 +142,6 @@ class Search(Fitter):
             return self.judged(first)
         near = corrected(raw, first.theta, raw)
         second = fit(near, first.theta, known=Known.of(first))
-        near.close()
         self.evaluations += second.evaluations
         self.say("errors of the exchange removed")
         self.declared = corrected(raw, second.theta, raw)
@@ -219,8 +218,8 @@ class Search(Fitter):
         """Candidates worth a refit: significant, not too small to matter, the best gains first.
 
         Where something is evidently missing and none is significant (an effect that shows in few
-        moments has few blocks to prove itself), unused runs decide alone. So they do on a few more
-        where the model is far off.
+        moments has few blocks to prove itself), unused runs decide alone. So they do on a few that
+        gain more than any significant one, or half as much where the model is far off.
         """
         able = [
             s
@@ -253,14 +252,14 @@ class Search(Fitter):
             and (s.candidate.instance, s.candidate.port) not in single
         ]
         chosen = few[:REFITS] + shared[:WHOLES]
-        if chosen and is_open(current.base.estimate):
+        if chosen and self.lacking(current.base):
             known = {s.candidate.label for s in (*good, *chosen)}
+            least = best * (SHARED if is_open(current.base.estimate) else 1.0)
             chosen += [
                 s for s in able
-                if s.candidate.label not in known and s.score.z > GATE_Z
-                and s.score.gain > SHARED * best
+                if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
             ][:EXTRA]  # fmt: skip
-        return chosen
+        return sorted(chosen, key=lambda s: -s.score.gain)
 
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.

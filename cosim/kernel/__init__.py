@@ -124,6 +124,8 @@ UNFIT = 7
 """Status of a set call that was not made, because a number does not fit the variable's type."""
 UNSETTLED = 8
 """Status of an algebraic loop that has no solution or does not settle."""
+TOO_LONG, TOO_LARGE = 9, 10
+"""Statuses of a run that took more than its limit, and of one that ran away."""
 _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Ramp)
 
 
@@ -153,6 +155,8 @@ def cache_folder() -> Path:
 def _load(path: str) -> Any:
     library = ct.CDLL(path)
     library.cosim_run.argtypes, library.cosim_run.restype = [_P, _I64], ct.c_int
+    library.cosim_run_within.argtypes = [_P, _I64, _D, _D]
+    library.cosim_run_within.restype = ct.c_int
     library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], _I64
     sizes = [library.cosim_size(what) for what in range(len(_STRUCTURES))]
     expected = [ct.sizeof(kind) for kind in _STRUCTURES]
@@ -347,6 +351,13 @@ class Kernel:
     def advance(self, last: int) -> int:
         """Communication steps up to `last`; 0, or the status that ended it."""
         return int(self._library.cosim_run(ct.addressof(self.run), last))
+
+    def advance_within(self, last: int, limit: float, most: float) -> int:
+        """The same within some processor time [s], while no recorded value is larger than `most`.
+
+        It does not return in between: each time, a thread would wait for the interpreter lock.
+        """
+        return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
 
     def restart(self) -> None:
         """Begin again at the first communication point."""

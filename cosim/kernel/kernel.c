@@ -4,21 +4,26 @@
    so the caller may release the interpreter lock and run several systems in threads. Compiled
    without fused multiply-add, because the Python executor rounds every product. */
 
+#define _POSIX_C_SOURCE 200809L /* clock_gettime */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #if defined(_WIN32)
+#include <windows.h>
 #define EXPORT __declspec(dllexport)
 #else
+#include <time.h>
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
        SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, RAMP };
-enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8 }; /* beyond the statuses of FMI */
+/* beyond the statuses of FMI */
+enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8, TOO_LONG = 9, TOO_LARGE = 10 };
+enum { LOOK = 50, CHECK = 100 }; /* as in cosim/session.py */
 enum { PARTS = 1 << 16, ITERATIONS = 60 }; /* as in cosim/plan.py and cosim/loops.py */
 #define SETTLED 1e-10
 #define CONTRACTION 0.25
@@ -492,6 +497,35 @@ EXPORT int cosim_run(Run *run, int64_t last) {
   for (; run->index < last; run->index++) {
     const int status = execute(run, 0, run->n_instructions);
     if (status) return status;
+  }
+  return 0;
+}
+
+/* Processor time of this thread [s]. */
+static double processor_time(void) {
+#if defined(_WIN32)
+  FILETIME created, ended, kernel, user;
+  if (!GetThreadTimes(GetCurrentThread(), &created, &ended, &kernel, &user)) return 0.0;
+  const double high = (double)kernel.dwHighDateTime + (double)user.dwHighDateTime;
+  return 1e-7 * (4294967296.0 * high + (double)kernel.dwLowDateTime + (double)user.dwLowDateTime);
+#else
+  struct timespec now;
+  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now)) return 0.0;
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+#endif
+}
+
+/* The same within some processor time [s], and as long as no recorded value is larger than `most`. */
+EXPORT int cosim_run_within(Run *run, int64_t last, double limit, double most) {
+  const double begun = processor_time();
+  while (run->index < last) {
+    const int64_t look = (run->index / LOOK + 1) * LOOK, next = look < last ? look : last;
+    const int status = cosim_run(run, next);
+    if (status) return status;
+    if (processor_time() - begun > limit) return TOO_LONG;
+    if (next % CHECK || !run->row) continue;
+    for (int64_t i = (run->row - 1) * run->n_record; i < run->row * run->n_record; i++)
+      if (fabs(run->rows[i]) > most) return TOO_LARGE;
   }
   return 0;
 }

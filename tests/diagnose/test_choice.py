@@ -34,14 +34,16 @@ def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str
         instance, port = label.partition(" at ")[2].split(".", 1)
         effect = label.partition(" at ")[0]
         candidate = SimpleNamespace(label=label, effect=effect, instance=instance, port=port)
-        score = SimpleNamespace(gain=gain)
+        score = SimpleNamespace(gain=gain, z=9.0)
         signatures.append(
             SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
         )
     round_: Any = SimpleNamespace(
         signatures=signatures, corrected=dict.fromkeys(gains, 0.0), base=near()
     )
-    search: Any = SimpleNamespace(fitting=SimpleNamespace(largest=lambda change: 1.0))
+    search: Any = SimpleNamespace(
+        fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: True
+    )
     return [s.candidate.label for s in Search.promising(search, round_)]
 
 
@@ -197,9 +199,21 @@ def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
     assert said == ["delay at motor.command could not be fitted thoroughly: unstable"]
 
 
-@pytest.mark.parametrize("mean_square, expected", [(1e3, ["lag", "delay"]), (1.0, ["lag"])])
-def test_far_off_a_few_that_are_not_significant_are_refitted_too(
-    mean_square: float, expected: list[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "mean_square, lacking, gain, expected",
+    [
+        (1e3, True, 4.4e7, ["lag", "delay"]),
+        (1.0, True, 4.4e7, ["lag"]),
+        (1.0, True, 8e7, ["delay", "lag"]),  # more than any significant one
+        (1.0, False, 8e7, ["lag"]),
+    ],
+)
+def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_too(
+    mean_square: float,
+    lacking: bool,
+    gain: float,
+    expected: list[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: set())
     signatures = [
@@ -207,10 +221,14 @@ def test_far_off_a_few_that_are_not_significant_are_refitted_too(
             candidate=SimpleNamespace(label=label, effect=label, instance="motor", port="command"),
             score=SimpleNamespace(gain=gain, z=z), unseen=False, asked=None,
         )
-        for label, gain, z in (("lag", 6.8e7, 10.7), ("delay", 4.4e7, 4.0), ("ripple", 4e7, 1.9),
-                               ("sag", 3e7, 4.0))
+        for label, gain, z in sorted(
+            (("lag", 6.8e7, 10.7), ("delay", gain, 4.0), ("ripple", 4e7, 1.9), ("sag", 3e7, 4.0)),
+            key=lambda item: -item[1],
+        )
     ]  # fmt: skip
-    search: Any = SimpleNamespace(fitting=SimpleNamespace(largest=lambda change: 1.0))
+    search: Any = SimpleNamespace(
+        fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking
+    )
     found: Any = SimpleNamespace(
         signatures=signatures, base=near(mean_square),
         corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
