@@ -164,7 +164,7 @@ def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
         models = dict(
             zip(
                 [run.name for run in problem.runs],
-                problem._map(lambda run: problem.simulate(theta, run), problem.runs),
+                problem.spread(lambda run: problem.simulate(theta, run), problem.runs),
                 strict=True,
             )
         )

@@ -1,0 +1,158 @@
+"""Derivatives of a problem's model values by differences, simulated in threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FmuCallError
+from .parts import Run, Sensitivity
+
+if TYPE_CHECKING:
+    from .problem import Problem
+
+Vector = NDArray[np.float64]
+STEP = 1e-3
+"""Step of differences over the span of a parameter."""
+
+
+def jacobian(
+    problem: Problem,
+    theta: Vector,
+    purpose: str | Iterable[str] | None = "identification",
+    *,
+    columns: Sequence[int] | None = None,
+    central: bool = True,
+    relative: float = STEP,
+) -> list[Sensitivity]:
+    """Derivatives of the model values over sigma, by differences inside the bounds.
+
+    Args:
+        problem: whose model.
+        theta: where.
+        purpose: runs.
+        columns: parameters, all if not given.
+        central: differences on both sides.
+        relative: step over the span of a parameter, from its lattice on where it has one.
+    """
+    runs = problem.chosen(purpose)
+    tasks: list[tuple[Run, int, float]] = []
+    wanted = set(range(len(problem.parameters)) if columns is None else columns)
+    owned = {
+        run.name: [int(i) for i in problem.columns(run.name) if int(i) in wanted] for run in runs
+    }
+    sides = {i: _sides(problem, theta, i, central, relative) for i in wanted}
+    for run in runs:
+        if central or any(0.0 in sides[i] for i in owned[run.name]):
+            tasks.append((run, -1, 0.0))
+        tasks += [(run, i, h) for i in owned[run.name] for h in sides[i] if h]
+
+    def simulate(task: tuple[Run, int, float]) -> Vector:
+        run, index, change = task
+        moved = theta.copy()
+        if index >= 0:  # sums round past bounds
+            moved[index] = np.clip(
+                moved[index] + change, problem.lower[index], problem.upper[index]
+            )
+        return problem.simulate(moved, run)
+
+    def beside(task: tuple[Run, int, float]) -> tuple[float, Vector]:
+        """The change that was made, and what it gave: where it cannot be, the opposite."""
+        run, index, change = task
+        try:
+            return change, simulate(task)
+        except FmuCallError:
+            room = problem.lower[index] - theta[index], problem.upper[index] - theta[index]
+            if index < 0 or not room[0] <= -change <= room[1]:
+                raise
+            return -change, simulate((run, index, -change))
+
+    results = problem.spread(beside, tasks)
+    found = {(t[0].name, t[1], t[2]): r for t, r in zip(tasks, results, strict=True)}
+    output = []
+    for run in runs:
+        gap = np.where(np.isfinite(run.data), 0.0, np.nan)
+        mine = owned[run.name]
+        values = np.empty((*run.data.shape, len(mine)))
+        rough = np.zeros_like(values)
+        for place, i in enumerate(mine):
+            (low, first), (high, second) = (
+                found[run.name, i if change else -1, change] for change in sides[i]
+            )
+            if low == high:  # one of both sides cannot be simulated
+                low, first = found[run.name, -1, 0.0]
+            values[:, :, place] = (second - first) / (high - low) / problem.sigma + gap
+            if low and high:
+                bend = first + second - 2.0 * found[run.name, -1, 0.0][1]
+                rough[:, :, place] = bend / (high - low) / problem.sigma + gap
+        output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))
+    return output
+
+
+def directional(
+    problem: Problem, theta: Vector, run: Run | str, directions: Vector, *, relative: float = STEP
+) -> Sensitivity:
+    """Derivatives of one run along directions, given back along the parameters.
+
+    Where the model jumps, differences along parameters do not cancel in a combination that has
+    no effect at all; differences along the combination do.
+
+    Args:
+        problem: whose model.
+        theta: where.
+        run: which.
+        directions: orthonormal columns over the run's parameters, in spans.
+        relative: step in spans.
+    """
+    run = problem.run(run) if isinstance(run, str) else run
+    columns = problem.columns(run.name)
+    scale = problem.scale[columns]
+
+    def simulate(change: Vector) -> Vector:
+        moved = theta.copy()
+        moved[columns] += change * scale
+        return problem.simulate(np.clip(moved, problem.lower, problem.upper), run)
+
+    low, high = problem.lower[columns] - theta[columns], problem.upper[columns] - theta[columns]
+    steps: list[tuple[float, float]] = []
+    for direction in directions.T:
+        room = []
+        for sign in (1.0, -1.0):
+            way = sign * direction * scale
+            with np.errstate(divide="ignore", invalid="ignore"):
+                limits = np.where(way > 0, high / way, np.where(way < 0, low / way, np.inf))
+            room.append(float(np.min(limits)))
+        if min(room) >= 0.1 * relative:
+            size = min(relative, *room)
+            steps.append((-size, size))
+        else:
+            steps.append((0.0, relative) if room[0] > room[1] else (-relative, 0.0))
+    changes = [h * d for d, pair in zip(directions.T, steps, strict=True) for h in pair if h]
+    results = iter(problem.spread(simulate, [np.zeros(columns.size), *changes]))
+    base = next(results)
+    gap = np.where(np.isfinite(run.data), 0.0, np.nan)
+    slopes = np.empty((*run.data.shape, columns.size))
+    bends = np.zeros_like(slopes)
+    for place, (first, second) in enumerate(steps):
+        below = next(results) if first else base
+        above = next(results) if second else base
+        slopes[:, :, place] = (above - below) / (second - first) / problem.sigma + gap
+        if first and second:
+            bends[:, :, place] = (above + below - 2 * base) / (second - first) / problem.sigma
+    back = directions.T / scale
+    return Sensitivity(run.name, columns, slopes @ back, bends @ back)
+
+
+def _sides(
+    problem: Problem, theta: Vector, index: int, central: bool, relative: float
+) -> tuple[float, float]:
+    """The two changes between which a difference is taken; 0 is the point itproblem."""
+    parameter, value = problem.parameters[index], float(theta[index])
+    change = max(relative * parameter.scale, parameter.lattice)
+    above, below = parameter.maximum - value, value - parameter.minimum
+    if central and above >= change and below >= change:
+        return -change, change
+    return (0.0, change) if above >= change or above >= below else (-change, 0.0)
