@@ -1,5 +1,5 @@
-"""One FMU for all the places of an effect, so that a system with hundreds of candidates takes tens
-of FMUs; and which of these places one simulation shows apart.
+"""One FMU for all the places of some effects, so that a system with hundreds of candidates takes
+tens of FMUs; and which of these places one simulation shows apart.
 """
 
 from __future__ import annotations
@@ -18,7 +18,12 @@ from ..errors import CosimError
 from .candidates import Candidate, balances, element_of, new_parameters
 
 MOST = 8
-"""Places in one FMU: effects that remember a signal's past make larger ones slow to compile."""
+"""Places of one effect in one FMU: what remembers a signal's past makes larger ones slow to
+compile."""
+EFFECTS, PLACES = 4, 24
+"""Effects and places in one FMU at most. What is absent costs little time, and an FMU with four
+effects compiles nearly as fast as one with one, but for those with states: in the order of the
+catalogue these are more than four apart."""
 _INDEX = re.compile(r"\[(\d+)\]$")
 
 
@@ -82,7 +87,8 @@ class Batch:
     """Candidates that are simulated together.
 
     Attributes:
-        change: of the system, as of `cosim run --set`; None for a fidelity.
+        change: of the system, as of `cosim run --set`, for this batch and others in the same FMU;
+            None for a fidelity.
         members: with channels that show the member apart from the others (None: all channels).
         whole: the effect on all elements of the vector at once.
     """
@@ -107,8 +113,9 @@ class Batch:
         Candidates that fit nothing are left out.
         """
         try:
-            if self.change is None or len(self.members) == 1:
+            if self.change in (None, self.members[0][0].change):
                 return _single(base, self.candidates)
+            assert self.change is not None
             problem = base.with_effects(self.change)
             problem.system()
         except CosimError:
@@ -206,6 +213,35 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
             result.append(Batch(change, tuple(zip(few, chosen, strict=True)), whole))
         if key in wholes and len(members) > MOST:
             result.append(Batch(wholes[key].change, ((wholes[key], None),)))
+    return _sharing(result, set(known))
+
+
+def _sharing(batches: Sequence[Batch], known: set[tuple[str, str]]) -> list[Batch]:
+    """Batches with neighbours of the same component in one FMU.
+
+    Args:
+        batches: of one effect each.
+        known: instance and name of balances; others are groups, which share their declarations.
+    """
+    open_: dict[tuple[str, bool], list[int]] = {}
+    shares: list[list[int]] = []
+    for index, batch in enumerate(batches):
+        first = batch.members[0][0]
+        if batch.change is None:
+            continue
+        key = (first.instance, (first.instance, first.port) in known)
+        share = open_.get(key, [])
+        places = sum(len(batches[i].members) for i in (*share, index))
+        if not share or len(share) >= EFFECTS or places > PLACES:
+            share = open_[key] = []
+            shares.append(share)
+        share.append(index)
+    result = list(batches)
+    for share in shares:
+        instance = batches[share[0]].members[0][0].instance
+        whole = "".join((batches[i].change or {})[instance] for i in share)
+        for i in share:
+            result[i] = replace(batches[i], change={instance: whole})
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -117,10 +118,13 @@ class Search(Fitter):
         """
         known = self.known if problem is None else candidates(problem)
         problem = problem or self.declared
-        for batch in batches(known, problem):
-            first = batch.members[0][0]
-            variant = apply(problem.instances, batch.change or first.change, problem.provider)
-            self._builder.submit(locate, variant[first.instance], problem.provider)
+        self._build(problem, (b.change or b.members[0][0].change for b in batches(known, problem)))
+
+    def _build(self, problem: Problem, changes: Iterable[Mapping[str, str]]) -> None:
+        """Have changed FMUs of a problem built in the background."""
+        for instance, change in dict.fromkeys(pair for c in changes for pair in c.items()):
+            variant = apply(problem.instances, {instance: change}, problem.provider)
+            self._builder.submit(locate, variant[instance], problem.provider)
 
     def close(self) -> None:
         """Stop building."""
@@ -286,6 +290,7 @@ class Search(Fitter):
         current = self.scored(start)
         current.base = base
         promising = self.promising(current)
+        self._build(start.problem, (item.candidate.change for item in promising))
         most = max((s.score.gain for s in promising), default=0.0)
         for item in promising:
             explained = self.explained(base, current.fitted)

@@ -11,7 +11,7 @@ import pytest
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.linear import Absorber, Layout
-from cosim.diagnose.probes import MOST, Batch, batches
+from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches
 from cosim.diagnose.secant import Bench, _shared, model_values
 from cosim.errors import CosimError
 
@@ -58,12 +58,22 @@ def test_no_candidate_is_lost() -> None:
     assert len(alone.members) == 1
 
 
-def test_an_effect_among_its_siblings_does_what_it_does_alone(clean_bench: Problem) -> None:
-    known = [c for c in candidates(clean_bench) if c.effect == "delay"]
-    assert len({c.instance for c in known}) == 2
+@pytest.mark.parametrize(
+    "effects, shared",
+    [
+        (("delay",), False),
+        (("bristle", "coulomb", "stribeck", "unbalance"), True),
+        (("delay", "first_order_lag", "gain", "sample_hold"), True),
+    ],
+)
+def test_an_effect_among_others_does_what_it_does_alone(
+    clean_bench: Problem, effects: tuple[str, ...], shared: bool
+) -> None:
+    known = [c for c in candidates(clean_bench) if c.effect in effects]
+    assert len({c.instance for c in known}) >= 2
     layout = Layout(clean_bench, clean_bench.chosen("identification"))
-    several = [b for b in batches(known, clean_bench) if len(b.members) > 1]
-    assert several
+    several = [b for b in batches(known, clean_bench) if b.change != b.members[0][0].change]
+    assert any(len(effects_of(b)) > 1 for b in several) == shared
     for batch in several:
         for probe in batch.probes(clean_bench):
             (alone,) = Batch(None, ((probe.candidate, None),)).probes(clean_bench)
@@ -77,6 +87,23 @@ def test_an_effect_among_its_siblings_does_what_it_does_alone(clean_bench: Probl
                 one.problem.close()
             # effects of strength 0 are absent exactly, so nothing but bits may be compared
             assert np.array_equal(*values)
+
+
+def effects_of(batch: Batch) -> set[str]:
+    """Effects in the FMU of a batch."""
+    return {part.partition("@")[0] for change in (batch.change or {}).values()
+            for part in change.split("+")[1:]}  # fmt: skip
+
+
+def test_few_fmus_serve_many_candidates(clean_bench: Problem) -> None:
+    found = batches(candidates(clean_bench), clean_bench)
+    built = [b for b in found if b.change]
+    changes = {tuple((b.change or {}).items()) for b in built}
+    assert len(changes) < 0.4 * len(built)
+    for batch in built:
+        assert len(effects_of(batch)) <= EFFECTS
+        places = sum(change.count("+") for change in (batch.change or {}).values())
+        assert places <= max(PLACES, len(batch.members))
 
 
 def test_the_angle_of_an_effect_is_found_without_a_search(clean_bench: Problem) -> None:
