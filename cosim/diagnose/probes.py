@@ -20,6 +20,9 @@ from .candidates import Candidate, balances, element_of, new_parameters
 MOST = 8
 """Places of one effect in one FMU: what remembers a signal's past makes larger ones slow to
 compile."""
+ENTANGLED = 2
+"""The same where the effect varies a coefficient: other equations contain it, and a friction
+coefficient with four angles of its own compiles for most of a minute."""
 EFFECTS, PLACES = 4, 24
 """Effects and places in one FMU at most. What is absent costs little time, and an FMU with four
 effects compiles nearly as fast as one with one, but for those with states: in the order of the
@@ -205,23 +208,34 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
         masks = [shown.get(n) for n in _numbers(members)] if key in wholes else []
         if len(members) > MOST or any(m is None for m in masks):
             masks = []
-        for first in range(0, len(members), MOST):
-            few = members[first : first + MOST]
-            chosen = masks[first : first + MOST] or [None] * len(few)
+        most = ENTANGLED if _entangled(members, known) else MOST
+        for first in range(0, len(members), most):
+            few = members[first : first + most]
+            chosen = masks[first : first + most] or [None] * len(few)
             whole = wholes.get(key) if len(members) <= MOST else None
             change = {key[0]: "".join(f"+{c.effect}@{c.port}" for c in few)}
             result.append(Batch(change, tuple(zip(few, chosen, strict=True)), whole))
         if key in wholes and len(members) > MOST:
             result.append(Batch(wholes[key].change, ((wholes[key], None),)))
-    return _sharing(result, set(known))
+    return _sharing(result, known)
 
 
-def _sharing(batches: Sequence[Batch], known: set[tuple[str, str]]) -> list[Batch]:
+def _entangled(members: Sequence[Candidate], known: Mapping[tuple[str, str], str]) -> bool:
+    """Whether an effect varies coefficients, alone or as groups of balances."""
+    kinds = {
+        kind for (instance, name), kind in known.items()
+        for c in members if instance == c.instance and name.endswith(c.port.rpartition(".")[2])
+    }  # fmt: skip
+    return kinds == {"coefficient"}
+
+
+def _sharing(batches: Sequence[Batch], known: Mapping[tuple[str, str], str]) -> list[Batch]:
     """Batches with neighbours of the same component in one FMU.
 
     Args:
         batches: of one effect each.
-        known: instance and name of balances; others are groups, which share their declarations.
+        known: kinds of the balances by instance and name; others are groups, which share their
+            declarations.
     """
     open_: dict[tuple[str, bool], list[int]] = {}
     shares: list[list[int]] = []
@@ -232,7 +246,10 @@ def _sharing(batches: Sequence[Batch], known: set[tuple[str, str]]) -> list[Batc
         key = (first.instance, (first.instance, first.port) in known)
         share = open_.get(key, [])
         places = sum(len(batches[i].members) for i in (*share, index))
-        if not share or len(share) >= EFFECTS or places > PLACES:
+        split = any(batches[i].members[0][0].effect == first.effect for i in share) and (
+            _entangled([first], known)
+        )
+        if not share or split or len(share) >= EFFECTS or places > PLACES:
             share = open_[key] = []
             shares.append(share)
         share.append(index)
