@@ -47,6 +47,12 @@ def is_open(estimate: Estimate) -> bool:
     return 2.0 * estimate.robust > OPEN * estimate.count
 
 
+def nearly(search: Search, base: Fitted, stage: Round) -> frozenset[Candidate]:
+    """Candidates whose fits gain nearly as much as the best quick one did."""
+    least = NEARLY * stage.quick
+    return frozenset(f.effects[-1] for f in stage.fitted if search.total(base, f) > least)
+
+
 def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
     """The model with early choices exchanged where that is better.
 
@@ -158,11 +164,11 @@ def _alike(
     winner = stage.winner
     assert winner is not None
     name = winner.effects[-1].effect
-    least = NEARLY * stage.quick
+    near = nearly(search, base, stage) | stage.near  # residuals may count in another way since
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in stage.fitted
         if f is not winner and f.signature is not None and search.accepted(base, f)
-        and search.total(base, f) > least
+        and f.effects[-1] in near
         and (f.effects[-1].effect == name or more_general(winner, f))
     ]  # fmt: skip
     fitted = {f.effects[-1]: f for f in stage.fitted}
@@ -186,11 +192,11 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
     """Rivals of a round's winner with their quick fits, and its twins elsewhere."""
     winner = stage.winner
     assert winner is not None
-    least = NEARLY * stage.quick
+    close = nearly(search, stage.base, stage) | stage.near
     near = [
         f for f in stage.fitted
         if f.effects[-1] != winner.effects[-1] and f.signature is not None
-        and search.accepted(stage.base, f) and search.total(stage.base, f) > least
+        and search.accepted(stage.base, f) and f.effects[-1] in close
     ][:MOST]  # fmt: skip
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in near if f.signature is not None

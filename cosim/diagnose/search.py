@@ -17,7 +17,7 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
-from .exchange import challenged, is_open
+from .exchange import challenged, is_open, nearly
 from .fitter import Fitter, Say
 from .judge import ALIKE
 from .linear import MATERIAL, Layout, holm
@@ -77,6 +77,7 @@ class Round:
         open: whether more was so evidently missing that the choice waits for it.
         probes: all candidates that were simulated, with the systems they were simulated in.
         quick: what the best quick fit gained on all runs [nats].
+        near: candidates whose quick fits gained nearly as much.
     """
 
     base: Fitted
@@ -89,6 +90,7 @@ class Round:
     open: bool = False
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0
+    near: frozenset[Candidate] = frozenset()
 
 
 class Search(Fitter):
@@ -298,6 +300,7 @@ class Search(Fitter):
                 self.tried(start, current, item, again=not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
+        current.near = nearly(self, base, current)
         first = self.chosen(base, current.fitted)
         current.winner = first
         if first is not None and is_open(first.estimate):

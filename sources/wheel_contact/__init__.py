@@ -44,6 +44,13 @@ W_RR = Quantity(
     start=0.1,
     minimum=1e-6,
 )
+T_TURN = Quantity(
+    "t_turn",
+    "s",
+    "time by which the direction of rolling lags that of the wheel while it turns",
+    start=0.0,
+    nominal=1e-3,
+)
 
 AXLE = Port("axle", TAU, W, "gives_motion", +1, "drive side of the axle")
 HUB_X = Port("hub_x", F_X, V_X, "gives_effort", -1, "wheel centre, forward")

@@ -1,6 +1,7 @@
 """What all fidelities share: the spin of the wheel, the slip of its contact, the balances.
 
-u = v turned into the wheel's plane;  s_x = u_x - r w,  s_y = u_y
+u = v turned into the direction of rolling;  s_x = u_x - r w,  s_y = u_y
+direction of rolling: toe - t_turn w_z from the wheel's plane
 (J_w + J_added) w' = tau - r f_x - c_rr f_n r tanh(w/w_rr) + axle
 P_loss = -(f_x s_x + f_y s_y) + c_rr f_n r w tanh(w/w_rr)   (sliding, rolling)
 """
@@ -31,6 +32,7 @@ from . import (
     M_Z,
     PHI,
     SPEED,
+    T_TURN,
     TAU,
     V_X,
     V_Y,
@@ -103,7 +105,8 @@ def wheel(
     radius = r + runout.effort
     slope = ca.jacobian(radius, angle)  # of an eccentric wheel, else structurally 0
     toe = m.balance("toe", "coefficient", unit="rad", value=0).effort
-    cos, sin = ca.cos(toe), ca.sin(toe)
+    direction = toe - m.parameter(T_TURN) * w_z
+    cos, sin = ca.cos(direction), ca.sin(direction)
 
     if computes_normal:
         m.input_rate(height, v_z)

@@ -132,14 +132,21 @@ def test_wheel_spins_up_by_what_the_floor_does_not_take(fidelity: str) -> None:
     assert wheel.derivatives(values)["speed"] == pytest.approx(expected, rel=1e-12)  # rounding
 
 
-def test_toe_angle_turns_the_forces_with_the_wheel() -> None:
+@pytest.mark.parametrize(
+    ("variant", "values"),
+    [
+        ("wheel_contact/creep+toe_angle", {"toe_angle.delta": 0.2}),
+        ("wheel_contact/creep", {"t_turn": 0.1, "w_z": -2.0}),  # it rolls where it pointed before
+    ],
+)
+def test_forces_turn_with_the_direction_of_rolling(variant: str, values: dict[str, float]) -> None:
     straight = Oracle(build_model("wheel_contact/creep"))
-    toed = Oracle(build_model("wheel_contact/creep+toe_angle"))
+    toed = Oracle(build_model(variant))
     delta, v = 0.2, np.array([0.01, -0.02])
     turn = np.array([[np.cos(delta), -np.sin(delta)], [np.sin(delta), np.cos(delta)]])
     along = straight.outputs({"v_x": v[0], "v_y": v[1]})
     x, y = turn @ v
-    turned = toed.outputs({"v_x": x, "v_y": y, "toe_angle.delta": delta})
+    turned = toed.outputs({"v_x": x, "v_y": y, **values})
     expected = turn @ [along["f_x"], along["f_y"]]
     assert [turned["f_x"], turned["f_y"]] == pytest.approx(list(expected), rel=1e-12)  # rounding
 

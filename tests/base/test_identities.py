@@ -67,6 +67,20 @@ def test_energy_neither_appears_nor_vanishes(variant: str) -> None:
         assert abs(defect) <= 1e-12 * largest + 1e-10
 
 
+@pytest.mark.parametrize("variant", FIDELITIES)
+def test_a_lagging_direction_of_rolling_keeps_the_energy(variant: str) -> None:
+    oracle, rng = Oracle(build_model(variant)), np.random.default_rng(3)
+    lags = {v.name: 0.05 for v in oracle.model.of_role("parameter") if v.name.endswith("t_turn")}
+    assert lags or "wheel_contact" not in variant
+    acts = []
+    for _ in range(20):
+        values = random_values(oracle, rng)
+        defect, largest = oracle.energy_defect({**values, **lags})
+        assert abs(defect) <= 1e-12 * largest + 1e-10  # as above
+        acts.append(oracle.derivatives({**values, **lags}) != oracle.derivatives(values))
+    assert any(acts) == bool(lags)  # not where random heights lift the wheels
+
+
 @pytest.mark.parametrize("variant", EFFECTS)
 def test_effect_of_strength_0_is_absent_bit_for_bit(variant: str) -> None:
     with_effect = Oracle(build_model(variant))
