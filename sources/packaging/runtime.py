@@ -144,6 +144,7 @@ SLACK = 1e-7  # part of its period by which a tick may be early
 KEEP = 20  # steps with one Jacobian
 GAMMA = 0.435866521508459  # of ROS34PW2
 GROW, SHRINK, SAFETY = 5.0, 0.1, 0.9  # of error-controlled steps
+TRIALS, TRIALS_PER_STEP = 2e5, 1e3  # over one stretch, and for each solver.step of it
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
@@ -509,7 +510,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         for _ in range(order):
             quiet, steady = quiet * (SAFETY / GROW), steady * SAFETY
         method = {3: self._dopri5, 4: self._rodas3, 5: self._rosw3}[code]
+        left = TRIALS + TRIALS_PER_STEP * length / largest
         while t < t1:
+            left -= 1
+            if left < 0:
+                raise ValueError(f"{MODEL}: too many solver steps from {v[0]:.9g} s on, at {t:.9g} s")
             if h > largest:
                 h = largest
             last = t + h * (1 + 1e-9) >= t1

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sources.packaging.build import collect
+from sources.packaging.layout import METHODS
 from tests.fmus import Slave, fmu
 
 KINDS = [("native", 2), ("native", 3), ("python", 2)]
@@ -49,6 +50,21 @@ def test_clocks_of_a_late_start_keep_to_the_grid(kind: str, fmi: int) -> None:
             seen.append(slave.get(["v_d"])[0])
     # passes on until the first tick at 0.02 (in step 2), then 0.03 (step 5), 0.04 begins step 9
     assert seen == [0, 1, 2, 2, 2, 5, 5, 5, 5, 9]
+
+
+@pytest.mark.parametrize(("kind", "fmi"), KINDS[:2])
+def test_a_solver_that_gets_nowhere_says_so(kind: str, fmi: int) -> None:
+    """An explicit one where friction that holds decays at 1e10/s: 3e9 steps for a second."""
+    values = {"coulomb.tau_c": 100.0, "coulomb.w_0": 1e-6, "J": 1e-2} | {
+        "solver.method": METHODS["dopri5"][0], "solver.step": 1e-2,
+    }  # fmt: skip
+    with Slave(fmu("inertia/disc+coulomb", kind, fmi), values) as slave:
+        slave.set({"tau": 90.0})
+        with pytest.raises(Exception, match=r"status [34]"):
+            slave.step(0.0, 1.0)
+        text = slave.messages[-1]
+        assert text.startswith("inertia_disc_coulomb: 300000 solver steps from 0 s on have only ")
+        assert text.endswith("loosen solver.tolerance or use a fixed-step method")
 
 
 @pytest.mark.parametrize(("kind", "fmi"), KINDS)

@@ -132,6 +132,10 @@ static void rosw3(Memory *m, double t, double h, double *x, double *e) {
 #define GROW 5.0
 #define SHRINK 0.1
 #define SAFETY 0.9
+/* A solver that tries more steps than this over one stretch, or so many for each solver.step of it, gets
+   nowhere: forces have become so large, or change so steeply, that it would take minutes or for ever. */
+#define TRIALS 2e5
+#define TRIALS_PER_STEP 1e3
 #define CUBE(a) ((a) * (a) * (a))
 #define FIFTH(a) ((a) * (a) * (a) * (a) * (a))
 
@@ -143,7 +147,12 @@ static int adaptive(Instance *c, double t1, double length) {
   const double exponent = implicit ? -1.0 / 3.0 : -1.0 / 5.0;
   const double quiet = implicit ? CUBE(SAFETY / GROW) : FIFTH(SAFETY / GROW);
   const double steady = implicit ? CUBE(SAFETY) : FIFTH(SAFETY);
+  double left = TRIALS + TRIALS_PER_STEP * length / v[STEP];
   while (t < t1) {
+    if (!(left-- > 0))
+      return report(c, ERROR, "%s: %g solver steps from %.9g s on have only reached %.9g s; loosen "
+                    "solver.tolerance or use a fixed-step method", MODEL,
+                    floor(TRIALS + TRIALS_PER_STEP * length / v[STEP]), v[0], t);
     if (h > v[STEP]) h = v[STEP];
     const int last = t + h * (1 + 1e-9) >= t1;
     const double hs = !last ? h : t == v[0] ? length : t1 - t;
