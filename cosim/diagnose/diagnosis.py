@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from .models import Fitted
 from .power import power
 from .search import ROUNDS, Round, Search
 from .structure import Structure, structures
+from .unstable import ends
 
 Vector = NDArray[np.float64]
 PURPOSES = ("identification", "validation")
@@ -49,6 +50,8 @@ class Diagnosis:
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
         experiment: proposed to separate rivals.
+        ended: run -> time from which it does not count: what happens there hangs on small changes
+            of start values (see `unstable`).
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
     """
@@ -66,6 +69,7 @@ class Diagnosis:
     structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     experiment: dict[str, Any] | None = None
+    ended: dict[str, float] = field(default_factory=dict)
     bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
@@ -110,6 +114,7 @@ class Diagnosis:
             "parameters": self.parameters(),
             "start_values": self.start_values(),
             "bursts": self.bursts,
+            "unstable_from": self.ended,
             "structure": {
                 f"{which} {purpose}": [s.to_dict() for s in tests]
                 for (which, purpose), tests in self.structure.items()
@@ -130,8 +135,10 @@ class Diagnosis:
         return table
 
     def _score(self, fitted: Fitted) -> float:
-        assert self.search is not None and self.after is not None
-        return self.search.total(self.after, fitted)
+        """Log likelihood of a rival over that of its round's winner, all runs [nats]."""
+        assert self.search is not None
+        pairs = [p for r in self.search.rounds for p in zip(r.rivals, r.scores, strict=True)]
+        return next(score for rival, score in pairs if rival is fitted)
 
     def parameters(self) -> dict[str, Any]:
         """Calibrated parameters before and after."""
@@ -274,9 +281,11 @@ def _searched(
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
-        if not any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
-            current = reconsidered(search, current, winners)
+        shortened = _shortened(result, winners, current)
+        if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
+            current = reconsidered(search, shortened, winners)
             break
+        current = shortened
     else:
         current = reconsidered(search, current, winners)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
@@ -293,6 +302,30 @@ def _searched(
         result.files += _leave_fmus(result, out)
     result.wall = time.perf_counter() - begun
     return result
+
+
+def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitted:
+    """The model judged by runs that end where it has left them by an instability."""
+    search = result.search
+    assert search is not None
+    if not search.raw.late or winners[-1].open or not search.lacking(current):
+        return current
+    names = [*search.fitting.names, *search.checking.names]
+    try:
+        sizes = ends(current.problem, current.estimate.theta, list(dict.fromkeys(names)))
+    except CosimError as error:  # it runs so well that a small change is too much
+        search.say(f"where runs turn unstable is not known: {error}")
+        return current
+    if not sizes:
+        return current
+    for name, size in sizes.items():
+        result.ended[name] = float(current.problem.run(name).times[size])
+    until = ", ".join(f"{name} to {result.ended[name]:.2f} s" for name in sizes)
+    search.say(f"unstable from there on, so runs count up to where the model leaves them: {until}")
+    current = reconsidered(search, current, winners)
+    for stage in winners:
+        stage.open = False  # their rivals have had their turn
+    return search.shortened(current, sizes)
 
 
 def _tests(search: Search, fitted: Fitted, purpose: str) -> list[Structure]:
@@ -326,6 +359,12 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
     remark = (
         f" In {', '.join(sorted(left))} the residual still holds more than noise." if left else ""
     )
+    if result.ended:
+        until = ", ".join(f"{name} up to {time:.1f} s" for name, time in result.ended.items())
+        remark += (
+            f" Further effects were looked for in {until} only: after that, changes of the start "
+            "values that nobody can see decide what the model does."
+        )
     if winners:
         different: list[Fitted] = []
         for stage in winners:
@@ -371,8 +410,9 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
 def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     """Residuals against the data as measured, the step's error removed at these parameters."""
     step = result.problem.step
-    data = {run.name: run.data for run in result.problem.runs}
-    problem = fitted.problem.with_data(data)._with(step=step)
+    whole = {run.name: run for run in result.problem.runs}
+    runs = [replace(whole[run.name], starts=run.starts) for run in fitted.problem.runs]
+    problem = fitted.problem._with(runs=runs, step=step)
     theta = fitted.estimate.theta
     errors = step_error(problem, theta, step)
     for name, residual in problem.residuals(theta, None):

@@ -90,6 +90,11 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
         if present.estimate is not fitted.estimate:
             fitted = search.sharpened(present, stage.base)
         stage.rivals = search.rivals(present, rivals)
+        stage.scores = [
+            search.gain(present, f)
+            + compare(search.check_data, present.check, f.check, search.checking).gain
+            for f in stage.rivals
+        ]
     return fitted
 
 

@@ -27,6 +27,7 @@ from .linear import Absorber, Layout
 from .models import GATE, Fitted, compare
 from .secant import FLOOR, patience
 from .signature import Signature
+from .unstable import ended
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -152,6 +153,26 @@ class Fitter(Judge):
         if root is not None:
             matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
+
+    def shortened(self, fitted: Fitted, sizes: Mapping[str, int]) -> Fitted:
+        """Judge by runs that end after so many samples from now on.
+
+        Args:
+            fitted: a model; it is fitted again where the rest holds more than noise.
+            sizes: samples by run.
+
+        Returns:
+            The model, judged by the rest.
+        """
+        self._measured(ended(self.raw, sizes))
+        self._own = None
+        problem, theta = ended(fitted.problem, sizes), fitted.estimate.theta
+        found = self.judged(fit(problem, theta, limit=0, robust=False))
+        if self.lacking(found):
+            found = self.judged(fit(problem, theta, near=True))
+        found.effects, found.signature = fitted.effects, fitted.signature
+        found.gate, found.p_value = fitted.gate, fitted.p_value
+        return found
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.

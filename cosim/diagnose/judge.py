@@ -36,9 +36,14 @@ class Judge:
     """
 
     def __init__(self, problem: Problem, check: str) -> None:
+        self.purpose = check
+        self._measured(problem)
+
+    def _measured(self, problem: Problem) -> None:
+        """What is judged by."""
         self.raw = problem
         self.fitting = Layout(problem, problem.chosen("identification"))
-        checks = problem.chosen(check) or problem.chosen("identification")
+        checks = problem.chosen(self.purpose) or problem.chosen("identification")
         self.checking = Layout(problem, checks)
         self.fit_data = self._data(self.fitting)
         self.check_data = self._data(self.checking)

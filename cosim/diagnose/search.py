@@ -74,6 +74,7 @@ class Round:
         fitted: refitted candidates, best first.
         winner: accepted one.
         rivals: fitted ones that the data cannot tell from it.
+        scores: of these, their log likelihoods over that of the winner [nats].
         open: whether more was so evidently missing that the choice waits for it.
         probes: all candidates that were simulated, with the systems they were simulated in.
         quick: what the best quick fit gained on all runs [nats].
@@ -87,6 +88,7 @@ class Round:
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None
     rivals: list[Fitted] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
     open: bool = False
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0
@@ -320,6 +322,8 @@ class Search(Fitter):
             self.follow(current, self.sharpened(self.released(current.winner, base), base))
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
+            mine = self.total(base, current.winner)
+            current.scores = [self.total(base, f) - mine for f in current.rivals]
         return current
 
     def opened(self, base: Fitted, current: Round) -> None:

@@ -66,6 +66,7 @@ def page(result: Diagnosis) -> str:
         _errors(result, table),
         _parameters(table["parameters"]),
         _starts(table["start_values"]),
+        _ended(table["unstable_from"]),
         _bursts(table["bursts"]),
         _measured(result),
         _residuals(result),
@@ -199,6 +200,17 @@ def _starts(values: dict[str, dict[str, float]]) -> str:
     return "<p>Start values, estimated run by run:</p>" + _table(
         ["run", *names],
         [[_td(run), *(_td(_number(own[n])) for n in names)] for run, own in values.items()],
+    )
+
+
+def _ended(times: dict[str, float]) -> str:
+    if not times:
+        return ""
+    rows = [[_td(run), _td(f"{time:.2f} s")] for run, time in times.items()]
+    return (
+        "<p>Runs that the model has left where a small change of a start value decides what "
+        "happens. From these times on they were not used to look for further effects; all tables "
+        "have them in full.</p>" + _table(["run", "up to"], rows)
     )
 
 
