@@ -33,6 +33,9 @@ NEARLY = 0.8
 HOPEFUL = 0.5
 """A law that gains less than this share of what the winner does, from the winner's parameters, is
 not fitted further."""
+NEAR = 0.98
+"""Late values, which were estimated for the winner, are estimated again for a law that gains this
+share of what the winner does."""
 CHANGED = 0.01
 """Share of what the best quick fit gained by which a challenger must be better for all others to be
 fitted from its parameters again."""
@@ -138,7 +141,8 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
                 trial = search.approached(trial, winner, base)
             else:
                 law = False
-            if law and (late := search.released(trial, base)) is not trial:
+            near = search.total(base, trial) > NEAR * search.total(base, winner)
+            if law and near and (late := search.released(trial, base)) is not trial:
                 trial = search.refined(base, late, quick=True, share=0.0)
             simple |= law and not (
                 search.gain(trial, winner) > GATE and search.apart(trial, winner)

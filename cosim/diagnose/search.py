@@ -21,7 +21,7 @@ from .exchange import challenged, is_open, nearly
 from .fitter import Fitter, Say
 from .judge import ALIKE
 from .linear import MATERIAL, Layout, holm
-from .models import GATE, GATE_Z, LEVEL, Fitted, compare
+from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
 from .probes import Probe, batches
 from .secant import Bench, model_values
 from .signature import Signature, merge, unscored, worthy
@@ -423,6 +423,8 @@ class Search(Fitter):
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         good = [f for f in current.fitted if self.accepted(base, f)]
         near = [f for f in good if self.total(base, f) > least][:REFINED]
+        if near:  # simpler laws at its place are fitted from its parameters anyway: `challenged`
+            near = [f for f in near if f is near[0] or not more_general(near[0], f)]
         alone = bool(good) and not near[1:]
         if not good and self.lacking(base):
             gains = sorted(current.fitted, key=lambda f: -self.gain(base, f))
