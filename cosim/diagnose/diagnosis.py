@@ -273,6 +273,7 @@ def _searched(
                 ranked = [s.candidate for s in stage.signatures]
                 result.located = localise(search, base, ranked, say)
         if stage.winner is None:
+            current = stage.base
             found = reconsidered(search, current, winners)
             if found is current:
                 break

@@ -17,6 +17,7 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
+from .established import settle
 from .exchange import challenged, is_open, nearly
 from .fitter import Fitter, Say
 from .judge import ALIKE
@@ -320,6 +321,9 @@ class Search(Fitter):
         if not current.open:
             challenged(self, base, current)
             self.follow(current, self.sharpened(self.released(current.winner, base), base))
+            settle(self, base, current)
+            if current.winner is None:
+                return current
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
             mine = self.total(base, current.winner)

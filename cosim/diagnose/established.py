@@ -1,0 +1,91 @@
+"""Whether a round's winner is established: its law by the data, and that it is there at all.
+
+A bristle that gives way by nothing is dry friction, and a further effect may have come with better
+start values of the runs, or beside moments that no model gets right.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import CosimError
+from .models import GATE, Fitted, compare
+
+if TYPE_CHECKING:
+    from .search import Round, Search
+
+HAIR = 0.005
+"""Share of what the winner explains that a simpler law may leave, where nothing that the winner has
+beyond it is determined: fits of laws that stick end that far from their minima."""
+PART = 0.2
+"""Share of what a model leaves beyond noise that a further effect must explain where runs may turn
+unstable: moments that come too early are most of that, and any law moves them a little."""
+
+
+def settle(search: Search, base: Fitted, stage: Round) -> None:
+    """Replace a winner by a simpler law, or take it back, where it is not established.
+
+    Args:
+        search: fits and judges.
+        base: model without the effect.
+        stage: the round; it has no winner, and perhaps a better base, if nothing is established.
+    """
+    winner = stage.winner
+    assert winner is not None
+    simple = _simpler(search, base, stage)
+    if simple is not winner:
+        search.say(
+            f"{winner.effects[-1].label}: nothing of it but {simple.effects[-1].effect} shows"
+        )
+        stage.winner = simple
+        search.follow(stage, search.sharpened(simple, base))
+    if base.effects and search.raw.unstable:
+        _needed(search, base, stage)
+
+
+def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
+    """The best simpler law of the same quantity, if nothing else of the winner is determined."""
+    winner = stage.winner
+    assert winner is not None and winner.signature is not None
+    last, estimate = winner.effects[-1], winner.estimate
+    strength = winner.signature.strength.name
+    others = [
+        (i, p) for i, p in enumerate(winner.problem.parameters)
+        if p.name.startswith(last.prefix) and p.name != strength
+    ]  # fmt: skip
+    if not others or any(
+        estimate.identifiable[i] and estimate.low[i] > p.minimum and estimate.high[i] < p.maximum
+        for i, p in others
+    ):
+        return winner
+    least = (1.0 - HAIR) * search.total(base, winner)
+    laws = [
+        f for f in stage.fitted
+        if f.effects[-1].place == last.place and f.effects[-1] != last
+        and f.quantity == winner.quantity != "" and f.complexity < winner.complexity
+        and search.accepted(base, f) and search.total(base, f) > least
+    ]  # fmt: skip
+    return max(laws, key=lambda f: search.total(base, f), default=winner)
+
+
+def _needed(search: Search, base: Fitted, stage: Round) -> None:
+    """Take a further effect back that the model from where it ended does as well without."""
+    winner = stage.winner
+    assert winner is not None
+    last = winner.effects[-1]
+    try:
+        less = search.approached(search.without(winner, last), winner, base)
+    except CosimError as error:  # it is needed
+        search.say(f"without {last.label}: {error}")
+        return
+    gate = compare(search.check_data, less.check, winner.check, search.checking)
+    gain, beyond = search.gain(less, winner), less.estimate.robust - 0.5 * less.estimate.count
+    if gate.passed and gain > max(GATE, PART * beyond):
+        return
+    search.say(f"{last.label} is not needed: {gain:.0f} nats, {gate.gain:.0f} on validation")
+    stage.winner = None
+    if search.gain(base, less) > GATE:
+        found = search.sharpened(less, base)
+        found.effects, found.signature = base.effects, base.signature
+        found.gate, found.p_value = base.gate, base.p_value
+        stage.base = found
