@@ -1,0 +1,111 @@
+"""A law is named if the data determine it, a further effect if the model needs it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.calibrate.parts import Parameter
+from cosim.diagnose import established
+from cosim.diagnose.models import Gate
+from cosim.errors import CosimError
+
+TOTALS = {"bristle": 1e5, "coulomb": 1e5 - 300.0, "cogging": 5e4}
+
+
+def law(effect: str, own: int, *, known: bool = False) -> Any:
+    """A fitted law at one place; what it has beyond its strength may be determined."""
+    prefix = f"axle.{effect}."
+    names = ["tau_c", "x_0", "r"][:own]
+    parameters = [
+        Parameter(prefix + n, "1", 1.0, 0.0, 9.0, (), strength=n == "tau_c") for n in names
+    ]
+    low = np.array([0.9, *([0.5 if known else 0.0] * (own - 1))])
+    return SimpleNamespace(
+        effects=(SimpleNamespace(effect=effect, place="axle", prefix=prefix, label=effect),),
+        problem=SimpleNamespace(parameters=parameters),
+        estimate=SimpleNamespace(low=low, high=low + 1.0, identifiable=np.ones(own, dtype=bool)),
+        signature=SimpleNamespace(strength=parameters[0]), quantity="tau_c", complexity=own,
+    )  # fmt: skip
+
+
+def judge(**more: Any) -> Any:
+    """What a search is asked for."""
+    return SimpleNamespace(
+        total=lambda base, fitted: TOTALS[fitted.effects[-1].effect],
+        accepted=lambda base, fitted: True, sharpened=lambda fitted, base: fitted,
+        say=lambda text: None, raw=SimpleNamespace(unstable=True),
+        follow=lambda stage, fitted: None, **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("others", "known", "named"),
+    [
+        (("coulomb", "cogging"), False, "coulomb"),
+        (("coulomb", "cogging"), True, "bristle"),  # it is seen to give way
+        (("cogging",), False, "bristle"),  # the simpler law does much worse
+    ],
+)
+def test_a_law_of_which_only_a_simpler_one_shows_is_that(
+    others: tuple[str, ...], known: bool, named: str
+) -> None:
+    winner = law("bristle", 3, known=known)
+    stage: Any = SimpleNamespace(winner=winner, fitted=[winner, *(law(n, 1) for n in others)])
+    established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
+    assert stage.winner.effects[-1].effect == named
+
+
+def without(gain: float, left: float, unused: float, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A round after a further effect, of which the model without it has been fitted again.
+
+    Args:
+        gain: by which it is better [nats].
+        left: what the model without it leaves beyond noise [nats].
+        unused: gain on unused runs [nats].
+        monkeypatch: of pytest.
+    """
+    winner, base = (
+        law("coulomb", 1),
+        SimpleNamespace(effects=("first",), signature=1, gate=2, p_value=3),
+    )
+    estimate = SimpleNamespace(robust=500.0 + left, count=1000)
+    less = SimpleNamespace(check=0, estimate=estimate)
+    winner.check = 1
+    monkeypatch.setattr(established, "compare", lambda *_: Gate(unused, 9.0 if unused > 0 else 0.0))
+    search = judge(
+        without=lambda fitted, effect: less, approached=lambda trial, goal, base: trial,
+        gain=lambda first, second: gain if first is less else 5000.0, check_data=0, checking=0,
+    )  # fmt: skip
+    stage: Any = SimpleNamespace(winner=winner, fitted=[winner], base=base)
+    established.settle(search, base, stage)  # type: ignore[arg-type]
+    return stage, winner, base, less
+
+
+def test_a_further_effect_that_the_model_needs_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, winner, base, _ = without(900.0, 1000.0, 50.0, monkeypatch)
+    assert stage.winner is winner and stage.base is base
+
+
+@pytest.mark.parametrize(("gain", "left", "unused"), [(150.0, 1000.0, 50.0), (900.0, 1000.0, -1.0)])
+def test_one_that_came_with_better_start_values_does_not(
+    monkeypatch: pytest.MonkeyPatch, gain: float, left: float, unused: float
+) -> None:
+    """It leaves the model without it, which is better than the one that the round began with."""
+    stage, _, base, less = without(gain, left, unused, monkeypatch)
+    assert stage.winner is None and stage.base is less
+    assert (less.effects, less.signature, less.gate, less.p_value) == (base.effects, 1, 2, 3)
+
+
+def test_one_without_which_nothing_can_be_simulated_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: Any) -> None:
+        raise CosimError("it runs away")
+
+    winner = law("coulomb", 1)
+    stage: Any = SimpleNamespace(winner=winner, fitted=[winner])
+    search = judge(without=fails, approached=None)
+    established.settle(search, SimpleNamespace(effects=("first",)), stage)  # type: ignore[arg-type]
+    assert stage.winner is winner
