@@ -171,14 +171,16 @@ def _alike(
     The laws come by their number of parameters.
     """
     winner = stage.winner
-    assert winner is not None
+    assert winner is not None and winner.signature is not None
     name = winner.effects[-1].effect
     near = nearly(search, base, stage) | stage.near  # residuals may count in another way since
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in stage.fitted
         if f is not winner and f.signature is not None and search.accepted(base, f)
         and f.effects[-1] in near
-        and (f.effects[-1].effect == name or more_general(winner, f))
+        and (f.effects[-1].effect == name or (
+            more_general(winner, f) and f.signature.probe.own <= winner.signature.probe.own
+        ))  # fitted with fewer parameters, a law that has more of them is no simpler one
     ]  # fmt: skip
     fitted = {f.effects[-1]: f for f in stage.fitted}
     found += [(t, None) for t in search.kin(base, stage) if t.candidate not in fitted]
