@@ -514,7 +514,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         while t < t1:
             left -= 1
             if left < 0:
-                raise ValueError(f"{MODEL}: too many solver steps from {v[0]:.9g} s on, at {t:.9g} s")
+                raise ValueError(
+                    f"{MODEL}: too many solver steps from {v[0]:.9g} s on, at {t:.9g} s"
+                )
             if h > largest:
                 h = largest
             last = t + h * (1 + 1e-9) >= t1
