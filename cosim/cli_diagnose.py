@@ -14,6 +14,7 @@ from rich.table import Table
 
 from .calibrate.mapping import read_problem
 from .diagnose import Diagnosis, diagnose
+from .diagnose.further import Further
 from .report import write_page
 
 
@@ -72,7 +73,27 @@ def _print(result: Diagnosis) -> None:
             *("-" if value is None else f"{value:.4g}" for value in cells),
         )  # fmt: skip
     console.print(table)
+    for item in result.further:
+        console.print(_spread(item), soft_wrap=True)
     console.print(f"in {result.files[-1].parent}", soft_wrap=True)
+
+
+def _spread(further: Further) -> str:
+    """How far runs of another system are from the noise, least and most over channels and runs."""
+    spans = []
+    for which in ("before", "after"):
+        sizes = [
+            size
+            for run in further.problem.runs
+            for column in range(len(further.problem.channels))
+            if (size := further.rms(which, column, run.name)) is not None
+        ]
+        spans.append(f"{min(sizes):.2f} to {max(sizes):.2f}" if sizes else "-")
+    runs = ", ".join(run.name for run in further.problem.runs)
+    return (
+        f"{runs} with {further.problem.file.path.stem}, residuals over the noise: "
+        f"before {spans[0]}, after {spans[1]}"
+    )
 
 
 def _value(name: str, entry: dict[str, Any]) -> str:

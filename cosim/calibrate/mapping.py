@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ KEYS = {
     "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
     "inputs", "starts", "channels", "parameter", "nuisance", "lead",
     "only", "run", "columns", "time", "ticks", "search_step", "search",
-    "resample", "relative", "base",
+    "resample", "relative", "base", "further",
 }  # fmt: skip
 _CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
             "window", "unit", "shift"}  # fmt: skip
@@ -130,7 +131,14 @@ def read_problem(
     else:
         path = Path(mapping) if mapping is not None else find_mapping(folder, "")
         data = _plain(folder, path)
-    return _Mapping(path, data, only or {}).problem(provider, system, workers)
+    problem = _Mapping(path, data, only or {}).problem(provider, system, workers)
+    problem.further = tuple(
+        partial(
+            read_problem, folder, provider, mapping=path.parent / name, workers=workers, only=only
+        )
+        for name in read_mapping(path).get("further", [])
+    )
+    return problem
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -138,7 +146,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
     table = read_toml(path)
     if "base" not in table:
         return table
-    return {**read_mapping(path.parent / str(table["base"])), **table}
+    return {**read_mapping(path.parent / str(table["base"])), "further": [], **table}
 
 
 def _plain(folder: Path, path: Path) -> DataSet:

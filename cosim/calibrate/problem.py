@@ -15,7 +15,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
@@ -67,6 +67,7 @@ class Problem:
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
         late: parameters of single runs that are held until `nuisance.released` estimates them.
         far: whether all residuals count in full, since nearly all are large (see `unstable`).
+        further: give runs of the data set that need another system; read when they are asked for.
         pool: sessions shared with problems that this one was made from.
 
     Attributes:
@@ -95,6 +96,7 @@ class Problem:
         relative: Sequence[Sequence[str]] = (),
         late: Sequence[Parameter] = (),
         far: bool = False,
+        further: Sequence[Callable[[], Problem]] = (),
         pool: Pool | None = None,
     ) -> None:
         self.ticks, self.search = ticks, search or Coarse(step)
@@ -103,6 +105,7 @@ class Problem:
         self.parameters, self.channels = tuple(parameters), tuple(channels)
         self.runs = tuple(runs)
         self.relative, self.late, self.far = tuple(relative), tuple(late), far
+        self.further = tuple(further)
         self.constants = dict(constants or {})
         self.step, self.algorithm, self.period = step, algorithm, period
         self.instances = dict(instances or file.instances)
@@ -368,7 +371,7 @@ class Problem:
             "constants": self.constants, "step": self.step, "algorithm": self.algorithm,
             "period": self.period, "instances": self.instances, "workers": self.workers,
             "ticks": self.ticks, "search": self.search, "relative": self.relative,
-            "late": self.late, "far": self.far, "pool": self._pool,
+            "late": self.late, "far": self.far, "further": self.further, "pool": self._pool,
             **changes,
         }  # fmt: skip
         return Problem(**arguments)

@@ -21,6 +21,7 @@ from .bursts import bursts, times
 from .deferred import step_error
 from .exchange import is_open, reconsidered
 from .experiment import propose
+from .further import Further, judged
 from .linear import Layout
 from .localise import Place, localise
 from .models import Fitted
@@ -52,6 +53,7 @@ class Diagnosis:
         experiment: proposed to separate rivals.
         ended: run -> time from which it does not count: what happens there hangs on small changes
             of start values (see `unstable`).
+        further: the models on runs that need another system.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
     """
@@ -70,6 +72,7 @@ class Diagnosis:
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
+    further: list[Further] = field(default_factory=list)
     bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
@@ -111,6 +114,7 @@ class Diagnosis:
             "power": self.power,
             "proposed_experiment": self.experiment,
             "channels": {},
+            "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
             "start_values": self.start_values(),
             "bursts": self.bursts,
@@ -299,6 +303,7 @@ def _searched(
         result.bursts = times(sudden, list(search.fitting.runs))
     result.after = current
     _judge(result, winners)
+    _look_further(result)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)
     result.wall = time.perf_counter() - begun
@@ -419,6 +424,21 @@ def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     for name, residual in problem.residuals(theta, None):
         result.residuals[which, name] = residual + errors[name] / problem.sigma
     problem.close()
+
+
+def _look_further(result: Diagnosis) -> None:
+    """Judge the models on runs that need another system."""
+    assert result.search is not None and result.before is not None and result.after is not None
+    for read in result.problem.further:
+        try:
+            problem = read()
+            if not problem.runs:
+                continue
+            result.search.say(f"further runs: {', '.join(run.name for run in problem.runs)}")
+            result.warnings += [str(finding) for finding in check_data(problem)]
+            result.further.append(judged(problem, result.problem, result.before, result.after))
+        except CosimError as error:  # they are an extra: the verdict stands without them
+            result.warnings.append(f"further runs are not judged: {error}")
 
 
 def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:

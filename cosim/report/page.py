@@ -64,6 +64,7 @@ def page(result: Diagnosis) -> str:
         *(f"<p class='over'>{escape(text)}</p>" for text in result.warnings),
         _effects(table["effects"]),
         _errors(result, table),
+        _further(table["further_runs"]),
         _parameters(table["parameters"]),
         _starts(table["start_values"]),
         _ended(table["unstable_from"]),
@@ -175,6 +176,23 @@ def _by_run(result: Diagnosis) -> str:
             cells.append(_td(text, "over" if pair[1] > 1.1 else ""))
         rows.append(cells)
     return "<p>By run, over the noise:</p>" + _table(["run", "purpose", *names], rows)
+
+
+def _further(found: list[dict[str, Any]]) -> str:
+    parts = []
+    for item in found:
+        rows = [
+            [_td(name), _td(row["unit"]), _td(_number(row["noise_rms"])),
+             *(_ratio(row[which], row["noise_rms"]) for which in ("before", "after"))]
+            for name, row in item["channels"].items()
+        ]  # fmt: skip
+        runs = escape(", ".join(item["runs"]))
+        parts.append(
+            f"<p>Runs {runs}, which need the system {escape(item['system'])}; nothing but their "
+            "start values was fitted to them:</p>"
+            + _table(["channel", "unit", "noise", "before", "after"], rows)
+        )
+    return "".join(parts)
 
 
 def _parameters(parameters: dict[str, Any]) -> str:

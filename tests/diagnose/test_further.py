@@ -1,0 +1,163 @@
+"""Runs that need another system are judged by the model that was found, and by nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cosim import library
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.parts import Parameter
+from cosim.calibrate.problem import Problem
+from cosim.cli_diagnose import _spread
+from cosim.diagnose.candidates import Candidate
+from cosim.diagnose.diagnosis import Diagnosis, _look_further
+from cosim.diagnose.further import carried, judged
+from cosim.errors import ScenarioError, VariantError
+from cosim.report.page import _further
+
+COULOMB = Candidate("load", "inertial_load", "coulomb", "flange")
+MAPPING = """base = "{base}"
+system = "{system}"
+only = {{ warm = {warm} }}
+further = {further}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two motor runs, one of which is `warm` and has a system file of its own."""
+    place = tmp_path_factory.mktemp("two")
+    bench = library.scenarios() / "motor_bench"
+    described = (bench / "data/MB-12/set.toml").read_text("utf-8")
+    parts = [p for p in described.split("[[run]]") if "run" not in p or "ST1" in p or "MX1" in p]
+    parts = [p + f"warm = {str('MX1' in p).lower()}\n" if "file" in p else p for p in parts]
+    (place / "set.toml").write_text("[[run]]".join(parts), "utf-8")
+    (place / "runs").mkdir()
+    for name in ("ST1", "MX1"):
+        source = bench / f"data/MB-12/runs/{name}.parquet"
+        (place / f"runs/{name}.parquet").write_bytes(source.read_bytes())
+    (place / "motor_bench.toml").write_bytes((bench / "data/motor_bench.toml").read_bytes())
+    system = (library.scenarios() / "systems/motor_bench.toml").read_text("utf-8")
+    (place / "warm_bench.toml").write_text(system, "utf-8")
+    base = (bench / "dataset.toml").as_posix()
+    (place / "dataset.toml").write_text(
+        MAPPING.format(base=base, system="motor_bench", warm="false", further='["warm.toml"]')
+    )
+    (place / "warm.toml").write_text(
+        MAPPING.format(base="dataset.toml", system="warm_bench.toml", warm="true", further="[]")
+        .replace("further = []\n", "")
+    )  # fmt: skip
+    return place
+
+
+@pytest.fixture(scope="module")
+def raw(folder: Path) -> Iterator[Problem]:
+    """The runs that the data set's own system describes."""
+    problem = read_problem(folder, workers=2)
+    yield problem
+    problem.close()
+
+
+def model(problem: Problem, **values: float) -> SimpleNamespace:
+    """A fitted model, as far as runs of another system need one."""
+    theta = problem.nominal.copy()
+    for name, value in values.items():
+        theta[[n.endswith(name) for n in problem.names].index(True)] = value
+    return SimpleNamespace(effects=(), problem=problem, estimate=SimpleNamespace(theta=theta))
+
+
+def test_other_runs_are_left_to_the_other_mapping(raw: Problem) -> None:
+    (read,) = raw.further
+    other = read()
+    assert [run.name for run in raw.runs] == ["ST1"]
+    assert [run.name for run in other.runs] == ["MX1"]
+    assert other.file.path.stem == "warm_bench"
+    assert other.further == ()  # not taken from the base
+    assert raw.only(["ST1"]).further == raw.further
+
+
+def test_the_model_that_was_found_is_what_judges(raw: Problem, folder: Path) -> None:
+    other = raw.further[0]()
+    before = model(raw, R_a=0.3)
+    after = model(COULOMB.added_to(raw), R_a=0.3, tau_c=0.4)
+    after.effects = (COULOMB,)
+    found = judged(other, raw, before, after)
+    direct = COULOMB.added_to(read_problem(folder, mapping=folder / "warm.toml"))
+    theta = model(direct, R_a=0.3, tau_c=0.4).estimate.theta
+    ((_, expected),) = direct.residuals(theta, None)
+    np.testing.assert_array_equal(found.residuals["after", "MX1"], expected)
+    assert np.nanmax(np.abs(found.residuals["before", "MX1"] - expected)) > 1.0
+    assert found.rms("after", 0) == pytest.approx(float(np.sqrt(np.nanmean(expected[:, 0] ** 2))))
+    row = found.to_dict()["channels"]["speed"]
+    assert row["after"] == pytest.approx(found.rms("after", 0) * row["noise_rms"])
+    page = _further([found.to_dict()])
+    assert "Runs MX1, which need the system warm_bench" in page and page.count("<tr>") == 5
+    assert _spread(found).startswith("MX1 with warm_bench, residuals over the noise: before ")
+    direct.close()
+
+
+def test_start_values_of_those_runs_are_estimated(raw: Problem) -> None:
+    other = raw.further[0]()
+    (run,) = other.runs
+    other = other.with_data({run.name: other.simulate(other.nominal, run)})
+    (run,) = other.runs
+    wrong = run.starts["encoder.theta"] + 0.05
+    moved = [replace(run, starts={**run.starts, "encoder.theta": wrong})]
+    own = Parameter(
+        "angle@MX1",
+        "rad",
+        wrong,
+        wrong - 0.2,
+        wrong + 0.2,
+        (("encoder.theta", 1.0),),
+        "nuisance",
+        "MX1",
+    )
+    held = other._with(runs=moved)
+    free = held.with_parameters([*other.parameters, own])
+    plain = model(raw)
+    first, second = judged(held, raw, plain, plain), judged(free, raw, plain, plain)
+    column = [c.name for c in other.channels].index("angle")
+    assert first.rms("before", column) > 5.0
+    assert second.rms("before", column) < 0.01
+    assert second.rms("after", column) == second.rms("before", column)
+
+
+def test_an_effect_on_another_instance_is_refused(raw: Problem) -> None:
+    other = raw.further[0]()
+    after = model(COULOMB.added_to(raw), tau_c=0.4)
+    after.effects = (COULOMB,)
+    changed = other._with(instances={**other.instances, "load": "inertial_load/free"})
+    with pytest.raises(
+        VariantError, match=r"coulomb at load\.flange was found on load = .*here it is"
+    ):
+        carried(changed, raw, after)
+
+
+def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
+    said: list[str] = []
+    before = model(raw)
+    search = SimpleNamespace(say=said.append)
+
+    def broken() -> Problem:
+        raise ScenarioError("warm.toml: there is no entry 'x'")
+
+    result = Diagnosis(replace_further(raw, broken), "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    _look_further(result)
+    assert result.further == []
+    assert result.warnings == ["further runs are not judged: warm.toml: there is no entry 'x'"]
+    result = Diagnosis(raw, "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    _look_further(result)
+    assert [run.name for run in result.further[0].problem.runs] == ["MX1"]
+    assert said == ["further runs: MX1"]
+
+
+def replace_further(problem: Problem, read: object) -> Problem:
+    """The problem with other further runs."""
+    return problem._with(further=(read,))
