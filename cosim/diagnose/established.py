@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import CosimError
+from .exchange import challenged
 from .models import GATE, Fitted, compare
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ def settle(search: Search, base: Fitted, stage: Round) -> None:
             f"{winner.effects[-1].label}: nothing of it but {simple.effects[-1].effect} shows"
         )
         stage.winner = simple
-        search.follow(stage, search.sharpened(simple, base))
+        challenged(search, base, stage)  # its places have been compared by the other law only
+        search.follow(stage, search.sharpened(stage.winner, base))
     if base.effects and search.raw.unstable:
         _needed(search, base, stage)
 

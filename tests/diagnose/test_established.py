@@ -51,12 +51,19 @@ def judge(**more: Any) -> Any:
     ],
 )
 def test_a_law_of_which_only_a_simpler_one_shows_is_that(
-    others: tuple[str, ...], known: bool, named: str
+    others: tuple[str, ...], known: bool, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """And its places are compared: other ones were fitted with the other law."""
+    compared: list[str] = []
+    monkeypatch.setattr(
+        established, "challenged",
+        lambda search, base, stage: compared.append(stage.winner.effects[-1].effect),
+    )  # fmt: skip
     winner = law("bristle", 3, known=known)
     stage: Any = SimpleNamespace(winner=winner, fitted=[winner, *(law(n, 1) for n in others)])
     established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
     assert stage.winner.effects[-1].effect == named
+    assert compared == [named] * (named == "coulomb")
 
 
 def without(gain: float, left: float, unused: float, monkeypatch: pytest.MonkeyPatch) -> Any:
