@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
 from ..calibrate.validate import Finding, check_data, check_model
-from ..errors import CosimError
+from ..errors import CosimError, ScenarioError
 from ..provider import locate
 from ..variants import apply
 from .bursts import bursts, times
@@ -435,7 +435,9 @@ def _look_further(result: Diagnosis) -> None:
             if not problem.runs:
                 continue
             result.search.say(f"further runs: {', '.join(run.name for run in problem.runs)}")
-            result.warnings += [str(finding) for finding in check_data(problem)]
+            wrong = [f for f in check_data(problem) if f.run and f.severity == "error"]
+            if wrong:
+                raise ScenarioError("; ".join(map(str, wrong)))
             result.further.append(judged(problem, result.problem, result.before, result.after))
         except CosimError as error:  # they are an extra: the verdict stands without them
             result.warnings.append(f"further runs are not judged: {error}")

@@ -156,6 +156,17 @@ def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
     _look_further(result)
     assert [run.name for run in result.further[0].problem.runs] == ["MX1"]
     assert said == ["further runs: MX1"]
+    assert result.warnings == []
+
+    def frozen() -> Problem:
+        other = raw.further[0]()
+        stuck = {run.name: np.where(np.isnan(run.data), np.nan, 0.5) for run in other.runs}
+        return other.with_data(stuck)
+
+    result = Diagnosis(replace_further(raw, frozen), "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    _look_further(result)
+    assert result.further == []
+    assert "further runs are not judged: error: run MX1 speed:" in result.warnings[0]
 
 
 def replace_further(problem: Problem, read: object) -> Problem:
