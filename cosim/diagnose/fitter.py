@@ -14,11 +14,10 @@ from ..calibrate.estimate import Estimate
 from ..calibrate.fit import QUICKLY, Known, fit
 from ..calibrate.loss import loss_for
 from ..calibrate.normal import cost_of
-from ..calibrate.nuisance import late_estimated, released, settled, slopes
+from ..calibrate.nuisance import settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.problem import Problem
-from ..calibrate.staged import jointly, staged
-from ..errors import CosimError, FmuCallError
+from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .deferred import corrected, step_error
 from .exchange import absent, is_open
@@ -27,7 +26,6 @@ from .linear import Absorber, Layout
 from .models import GATE, Fitted, compare
 from .secant import FLOOR, patience
 from .signature import Signature
-from .unstable import ended
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -40,14 +38,9 @@ EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
 DOUBLINGS = 6
 """Times at most that a strength to begin with is doubled."""
-RELEASES, PAYS = 4, 0.01
-"""Times at most that late values and all others are estimated in turn, and the share of what a
-model leaves beyond noise that another turn must remove."""
 AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
-WORTH = 0.05
-"""Late values are kept if they remove this share of what a model leaves beyond noise."""
 
 
 class Fitter(Judge):
@@ -153,26 +146,6 @@ class Fitter(Judge):
         if root is not None:
             matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
-
-    def shortened(self, fitted: Fitted, sizes: Mapping[str, int]) -> Fitted:
-        """Judge by runs that end after so many samples from now on.
-
-        Args:
-            fitted: a model; it is fitted again where the rest holds more than noise.
-            sizes: samples by run.
-
-        Returns:
-            The model, judged by the rest.
-        """
-        self._measured(ended(self.raw, sizes))
-        self._own = None
-        problem, theta = ended(fitted.problem, sizes), fitted.estimate.theta
-        found = self.judged(fit(problem, theta, limit=0, robust=False))
-        if self.lacking(found):
-            found = self.judged(fit(problem, theta, near=True))
-        found.effects, found.signature = fitted.effects, fitted.signature
-        found.gate, found.p_value = fitted.gate, fitted.p_value
-        return found
 
     def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.
@@ -321,52 +294,6 @@ class Fitter(Judge):
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
         return self.again(found, winner, base)
-
-    def released(self, winner: Fitted, base: Fitted) -> Fitted:
-        """The model with late values of the runs (start angles of casters) estimated, if it helps.
-
-        The effect may be what makes them matter: dry friction keeps casters where they were.
-        """
-        if not self.raw.late:
-            return winner
-        least = PAYS if late_estimated(winner.problem) else WORTH
-        for _ in range(RELEASES):
-            if not self.lacking(winner):
-                break
-            theta = winner.estimate.theta
-            beyond = winner.estimate.robust - 0.5 * winner.estimate.count
-            try:
-                problem = corrected(winner.problem, theta, self.raw)
-                problem.limits = limits = patience(winner.problem)
-                problem, values, fall = released(problem, theta)
-                if fall < least * beyond:
-                    break
-                self.say(f"start values of the runs estimated: {fall:.0f} nats")
-                problem.limits = limits
-                if not late_estimated(winner.problem):
-                    problem, values = staged(problem, values)
-                found = self._with_late(problem, values)
-            except CosimError as error:
-                self.say(f"start values of the runs could not be estimated: {error}")
-                break
-            gain = self.gain(winner, found)
-            if gain <= 0.0:
-                break
-            self.say(f"fitted with them: {gain:.0f} nats")
-            winner = self.again(found, winner, base)
-            if gain < PAYS * beyond:
-                break
-            least = PAYS
-        return winner
-
-    def _with_late(self, problem: Problem, theta: Vector) -> Fitted:
-        """A model fitted together with late values; beside them, if that cannot be simulated."""
-        try:
-            held, values, known = jointly(problem, theta)
-        except FmuCallError as error:
-            self.say(f"start values of the runs are held: {error}")
-            return self.judged(fit(problem, theta, near=True, draft=True))
-        return self.judged(fit(held, values, known=known))
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.

@@ -19,8 +19,9 @@ from .candidates import Candidate, balances, candidates
 from .deferred import corrected
 from .established import settle
 from .exchange import challenged, is_open, nearly
-from .fitter import Fitter, Say
+from .fitter import Say
 from .judge import ALIKE
+from .late import LateFitter
 from .linear import MATERIAL, Layout, holm
 from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
 from .probes import Probe, batches
@@ -96,7 +97,7 @@ class Round:
     near: frozenset[Candidate] = frozenset()
 
 
-class Search(Fitter):
+class Search(LateFitter):
     """Attribution on one problem.
 
     Args:

@@ -108,18 +108,50 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
         raise CosimError("unstable")
 
     problem = SimpleNamespace(costs={}, runs=(), late=())
-    monkeypatch.setattr("cosim.diagnose.fitter.corrected", lambda *_: problem)
-    monkeypatch.setattr("cosim.diagnose.fitter.released", fail)
+    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: problem)
+    monkeypatch.setattr("cosim.diagnose.late.released", fail)
     estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
     winner: Any = SimpleNamespace(problem=problem, estimate=estimate)
     said: list[str] = []
     search: Any = SimpleNamespace(
-        raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append
+        raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append, _settled=None
     )
     assert Search.released(search, winner, winner) is winner
     assert said == ["start values of the runs could not be estimated: unstable"]
     search.raw.late = ()
     assert Search.released(search, winner, winner) is winner and len(said) == 1
+
+
+@pytest.mark.parametrize(("alone", "kept"), [(3.0, True), (12.0, False)])
+def test_start_values_stay_where_a_joint_fit_loses_them(
+    alone: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what has been tried in vain is not tried again."""
+
+    def model(cost: float) -> Any:
+        estimate = SimpleNamespace(theta=None, robust=cost, count=2)
+        return SimpleNamespace(problem=problem, estimate=estimate)
+
+    problem = SimpleNamespace(costs={}, runs=(), late=(), limits={})
+    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: problem)
+    monkeypatch.setattr("cosim.diagnose.late.released", lambda *_: (problem, None, 5.0))
+    monkeypatch.setattr("cosim.diagnose.late.late_estimated", lambda _: True)
+    monkeypatch.setattr("cosim.diagnose.late.patience", lambda _: {})
+    said: list[str] = []
+    search: Any = SimpleNamespace(
+        raw=SimpleNamespace(late=(1,)), lacking=lambda f: f.estimate.robust > 4.0, say=said.append,
+        gain=lambda first, second: first.estimate.robust - second.estimate.robust, _settled=None,
+        _with_late=lambda *_: model(11.0), fitted=lambda *_: model(alone),
+        again=lambda found, *_: found,
+    )  # fmt: skip
+    winner = model(9.0)
+    found = Search.released(search, winner, winner)
+    assert (found is not winner) == kept
+    assert said == ["start values of the runs estimated: 5 nats"] + kept * [
+        "with them and hardly another change: 6 nats"
+    ]
+    assert Search.released(search, found, winner) is found
+    assert len(said) == 1 + kept
 
 
 def test_a_law_more_general_than_a_rival_is_none() -> None:

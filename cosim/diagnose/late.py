@@ -1,0 +1,106 @@
+"""Fits of models whose runs begin with values that matter only once an effect is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.estimate import Estimate
+from ..calibrate.fit import fit
+from ..calibrate.nuisance import late_estimated, released
+from ..calibrate.problem import Problem
+from ..calibrate.staged import jointly, staged
+from ..errors import CosimError, FmuCallError
+from .deferred import corrected
+from .fitter import Fitter
+from .models import Fitted
+from .secant import patience
+from .unstable import ended
+
+Vector = NDArray[np.float64]
+RELEASES, PAYS = 4, 0.01
+"""Times at most that late values and all others are estimated in turn, and the share of what a
+model leaves beyond noise that another turn must remove."""
+WORTH = 0.05
+"""Late values are kept if they remove this share of what a model leaves beyond noise."""
+
+
+class LateFitter(Fitter):
+    """Fits models with late values (start angles of casters)."""
+
+    _settled: Estimate | None = None
+    """Fit whose late values have been estimated: once more would bring as little."""
+
+    def released(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model with late values of the runs (start angles of casters) estimated, if it helps.
+
+        The effect may be what makes them matter: dry friction keeps casters where they were.
+        """
+        if not self.raw.late or winner.estimate is self._settled:
+            return winner
+        least = PAYS if late_estimated(winner.problem) else WORTH
+        for _ in range(RELEASES):
+            if not self.lacking(winner):
+                break
+            theta = winner.estimate.theta
+            beyond = winner.estimate.robust - 0.5 * winner.estimate.count
+            try:
+                problem = corrected(winner.problem, theta, self.raw)
+                problem.limits = limits = patience(winner.problem)
+                problem, values, fall = released(problem, theta)
+                if fall < least * beyond:
+                    break
+                self.say(f"start values of the runs estimated: {fall:.0f} nats")
+                problem.limits = limits
+                if not late_estimated(winner.problem):
+                    problem, values = staged(problem, values)
+                found = self._with_late(problem, values)
+            except CosimError as error:
+                self.say(f"start values of the runs could not be estimated: {error}")
+                break
+            gain = self.gain(winner, found)
+            if gain > 0.0:
+                self.say(f"fitted with them: {gain:.0f} nats")
+            else:  # where runs are unstable a joint step may lose what start values had gained
+                found = self.fitted(problem, values, winner.estimate)
+                gain = self.gain(winner, found)
+                if gain <= 0.0:
+                    break
+                self.say(f"with them and hardly another change: {gain:.0f} nats")
+            winner = self.again(found, winner, base)
+            if gain < PAYS * beyond:
+                break
+            least = PAYS
+        self._settled = winner.estimate
+        return winner
+
+    def _with_late(self, problem: Problem, theta: Vector) -> Fitted:
+        """A model fitted together with late values; beside them, if that cannot be simulated."""
+        try:
+            held, values, known = jointly(problem, theta)
+        except FmuCallError as error:
+            self.say(f"start values of the runs are held: {error}")
+            return self.judged(fit(problem, theta, near=True, draft=True))
+        return self.judged(fit(held, values, known=known))
+
+    def shortened(self, fitted: Fitted, sizes: Mapping[str, int]) -> Fitted:
+        """Judge by runs that end after so many samples from now on.
+
+        Args:
+            fitted: a model; it is fitted again where the rest holds more than noise.
+            sizes: samples by run.
+
+        Returns:
+            The model, judged by the rest.
+        """
+        self._measured(ended(self.raw, sizes))
+        self._own = None
+        problem, theta = ended(fitted.problem, sizes), fitted.estimate.theta
+        found = self.judged(fit(problem, theta, limit=0, robust=False))
+        if self.lacking(found):
+            found = self.judged(fit(problem, theta, near=True))
+        found.effects, found.signature = fitted.effects, fitted.signature
+        found.gate, found.p_value = fitted.gate, fitted.p_value
+        return found
