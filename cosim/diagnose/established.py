@@ -24,25 +24,22 @@ unstable: moments that come too early are most of that, and any law moves them a
 
 
 def settle(search: Search, base: Fitted, stage: Round) -> None:
-    """Replace a winner by a simpler law, or take it back, where it is not established.
+    """Replace a winner by a simpler law where nothing else of it is determined.
 
     Args:
         search: fits and judges.
         base: model without the effect.
-        stage: the round; it has no winner, and perhaps a better base, if nothing is established.
+        stage: the round; its winner has intervals.
     """
     winner = stage.winner
     assert winner is not None
     simple = _simpler(search, base, stage)
-    if simple is not winner:
-        search.say(
-            f"{winner.effects[-1].label}: nothing of it but {simple.effects[-1].effect} shows"
-        )
-        stage.winner = simple
-        challenged(search, base, stage)  # its places have been compared by the other law only
-        search.follow(stage, search.sharpened(stage.winner, base))
-    if base.effects and search.raw.unstable:
-        _needed(search, base, stage)
+    if simple is winner:
+        return
+    search.say(f"{winner.effects[-1].label}: nothing of it but {simple.effects[-1].effect} shows")
+    stage.winner = simple
+    challenged(search, base, stage)  # its places have been compared by the other law only
+    search.follow(stage, search.sharpened(stage.winner, base))
 
 
 def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
@@ -70,10 +67,20 @@ def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
     return max(laws, key=lambda f: search.total(base, f), default=winner)
 
 
-def _needed(search: Search, base: Fitted, stage: Round) -> None:
-    """Take a further effect back that the model from where it ended does as well without."""
+def needed(search: Search, base: Fitted, stage: Round) -> None:
+    """Take a further effect back that the model from where it ended does as well without.
+
+    Only where runs may turn unstable. The round then has no winner, and perhaps a better base.
+
+    Args:
+        search: fits and judges.
+        base: model without the effect.
+        stage: the round.
+    """
     winner = stage.winner
     assert winner is not None
+    if not base.effects or not search.raw.unstable:
+        return
     last = winner.effects[-1]
     try:
         less = search.approached(search.without(winner, last), winner, base)

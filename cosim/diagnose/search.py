@@ -17,7 +17,7 @@ from ..provider import locate
 from ..variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
-from .established import settle
+from .established import needed, settle
 from .exchange import challenged, is_open, nearly
 from .fitter import Say
 from .judge import ALIKE
@@ -321,10 +321,12 @@ class Search(LateFitter):
             return current
         if not current.open:
             challenged(self, base, current)
-            self.follow(current, self.sharpened(self.released(current.winner, base), base))
-            settle(self, base, current)
+            self.follow(current, self.released(current.winner, base))
+            needed(self, base, current)
             if current.winner is None:
                 return current
+            self.follow(current, self.sharpened(current.winner, base))
+            settle(self, base, current)
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(current.winner, wanted)
             mine = self.total(base, current.winner)

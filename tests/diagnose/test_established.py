@@ -88,7 +88,7 @@ def without(gain: float, left: float, unused: float, monkeypatch: pytest.MonkeyP
         gain=lambda first, second: gain if first is less else 5000.0, check_data=0, checking=0,
     )  # fmt: skip
     stage: Any = SimpleNamespace(winner=winner, fitted=[winner], base=base)
-    established.settle(search, base, stage)  # type: ignore[arg-type]
+    established.needed(search, base, stage)  # type: ignore[arg-type]
     return stage, winner, base, less
 
 
@@ -114,5 +114,15 @@ def test_one_without_which_nothing_can_be_simulated_stays(monkeypatch: pytest.Mo
     winner = law("coulomb", 1)
     stage: Any = SimpleNamespace(winner=winner, fitted=[winner])
     search = judge(without=fails, approached=None)
-    established.settle(search, SimpleNamespace(effects=("first",)), stage)  # type: ignore[arg-type]
+    established.needed(search, SimpleNamespace(effects=("first",)), stage)  # type: ignore[arg-type]
     assert stage.winner is winner
+
+
+@pytest.mark.parametrize(("effects", "unstable"), [((), True), (("first",), False)])
+def test_first_effects_and_calm_systems_are_not_asked(
+    effects: tuple[str, ...], unstable: bool
+) -> None:
+    stage: Any = SimpleNamespace(winner=law("coulomb", 1))
+    search = SimpleNamespace(raw=SimpleNamespace(unstable=unstable))  # fits nothing
+    established.needed(search, SimpleNamespace(effects=effects), stage)  # type: ignore[arg-type]
+    assert stage.winner is not None
