@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -95,6 +95,40 @@ class Round:
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0
     near: frozenset[Candidate] = frozenset()
+
+
+def groups_of(
+    chosen: Sequence[Signature],
+    able: Sequence[Signature],
+    single: Container[tuple[str, str]],
+    least: float,
+) -> list[Signature]:
+    """Of what acts alike on a whole group, those of which members are refitted.
+
+    What one caster explains by far too much friction, all of them may explain by a little: to
+    first order both look alike, and the member's gain says nothing against its group.
+
+    Args:
+        chosen: candidates that are refitted.
+        able: candidates that may be.
+        single: instances and ports of balances; others are groups of them.
+        least: gain below which a group is no rival.
+    """
+
+    def kind(s: Signature) -> tuple[str, str, str]:
+        return s.candidate.effect, s.candidate.instance, s.candidate.port.rpartition(".")[2]
+
+    members = {kind(s) for s in chosen if (s.candidate.instance, s.candidate.port) in single}
+    known = {s.candidate.label for s in chosen}
+    groups = [
+        s
+        for s in able
+        if s.candidate.label not in known
+        and (s.candidate.instance, s.candidate.port) not in single
+        and kind(s) in members
+        and s.score.gain > least
+    ]
+    return groups[:WHOLES]
 
 
 class Search(LateFitter):
@@ -269,6 +303,7 @@ class Search(LateFitter):
                 s for s in able
                 if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
             ][:EXTRA]  # fmt: skip
+            chosen += groups_of(chosen, able, single, SHARED * best)
         return sorted(chosen, key=lambda s: -s.score.gain)
 
     def round(self, base: Fitted) -> Round:

@@ -26,8 +26,10 @@ def near(mean_square: float = 1.0) -> Any:
     )
 
 
-def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Labels that are refitted, of `effect at instance.port` -> gain, all of them significant."""
+def chosen(
+    gains: dict[str, float], monkeypatch: pytest.MonkeyPatch, doubtful: tuple[str, ...] = ()
+) -> list[str]:
+    """Labels that are refitted, of `effect at instance.port` -> gain, all significant but some."""
     monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: MEMBERS)
     signatures = []
     for label, gain in sorted(gains.items(), key=lambda item: -item[1]):
@@ -39,7 +41,9 @@ def chosen(gains: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[str
             SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
         )
     round_: Any = SimpleNamespace(
-        signatures=signatures, corrected=dict.fromkeys(gains, 0.0), base=near()
+        signatures=signatures,
+        corrected={label: float(label in doubtful) for label in gains},
+        base=near(),
     )
     search: Any = SimpleNamespace(
         fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: True
@@ -67,6 +71,16 @@ def test_two_members_of_a_group_are_enough_for_one_effect(monkeypatch: pytest.Mo
     assert [label.partition(" at ")[2] for label in chosen(gains, monkeypatch)][2:] == [
         "arm.joint_1", "arm.joint_2", "arm.joint_3", "base.caster.swivel"
     ]  # fmt: skip
+
+
+def test_a_group_of_which_members_are_refitted_needs_no_significance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    groups = tuple(f"{effect} at base.caster.swivel" for effect in ("coulomb", "stribeck"))
+    gains = {f"coulomb at {i}.{port}": 100.0 for i, port in MEMBERS}
+    gains |= dict.fromkeys(groups, 80.0)
+    assert chosen(gains, monkeypatch, groups)[2:] == [groups[0]]
+    assert groups[0] not in chosen({**gains, groups[0]: 40.0}, monkeypatch, groups)
 
 
 def test_a_group_that_gains_little_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
