@@ -77,7 +77,8 @@ def jacobian(
         gap = np.where(np.isfinite(run.data), 0.0, np.nan)
         mine = owned[run.name]
         values = np.empty((*run.data.shape, len(mine)))
-        rough = np.zeros_like(values)
+        both = any(low and high for low, high in (sides[i] for i in mine))
+        rough = np.zeros_like(values) if both else None
         for place, i in enumerate(mine):
             (low, first), (high, second) = (
                 found[run.name, i if change else -1, change] for change in sides[i]
@@ -85,7 +86,7 @@ def jacobian(
             if low == high:  # one of both sides cannot be simulated
                 low, first = found[run.name, -1, 0.0]
             values[:, :, place] = (second - first) / (high - low) / problem.sigma + gap
-            if low and high:
+            if rough is not None and low and high:
                 bend = first + second - 2.0 * found[run.name, -1, 0.0][1]
                 rough[:, :, place] = bend / (high - low) / problem.sigma + gap
         output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))

@@ -99,17 +99,22 @@ class Known:
         found = []
         for run in runs:
             columns = problem.columns(run.name)
+            place = self.place.get(run.name, {})
+            mine = [names[i] for i in columns.tolist()]
+            here = [k for k, name in enumerate(mine) if name in place]
             values = np.empty((*run.data.shape, columns.size))
-            rough = np.zeros_like(values)
-            for k, i in enumerate(columns.tolist()):
-                if names[i] in self.place.get(run.name, {}):
-                    old, at = self.runs[run.name], self.place[run.name][names[i]]
-                    values[:, :, k] = old.values[:, :, at]
-                    rough[:, :, k] = old.roughness[:, :, at]
-                else:
-                    item = fresh[run.name]
-                    at = item.columns.tolist().index(i)
-                    values[:, :, k] = item.values[:, :, at]
+            rough = None
+            if here:
+                old, at = self.runs[run.name], [place[mine[k]] for k in here]
+                values[:, :, here] = old.values[:, :, at]
+                if old.roughness is not None:
+                    rough = np.zeros_like(values)
+                    rough[:, :, here] = old.roughness[:, :, at]
+            if len(here) < len(mine):
+                item = fresh[run.name]
+                own = {i: k for k, i in enumerate(item.columns.tolist())}
+                there = [k for k, name in enumerate(mine) if name not in place]
+                values[:, :, there] = item.values[:, :, [own[int(columns[k])] for k in there]]
             found.append(Sensitivity(run.name, columns, values, rough))
         return found
 

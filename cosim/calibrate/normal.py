@@ -57,12 +57,15 @@ class Normal:
             good = np.isfinite(residual) & np.isfinite(derivative).all(axis=2)
             errors = np.where(good, residual, 0.0)
             factor = np.where(good, loss.weight(residual), 0.0)
-            derivative = np.where(good[:, :, None], derivative, 0.0)
+            derivative[~good] = 0.0
             flat = derivative.reshape(-1, columns.size)
             matrix = (flat * factor.reshape(-1, 1)).T @ flat
-            bend = np.where(good[:, :, None], item.roughness * scale[columns], 0.0)
-            bend = bend.reshape(-1, columns.size)
-            reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
+            reliable, share = matrix, None
+            if item.roughness is not None:
+                bend = item.roughness * scale[columns]
+                bend[~good] = 0.0
+                bend = bend.reshape(-1, columns.size)
+                reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
             if share is not None:
                 self.rough += [name] * bool(np.trace(reliable) < 0.99 * np.trace(matrix))
             if name not in self.rough:

@@ -114,15 +114,15 @@ class Channel:
     window: float = 0.0
     shift: float = 0.0
 
-    def of(self, times: Vector, recorded: Vector, values: Vector) -> Vector:
-        """What the channel would read at `times`."""
-        times = times + self.shift
+    def of(self, sampler: Sampler, values: Vector) -> Vector:
+        """What the channel would read, of a signal that was recorded at the sampler's times."""
         if self.transform == "sample":
-            result = _at(times, recorded, values)
+            result = sampler.at(self.shift, values)
         elif self.transform == "difference":
-            before = _at(times - self.window, recorded, values)
-            result = (_at(times, recorded, values) - before) / self.window
+            before = sampler.at(self.shift - self.window, values)
+            result = (sampler.at(self.shift, values) - before) / self.window
         else:
+            times, recorded = sampler.times + self.shift, sampler.recorded
             steps = np.diff(recorded) * 0.5 * (values[1:] + values[:-1])
             integral = np.concatenate([[0.0], np.cumsum(steps)])
             first = np.maximum(times - self.window, recorded[0])
@@ -132,18 +132,47 @@ class Channel:
         return np.asarray(self.gain * result + self.offset, dtype=np.float64)
 
 
-def _at(times: Vector, recorded: Vector, values: Vector) -> Vector:
-    if times.shape == recorded.shape:
-        interval = recorded[1] - recorded[0] if recorded.size > 1 else 1.0
-        if np.max(np.abs(times - recorded)) <= COINCIDENT * interval:
-            return values
-    if recorded.size > 1:
-        interval = recorded[1] - recorded[0]
-        index = np.clip(np.rint((times - recorded[0]) / interval).astype(np.intp), 0, None)
-        index = np.minimum(index, recorded.size - 1)
-        if np.max(np.abs(times - recorded[index])) <= COINCIDENT * interval:
-            return np.asarray(values[index], dtype=np.float64)
-    return np.asarray(np.interp(times, recorded, values), dtype=np.float64)
+class Sampler:
+    """Reads recorded signals at the sample times of a run.
+
+    Places are sought once for all channels that are read at the same shift.
+
+    Args:
+        times: at which sensors sample [s].
+        recorded: at which the signals were recorded [s], rising.
+    """
+
+    def __init__(self, times: Vector, recorded: Vector) -> None:
+        self.times, self.recorded = times, recorded
+        self._places: dict[float, tuple[NDArray[np.intp], Vector | None]] = {}
+
+    def at(self, shift: float, values: Vector) -> Vector:
+        """Values at the sample times plus a shift [s], between recorded ones on straight lines."""
+        place, past = self._places.get(shift) or self._sought(shift)
+        if past is None:
+            return np.asarray(values[place], dtype=np.float64)
+        first = values[place]
+        slope = (values[place + 1] - first) / (self.recorded[place + 1] - self.recorded[place])
+        return np.asarray(slope * past + first, dtype=np.float64)
+
+    def _sought(self, shift: float) -> tuple[NDArray[np.intp], Vector | None]:
+        """Recorded times at or before the sample times, and how far behind these are.
+
+        Where all coincide, None is behind.
+        """
+        times, recorded = self.times + shift, self.recorded
+        last = recorded.size - 1
+        interval = recorded[1] - recorded[0] if last else 1.0
+        found: tuple[NDArray[np.intp], Vector | None]
+        nearest = np.rint((times - recorded[0]) / interval).astype(np.intp).clip(0, last)
+        if not last or np.max(np.abs(times - recorded[nearest])) <= COINCIDENT * interval:
+            found = nearest, None
+        else:
+            held = times.clip(recorded[0], recorded[-1])
+            before = (np.searchsorted(recorded, held, "right") - 1).clip(0, last - 1)
+            found = before, held - recorded[before]
+        self._places[shift] = found
+        return found
 
 
 @dataclass(frozen=True)
@@ -180,14 +209,14 @@ class Sensitivity(NamedTuple):
         run: its name.
         columns: indices of the parameters that concern it.
         values: (samples, channels, columns); NaN where nothing was measured.
-        roughness: half the difference between the derivatives on both sides, where both were
-            taken, else zeros; large where the model jumps.
+        roughness: half the difference between the derivatives on both sides, zeros where one was
+            taken, None where all are such; large where the model jumps.
     """
 
     run: str
     columns: NDArray[np.intp]
     values: Vector
-    roughness: Vector
+    roughness: Vector | None
 
 
 def free_parameter(variable: Variable, name: str, target: str, *, strength: bool) -> Parameter:

@@ -38,6 +38,7 @@ from .parts import (
     Coarse,
     Parameter,
     Run,
+    Sampler,
     Sensitivity,
     adjustable,
     free_parameter,
@@ -312,9 +313,8 @@ class Problem:
             self.costs[run.name] = time.thread_time() - begun
         self._pool.give(key, session, run.inputs)
         place = {name: column for column, name in enumerate(session.names)}
-        read = np.column_stack(
-            [c.of(run.times, times, rows[:, place[c.signal]]) for c in self.channels]
-        )
+        sampler = Sampler(run.times, times)
+        read = np.column_stack([c.of(sampler, rows[:, place[c.signal]]) for c in self.channels])
         for names in self.relative:
             pose = [[c.name for c in self.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..calibrate.problem import Problem
 from ..calibrate.validate import Finding, check_data, check_model
@@ -247,7 +248,9 @@ def diagnose(
     search = Search(problem, say)
     search.prepare()
     try:
-        return _searched(search, findings, out, say, begun)
+        # threads of BLAS wait in loops, at the cost of simulations
+        with threadpool_limits(1, user_api="blas"):
+            return _searched(search, findings, out, say, begun)
     finally:
         search.close()
 
