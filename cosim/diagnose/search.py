@@ -105,8 +105,8 @@ def groups_of(
 ) -> list[Signature]:
     """Of what acts alike on a whole group, those of which members are refitted.
 
-    What one caster explains by far too much friction, all of them may explain by a little: to
-    first order both look alike, and the member's gain says nothing against its group.
+    What one caster explains by far too much friction, all of them may explain by a little: where
+    casters turn over, first orders do not tell which gains more.
 
     Args:
         chosen: candidates that are refitted.
@@ -303,7 +303,7 @@ class Search(LateFitter):
                 s for s in able
                 if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
             ][:EXTRA]  # fmt: skip
-            chosen += groups_of(chosen, able, single, SHARED * best)
+            chosen += groups_of(chosen, able, single, PART * best)
         return sorted(chosen, key=lambda s: -s.score.gain)
 
     def round(self, base: Fitted) -> Round:
