@@ -38,6 +38,8 @@ EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
 DOUBLINGS = 6
 """Times at most that a strength to begin with is doubled."""
+SHARP = 0.01
+"""Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
 AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
@@ -168,9 +170,11 @@ class Fitter(Judge):
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
         held = [p for p in others if p.name != item.probe.second]
-        if held:
-            problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
-        problem.limits = patience(base.problem)
+        fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in held}
+        sharp = {p.name: max(SHARP * fixed[p.name], p.minimum) for p in held if p.minimum > 0.0}
+        smooth = problem.hold({n: v for n, v in fixed.items() if n not in sharp})
+        problem = problem.hold(fixed)
+        problem.limits = smooth.limits = patience(base.problem)
         root = self.fitting.root(self.fit_data - base.fit)
         absorber = self.absorber(base, self.fitting, root)
         residual = root * (self.fit_data - base.fit - item.score.amplitude * item.change)
@@ -206,7 +210,34 @@ class Fitter(Judge):
             return None
         result.effects = (*base.effects, item.candidate)
         result.signature = item
+        if sharp and self.raw.unstable and is_open(base.estimate):
+            return self._sharper(result, smooth, sharp)
         return result
+
+    def _sharper(self, fitted: Fitted, smooth: Problem, sharp: dict[str, float]) -> Fitted:
+        """The model with a law that sticks more nearly, if it fits better from here.
+
+        A law that smooths a sign creeps at rest. Where it holds casters, all parameters make up for
+        that, and derivatives do not lead to where it hardly creeps.
+
+        Args:
+            fitted: the model.
+            smooth: its problem with the law's smoothing free.
+            sharp: values to hold that at.
+        """
+        problem = smooth.hold(sharp)
+        problem.limits = smooth.limits
+        try:
+            trial = self.fitted(problem, fitted.estimate.theta, fitted.estimate)
+        except CosimError as error:
+            self.say(f"{fitted.effects[-1].label} with {sharp}: {error}")
+            return fitted
+        if not trial.estimate.robust < fitted.estimate.robust - GATE:
+            return fitted
+        assert fitted.signature is not None
+        trial.effects = fitted.effects
+        trial.signature = replace(fitted.signature, fixed={**fitted.signature.fixed, **sharp})
+        return trial
 
     def _doubled(self, problem: Problem, theta: Vector, cost: float, name: str) -> Vector:
         """A place to begin with a larger strength, as long as that is better.
