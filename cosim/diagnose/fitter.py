@@ -170,11 +170,9 @@ class Fitter(Judge):
                  for p in problem.parameters]  # fmt: skip
         problem = problem.with_parameters(moved)
         held = [p for p in others if p.name != item.probe.second]
-        fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in held}
-        sharp = {p.name: max(SHARP * fixed[p.name], p.minimum) for p in held if p.minimum > 0.0}
-        smooth = problem.hold({n: v for n, v in fixed.items() if n not in sharp})
-        problem = problem.hold(fixed)
-        problem.limits = smooth.limits = patience(base.problem)
+        if held:
+            problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
+        problem.limits = patience(base.problem)
         root = self.fitting.root(self.fit_data - base.fit)
         absorber = self.absorber(base, self.fitting, root)
         residual = root * (self.fit_data - base.fit - item.score.amplitude * item.change)
@@ -210,34 +208,7 @@ class Fitter(Judge):
             return None
         result.effects = (*base.effects, item.candidate)
         result.signature = item
-        if sharp and self.raw.unstable and is_open(base.estimate):
-            return self._sharper(result, smooth, sharp)
         return result
-
-    def _sharper(self, fitted: Fitted, smooth: Problem, sharp: dict[str, float]) -> Fitted:
-        """The model with a law that sticks more nearly, if it fits better from here.
-
-        A law that smooths a sign creeps at rest. Where it holds casters, all parameters make up for
-        that, and derivatives do not lead to where it hardly creeps.
-
-        Args:
-            fitted: the model.
-            smooth: its problem with the law's smoothing free.
-            sharp: values to hold that at.
-        """
-        problem = smooth.hold(sharp)
-        problem.limits = smooth.limits
-        try:
-            trial = self.fitted(problem, fitted.estimate.theta, fitted.estimate)
-        except CosimError as error:
-            self.say(f"{fitted.effects[-1].label} with {sharp}: {error}")
-            return fitted
-        if not trial.estimate.robust < fitted.estimate.robust - GATE:
-            return fitted
-        assert fitted.signature is not None
-        trial.effects = fitted.effects
-        trial.signature = replace(fitted.signature, fixed={**fitted.signature.fixed, **sharp})
-        return trial
 
     def _doubled(self, problem: Problem, theta: Vector, cost: float, name: str) -> Vector:
         """A place to begin with a larger strength, as long as that is better.
@@ -325,6 +296,43 @@ class Fitter(Judge):
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
         return self.again(found, winner, base)
+
+    def sharper(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model with its last effect's law sticking more nearly, if it fits better from here.
+
+        A law that smooths a sign creeps at rest. Where it holds casters, all parameters make up for
+        that, and derivatives do not lead to where it hardly creeps.
+        """
+        item = winner.signature
+        if item is None or not self.raw.unstable or not is_open(winner.estimate):
+            return winner
+        whole = item.candidate.added_to(base.problem)
+        held = {
+            p.name: (p.minimum, item.fixed.get(p.name, p.nominal))
+            for p in new_parameters(base.problem, whole)[1]
+            if p.name not in winner.estimate.values
+        }
+        sharp = {n: max(SHARP * value, least) for n, (least, value) in held.items() if least > 0.0}
+        if not sharp:
+            return winner
+        fixed = {n: value for n, (_, value) in held.items()} | sharp
+        spans = {p.name: p.span for p in winner.problem.parameters}
+        problem = whole.with_parameters(
+            [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
+        )._with(runs=winner.problem.runs)
+        problem = problem.hold(fixed)
+        theta = np.array([winner.estimate.values[name] for name in problem.names])
+        try:
+            found = self.fitted(problem, theta, winner.estimate)
+        except CosimError as error:
+            self.say(f"{winner.effects[-1].label} with {sharp}: {error}")
+            return winner
+        if not found.estimate.robust < winner.estimate.robust - GATE:
+            return winner
+        self.say(f"{winner.effects[-1].label}: sticks more nearly than usual")
+        found = self.again(found, winner, base)
+        found.signature = replace(item, fixed={**item.fixed, **fixed})
+        return found
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.

@@ -52,6 +52,8 @@ OFF = 400.0
 """Mean square over the noise's of a channel's typical windows beyond which all residuals count in
 full: by their logarithm, fits end far from their minima, and beside that much, moments at which
 casters turn over are small."""
+SIMPLER = 1
+"""Simpler laws at the best one's place that are fitted as far where much more is missing."""
 UNWANTED = 2
 """So many where unused runs want none."""
 RIVAL = 0.5
@@ -370,8 +372,18 @@ class Search(LateFitter):
 
     def opened(self, base: Fitted, current: Round) -> None:
         """Fit a model that evidently lacks more; if it still does, others are compared later."""
-        assert current.winner is not None
-        self.follow(current, self.retried(current.winner, base))
+        winner = current.winner
+        assert winner is not None
+        models = [winner]
+        if self.raw.unstable:  # quick fits end anywhere, so the better law is not known yet
+            models += [
+                f for f in current.fitted
+                if f.effects[-1] in current.near and f.effects[-1].place == winner.effects[-1].place
+                and f.quantity == winner.quantity and f.complexity < winner.complexity
+            ][:SIMPLER]  # fmt: skip
+        begun = {id(f): self.sharper(self.retried(f, base), base) for f in models}
+        current.fitted = [begun.get(id(f), f) for f in current.fitted]
+        current.winner = min(begun.values(), key=lambda f: f.estimate.robust)
         base = self.recount(current)
         found = self.refined(base, current.winner, quick=True)
         better = self.released(found, base)
