@@ -65,3 +65,47 @@ def test_of_usual_strengths_the_best_is_kept_though_none_leads_there() -> None:
     bench: Any = SimpleNamespace(_measure=measured, at=simulated, model=0.0)
     Bench._scanned(bench, trials)
     assert trials.best.value == 2.0 and not trials.open
+
+
+@pytest.mark.parametrize(
+    ("unstable", "cost", "sharp"),
+    [(True, 5.0, True), (True, 99.0, False), (False, 5.0, False), (True, None, False)],
+)
+def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(
+    monkeypatch: pytest.MonkeyPatch, unstable: bool, cost: float | None, sharp: bool
+) -> None:
+    """And kept so only if it is better; one that cannot be simulated changes nothing."""
+    tau_c = Parameter("law.tau_c", "N.m", 0.0, 0.0, 10.0, (), strength=True, span=0.3)
+    w_0 = Parameter("law.w_0", "rad/s", 2e-3, 1e-6, 1.0, ())
+    held: list[dict[str, float]] = []
+
+    whole = SimpleNamespace(names=["law.tau_c"], parameters=[], runs=())
+    whole.with_parameters = lambda _: whole
+    whole._with = lambda **_: whole
+    whole.hold = lambda values: held.append(values) or whole
+
+    def fitted(problem: Any, theta: Any, close: Any) -> Any:
+        assert theta.tolist() == [0.5]
+        if cost is None:
+            raise FmuCallError("it took too long")
+        return SimpleNamespace(estimate=SimpleNamespace(robust=cost))
+
+    monkeypatch.setattr("cosim.diagnose.fitter.new_parameters", lambda *_: ([tau_c], [w_0]))
+    monkeypatch.setattr("cosim.diagnose.fitter.replace", lambda item, **new: (item, new))
+    candidate = SimpleNamespace(label="law", added_to=lambda _: whole)
+    item = SimpleNamespace(candidate=candidate, fixed={})
+    estimate = SimpleNamespace(values={"law.tau_c": 0.5}, robust=90.0, count=2)
+    problem = SimpleNamespace(parameters=[], runs=())
+    model: Any = SimpleNamespace(
+        signature=item, estimate=estimate, effects=[candidate], problem=problem
+    )
+    it: Any = SimpleNamespace(
+        raw=SimpleNamespace(unstable=unstable), say=lambda _: None, fitted=fitted,
+        again=lambda found, *_: found,
+    )  # fmt: skip
+    found = Fitter.sharper(it, model, SimpleNamespace(problem=None))  # type: ignore[arg-type]
+    assert (found is not model) is sharp
+    if unstable:
+        assert held == [{"law.w_0": pytest.approx(2e-5)}]
+    if sharp:
+        assert found.signature == (item, {"fixed": {"law.w_0": pytest.approx(2e-5)}})
