@@ -62,6 +62,8 @@ def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
         f for f in stage.fitted
         if f.effects[-1].place == last.place and f.effects[-1] != last
         and f.quantity == winner.quantity != "" and f.complexity < winner.complexity
+        and f.signature is not None  # fitted with fewer parameters, it may have more
+        and f.signature.probe.own < winner.signature.probe.own
         and search.accepted(base, f) and search.total(base, f) > least
     ]  # fmt: skip
     return max(laws, key=lambda f: search.total(base, f), default=winner)

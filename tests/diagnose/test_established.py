@@ -16,8 +16,8 @@ from cosim.errors import CosimError
 TOTALS = {"bristle": 1e5, "coulomb": 1e5 - 300.0, "cogging": 5e4}
 
 
-def law(effect: str, own: int, *, known: bool = False) -> Any:
-    """A fitted law at one place; what it has beyond its strength may be determined."""
+def law(effect: str, own: int, *, known: bool = False, held: int = 0) -> Any:
+    """A fitted law at one place; what it has beyond its strength may be determined, or held."""
     prefix = f"axle.{effect}."
     names = ["tau_c", "x_0", "r"][:own]
     parameters = [
@@ -28,7 +28,10 @@ def law(effect: str, own: int, *, known: bool = False) -> Any:
         effects=(SimpleNamespace(effect=effect, place="axle", prefix=prefix, label=effect),),
         problem=SimpleNamespace(parameters=parameters),
         estimate=SimpleNamespace(low=low, high=low + 1.0, identifiable=np.ones(own, dtype=bool)),
-        signature=SimpleNamespace(strength=parameters[0]), quantity="tau_c", complexity=own,
+        signature=SimpleNamespace(
+            strength=parameters[0], probe=SimpleNamespace(own=own + held)
+        ),
+        quantity="tau_c", complexity=own,
     )  # fmt: skip
 
 
@@ -64,6 +67,14 @@ def test_a_law_of_which_only_a_simpler_one_shows_is_that(
     established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
     assert stage.winner.effects[-1].effect == named
     assert compared == [named] * (named == "coulomb")
+
+
+def test_a_law_with_more_parameters_that_were_held_is_no_simpler_one() -> None:
+    """Coulomb's law with its smoothing free is not a bristle whose deflection was not fitted."""
+    winner = law("coulomb", 2)
+    stage: Any = SimpleNamespace(winner=winner, fitted=[winner, law("bristle", 1, held=2)])
+    established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
+    assert stage.winner is winner
 
 
 def without(gain: float, left: float, unused: float, monkeypatch: pytest.MonkeyPatch) -> Any:
