@@ -15,7 +15,8 @@ from .loss import loss_for
 from .normal import Normal, cost_of
 from .parts import Sensitivity
 from .problem import Problem
-from .weak import KNOWN, WEAK, confirmed, profiled
+from .valley import profiled
+from .weak import KNOWN, WEAK, confirmed
 
 if TYPE_CHECKING:
     from .fit import Descent
@@ -126,7 +127,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     unknown = (turned[:, poor] * (spread / (values[poor] + BOUNDS))) @ turned[:, poor].T
     scaled = known + unknown
     if confirm:
-        scaled = profiled(run, normal, scaled, vectors[:, values < WEAK * values.max()])
+        doubtful = values < (math.inf if run.uneven else WEAK * values.max())
+        scaled = profiled(run, normal, scaled, vectors[:, doubtful])
     covariance = scaled * np.outer(scale, scale)
     # any value between two of a lattice may do as well
     covariance += np.diag([p.lattice**2 / 12.0 for p in problem.parameters])

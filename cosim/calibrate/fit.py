@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
+from .differences import UNEVEN, smoothest, unevenness
 from .estimate import BOUNDS, Estimate, estimated
 from .loss import Huber, Loss, Squares, loss_for
 from .normal import Normal, cost_of, drawn, gradient
@@ -28,10 +29,12 @@ STEPS = (2e-2, 5e-3, 1e-2)
 """Steps of differences over the span, from the first iterations to the last."""
 REUSED = 0.02
 """A Jacobian is used again after a step that lowered the cost by this fraction."""
-UNEVEN = 10.0
+APART = 10.0
 """Runs are fitted one half after the other if their mean errors differ by more than this factor."""
 CORRECTIONS = 4
 """Steps at most with the Jacobian of a point that is close."""
+ROUGH = 0.1
+"""Unevenness of derivatives that go on being those of jumps: others are taken along directions."""
 CALM = 0.8
 """Share of the information on a direction that runs without jumps give: then derivatives do."""
 RENEWALS, DRAFTED = 5, 3
@@ -134,6 +137,7 @@ class Descent:
         self.theta = np.clip(theta, problem.lower, problem.upper)
         self.loss: Loss = Squares()
         self.iterations = 0
+        self.uneven = False
         self.promised = math.inf
         self.damping = FIRM
         self.begun = problem.evaluations if begun is None else begun
@@ -157,11 +161,19 @@ class Descent:
         self.jacobian = self.problem.jacobian(
             self.theta, self.purpose, central=central, relative=relative
         )
+        self.uneven = any(unevenness(self.problem, item) > UNEVEN for item in self.jacobian)
+        # unstable runs are rough at any step
+        if central and self.uneven and not self.problem.unstable:
+            self.jacobian = smoothest(self.problem, self.theta, self.jacobian)
         normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-        if not normal.rough:
+        rough = {
+            item.run for item in self.jacobian
+            if item.run in normal.rough and unevenness(self.problem, item) > ROUGH
+        }  # fmt: skip
+        if not rough:
             return normal
         for place, item in enumerate(self.jacobian):
-            if item.run in normal.rough:
+            if item.run in rough:
                 part = normal.calm[np.ix_(item.columns, item.columns)]
                 self.jacobian[place] = self.problem.directional(
                     self.theta, item.run, np.linalg.eigh(part)[1], relative=relative
@@ -378,7 +390,7 @@ def fit(
 def _uneven(run: Descent) -> bool:
     """Whether some runs are much farther off than others."""
     sizes = [float(np.nanmean(np.minimum(np.abs(r), 1e6))) for _, r in run.residuals]
-    return max(sizes) > UNEVEN * max(min(sizes), 1.0)
+    return max(sizes) > APART * max(min(sizes), 1.0)
 
 
 def _calmest(run: Descent) -> list[str]:

@@ -20,9 +20,9 @@ LABEL = "coulomb at load.flange"
 STRENGTH = "load.flange.coulomb.tau_c"
 
 
-def calibrated(problem: Problem) -> Estimate:
-    """The declared parameters and the friction."""
-    search = Search(problem, only=[c for c in candidates(problem) if c.label == LABEL])
+def calibrated(problem: Problem, label: str = LABEL) -> Estimate:
+    """The declared parameters and the effect."""
+    search = Search(problem, only=[c for c in candidates(problem) if c.label == label])
     winner = search.round(search.calibrated()).winner
     search.close()
     assert winner is not None
@@ -41,6 +41,25 @@ def test_a_factor_on_all_torques_stays_open(tmp_path: Path) -> None:
         # nine of 95 %; the fit ends at eta = 0.781, and its derivatives alone give 0.001 for that
         assert estimate.low[k] <= value <= estimate.high[k], name
     assert not estimate.identifiable[names.index("eta")]
+
+
+def test_a_valley_beside_limits_stays_open(tmp_path: Path) -> None:
+    """Efficiency, damping and inertia by nearly one factor, beside limits that are met by ticks."""
+    bench = benches(3, 11, 121)[35]
+    assert bench.effect == "saturation"
+    (place,) = write_sets(tmp_path, [bench], SHEET, 121)
+    estimate = calibrated(
+        read_problem(place, workers=2), "torque_constant_saturation at motor.torque_constant"
+    )
+    names = list(estimate.problem.names)
+    for name, value in bench.parameters.items():
+        k = names.index(name)
+        # derivatives alone give J_load 5e-6 kg.m2 and miss by 170 of that
+        assert estimate.low[k] <= value <= estimate.high[k], name
+    k = names.index("eta")
+    # half of what the sheet leaves open, 0.08: J_load meets its bound there
+    assert estimate.high[k] - estimate.low[k] > 0.04
+    assert estimate.identifiable[names.index("acc_max")]
 
 
 @pytest.mark.parametrize("seed", [4, 6])
