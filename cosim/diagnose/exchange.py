@@ -41,6 +41,8 @@ CHANGED = 0.01
 fitted from its parameters again."""
 TENTHS = 4
 """Powers of a tenth of a law's usual smoothing that are tried, the first being 1."""
+CLOSE, OTHERS = 0.95, 2
+"""Share of the winner's gain from which other laws are fitted as far as it, and how many."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
@@ -71,6 +73,7 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
             continue
         present = _seen_last(fitted, stage.winner)
         rivals: list[Fitted] = []
+        trials: list[tuple[Fitted, Fitted | None]] = []
         for item, known in _others(search, stage):
             if item.candidate in fitted.effects:
                 continue
@@ -80,12 +83,14 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
             trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
-            gate = compare(search.check_data, present.check, trial.check, search.checking)
-            gain = search.gain(present, trial) + gate.gain
+            gain = _gains(search, present, trial)[0]
             search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")
+            trials.append((trial, known))
+        for trial, known in _told_apart(search, present, stage.base, trials):
+            gain, unused = _gains(search, present, trial)
             alike = not search.apart(present, trial)
             simpler = alike and more_general(present, trial)
-            if simpler or (not alike and gain > GATE and gate.gain > 0.0):
+            if simpler or (not alike and gain > GATE and unused > 0.0):
                 rivals.append(present)
                 present, stage.winner = trial, known or trial
             elif alike:
@@ -101,8 +106,36 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
     return fitted
 
 
+def _gains(search: Search, present: Fitted, trial: Fitted) -> tuple[float, float]:
+    """What a model gains over another one on all runs, and on unused ones [nats]."""
+    unused = compare(search.check_data, present.check, trial.check, search.checking).gain
+    return search.gain(present, trial) + unused, unused
+
+
+def _told_apart(
+    search: Search, present: Fitted, base: Fitted, trials: list[tuple[Fitted, Fitted | None]]
+) -> list[tuple[Fitted, Fitted | None]]:
+    """Models that could take another's place, the best first, thoroughly fitted if they are near.
+
+    Args:
+        search: fits and judges.
+        present: the model that they could replace.
+        base: model without the effect.
+        trials: quick fits, with those of the round.
+    """
+    gains = [_gains(search, present, trial)[0] for trial, _ in trials]
+    most = max(gains, default=0.0)
+    order = np.argsort(gains, kind="stable")[::-1].tolist()
+    near = [i for i in order if gains[i] > max(NEARLY * most, GATE)][:MOST]
+    found = [trials[i] for i in order]
+    for place, i in enumerate(near if near[1:] else []):
+        trial, known = trials[i]
+        found[place] = search.sharpened(trial, base, draft=True), known
+    return sorted(found, key=lambda pair: -_gains(search, present, pair[0])[0])
+
+
 def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
-    """The winner of a round, or its effect elsewhere, or a simpler law there, if that does as well.
+    """The winner of a round, or its effect elsewhere or another law, if that does as well.
 
     Fits that end at different distances from their minima would tell laws apart that are one; so
     all of these are fitted from where the winner's parameters are, down to `fit.SETTLED`.
@@ -124,7 +157,10 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
             settled[winner.effects[-1]] = winner
         last, simple = winner.effects[-1], False
         for item, known in others:
-            law = item.candidate.effect != last.effect
+            law = item.candidate.effect != last.effect and (
+                item.candidate.place == last.place
+                or (known is not None and more_general(winner, known))
+            )
             if law and simple:
                 continue  # more general than one that does as well
             try:
@@ -166,9 +202,9 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
 def _alike(
     search: Search, base: Fitted, stage: Round, known: set[Candidate]
 ) -> list[tuple[Signature, Fitted | None]]:
-    """The winner's effect at other places and simpler laws at its own, but for known ones.
+    """The winner's effect at other places, simpler laws at its own, close ones elsewhere.
 
-    The laws come by their number of parameters.
+    But for known ones; by their number of parameters.
     """
     winner = stage.winner
     assert winner is not None and winner.signature is not None
@@ -185,6 +221,14 @@ def _alike(
     fitted = {f.effects[-1]: f for f in stage.fitted}
     found += [(t, None) for t in search.kin(base, stage) if t.candidate not in fitted]
     found += _simpler(search, stage)
+    # another law that does nearly as well elsewhere has not been fitted as far
+    least = CLOSE * search.total(base, winner)
+    found += [
+        (f.signature, f) for f in stage.fitted
+        if f.signature is not None and f.effects[-1].effect != name and f.effects[-1] in near
+        and f.effects[-1].place != winner.effects[-1].place
+        and search.accepted(base, f) and search.total(base, f) > least
+    ][:OTHERS]  # fmt: skip
     unique = {item.candidate: (item, f) for item, f in reversed(found)}
     return sorted(
         (pair for candidate, pair in unique.items() if candidate not in known),
@@ -208,7 +252,15 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
         f for f in stage.fitted
         if f.effects[-1] != winner.effects[-1] and f.signature is not None
         and search.accepted(stage.base, f) and f.effects[-1] in close
-    ][:MOST]  # fmt: skip
+    ]  # fmt: skip
+    met = {winner.effects[-1].effect}
+    first: list[Fitted] = []
+    for f in near:  # another law differs more than the same one elsewhere
+        if f.effects[-1].effect not in met:
+            met.add(f.effects[-1].effect)
+            first.append(f)
+    again = {id(f) for f in first}
+    near = (first + [f for f in near if id(f) not in again])[:MOST]
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in near if f.signature is not None
     ]

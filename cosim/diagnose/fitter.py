@@ -288,7 +288,9 @@ class Fitter(Judge):
         """
         if not self.far(base) or not is_open(winner.estimate):
             return winner
-        problem = corrected(winner.problem, winner.estimate.theta, self.raw)
+        problem = winner.problem
+        if not self.raw.far:
+            problem = corrected(problem, winner.estimate.theta, self.raw)
         effects = {p.name for p in problem.parameters if p.role == "effect"}
         kept = {n: v for n, v in winner.estimate.values.items() if n in effects}
         found = self.anew(problem, kept, limit=6, robust=True)

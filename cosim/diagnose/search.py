@@ -18,7 +18,7 @@ from ..variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
 from .established import needed, settle
-from .exchange import challenged, is_open, nearly
+from .exchange import challenged, is_open, nearly, reconsidered
 from .fitter import Say
 from .judge import ALIKE
 from .late import LateFitter
@@ -186,6 +186,9 @@ class Search(LateFitter):
         )
         if exact:
             return self.judged(first)
+        if raw.far:  # errors at such parameters are not those at the right ones, and small beside
+            self.declared = raw._with(step=raw.search_step)
+            return self.judged(fit(self.declared, first.theta, near=True, draft=True))
         near = corrected(raw, first.theta, raw)
         second = fit(near, first.theta, known=Known.of(first))
         self.evaluations += second.evaluations
@@ -382,6 +385,8 @@ class Search(LateFitter):
                 and f.quantity == winner.quantity and f.complexity < winner.complexity
             ][:SIMPLER]  # fmt: skip
         begun = {id(f): self.sharper(self.retried(f, base), base) for f in models}
+        if self.raw.far:  # near now, and fitted without regard to errors of the exchange
+            begun = {key: self.sharpened(f, base, draft=True) for key, f in begun.items()}
         current.fitted = [begun.get(id(f), f) for f in current.fitted]
         current.winner = min(begun.values(), key=lambda f: f.estimate.robust)
         base = self.recount(current)
@@ -391,6 +396,14 @@ class Search(LateFitter):
             better = self.sharpened(found, base, draft=True)
         self.follow(current, self.snapped(better, base))
         current.open = is_open(current.winner.estimate)
+        if not current.open:
+            return
+        # quick fits are rough, so what is left may be that of the wrong law
+        kept = current.winner
+        swapped = reconsidered(self, kept, [current])
+        if swapped is not kept:
+            self.follow(current, self.snapped(self.released(swapped, base), base))
+            current.open = is_open(current.winner.estimate)
 
     def recount(self, current: Round) -> Fitted:
         """The base of a round; with a winner that is near, residuals count by logarithm again.

@@ -49,6 +49,13 @@ def test_where_everything_is_far_off_residuals_count_in_full(
     for problem in (search.raw, search.declared, fitted.problem):
         assert problem.unstable != far
     assert search.fitting.unstable != far and search.checking.unstable != far
+    # what the communication step adds at such parameters is not what it adds at the right ones
+    measured = {run.name: run.data for run in search.raw.runs}
+    as_measured = [
+        np.array_equal(run.data, measured[run.name], True) for run in fitted.problem.runs
+    ]
+    assert as_measured == [far] * len(measured)
+    assert fitted.problem.step == search.raw.search_step
 
 
 @pytest.mark.parametrize("near", [True, False])
