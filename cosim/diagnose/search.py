@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -26,7 +26,7 @@ from .linear import MATERIAL, Layout, holm
 from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
 from .probes import Probe, batches
 from .secant import Bench, model_values
-from .signature import Signature, merge, unscored, worthy
+from .signature import WHOLES, Signature, groups_of, kind, merge, unscored, worthy
 from .structure import structures
 
 Vector = NDArray[np.float64]
@@ -38,9 +38,9 @@ PART = 0.2
 refitted: it is no rival, and another round will ask again."""
 MEMBERS = 2
 """Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
-SHARED, WHOLES = 0.5, 3
+SHARED = 0.5
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
-this share of what the best one gains, and at most so many: members must not crowd it out."""
+this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""
 EXTRA = 2
 """Where something is evidently missing, so many that gain more than the best one are refitted
 though not significant: the blocks' variance is then that of what is missing. Half as much will do
@@ -97,40 +97,6 @@ class Round:
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0
     near: frozenset[Candidate] = frozenset()
-
-
-def groups_of(
-    chosen: Sequence[Signature],
-    able: Sequence[Signature],
-    single: Container[tuple[str, str]],
-    least: float,
-) -> list[Signature]:
-    """Of what acts alike on a whole group, those of which members are refitted.
-
-    What one caster explains by far too much friction, all of them may explain by a little: where
-    casters turn over, first orders do not tell which gains more.
-
-    Args:
-        chosen: candidates that are refitted.
-        able: candidates that may be.
-        single: instances and ports of balances; others are groups of them.
-        least: gain below which a group is no rival.
-    """
-
-    def kind(s: Signature) -> tuple[str, str, str]:
-        return s.candidate.effect, s.candidate.instance, s.candidate.port.rpartition(".")[2]
-
-    members = {kind(s) for s in chosen if (s.candidate.instance, s.candidate.port) in single}
-    known = {s.candidate.label for s in chosen}
-    groups = [
-        s
-        for s in able
-        if s.candidate.label not in known
-        and (s.candidate.instance, s.candidate.port) not in single
-        and kind(s) in members
-        and s.score.gain > least
-    ]
-    return groups[:WHOLES]
 
 
 class Search(LateFitter):
@@ -287,9 +253,8 @@ class Search(LateFitter):
         for s in good:
             instance, port = s.candidate.instance, s.candidate.port
             if (instance, port) in single and "." in port:
-                key = (s.candidate.effect, instance, port.rpartition(".")[2])
-                alike[key] += 1
-                if alike[key] > MEMBERS:
+                alike[kind(s.candidate)] += 1
+                if alike[kind(s.candidate)] > MEMBERS:
                     continue
             if s.score.gain > PART * best:
                 few.append(s)
@@ -346,14 +311,14 @@ class Search(LateFitter):
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         current.near = nearly(self, base, current)
         first = self.chosen(base, current.fitted)
-        current.winner = first
+        current.winner, uncorrected = first, self.raw.far
         if first is not None and is_open(first.estimate):
             self.opened(base, current)
             base = current.base
         else:
             base = self.recount(current)
             # quick fits are too far from their minima to be told apart
-            self.finish(base, current, LOOSE if self.far(base) else CLOSE)
+            self.finish(base, current, LOOSE if self.far(base) else CLOSE, uncorrected=uncorrected)
             current.winner = self.chosen(base, current.fitted)
             if current.winner is not None:
                 self.follow(current, self.snapped(self.released(current.winner, base), base))
@@ -476,7 +441,9 @@ class Search(LateFitter):
             and probe.own < winner.signature.probe.own
         ]  # fmt: skip
 
-    def finish(self, base: Fitted, current: Round, share: float) -> None:
+    def finish(
+        self, base: Fitted, current: Round, share: float, *, uncorrected: bool = False
+    ) -> None:
         """Replace the first few quick fits by thorough ones.
 
         Where unused runs want none of them, those that gain most on the others: a quick fit may
@@ -486,13 +453,14 @@ class Search(LateFitter):
             base: model without the effects.
             current: round whose fits are replaced.
             share: of the best gain, below which a quick fit stays one.
+            uncorrected: whether quick fits have errors of the exchange in them.
         """
         least = share * max((self.total(base, f) for f in current.fitted), default=0.0)
         good = [f for f in current.fitted if self.accepted(base, f)]
         near = [f for f in good if self.total(base, f) > least][:REFINED]
         if near:  # simpler laws at its place are fitted from its parameters anyway: `challenged`
             near = [f for f in near if f is near[0] or not more_general(near[0], f)]
-        alone = bool(good) and not near[1:]
+        alone = bool(good) and not near[1:] and not uncorrected
         if not good and self.lacking(base):
             gains = sorted(current.fitted, key=lambda f: -self.gain(base, f))
             near = [f for f in gains if self.gain(base, f) > GATE][:UNWANTED]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,8 @@ KEPT = 40
 """Candidates that go from one run to all of them at most."""
 HIDDEN = 0.98
 """Share of a signature beyond which one run cannot tell it from other parameters."""
+WHOLES = 3
+"""Groups whose members act alike that are refitted at most."""
 STRETCH, COARSE = 64, 0.03
 """Unit vectors with a cosine of 1 - 1e-6 differ by 0.0014, sums over 64 of their entries by at most
 8 times that, and rounding."""
@@ -131,3 +133,40 @@ def merge(signatures: list[Signature]) -> list[Signature]:
         else:
             kept.append((item, coarse, size))
     return [item for item, _, _ in kept]
+
+
+def kind(candidate: Candidate) -> tuple[str, str, str]:
+    """What members of a group (swivels of casters) and the whole of it have in common."""
+    return candidate.effect, candidate.instance, candidate.port.rpartition(".")[2]
+
+
+def groups_of(
+    chosen: Sequence[Signature],
+    able: Sequence[Signature],
+    single: Container[tuple[str, str]],
+    least: float,
+) -> list[Signature]:
+    """Of what acts alike on a whole group, those of which members are refitted.
+
+    What one caster explains by far too much friction, all of them may explain by a little: where
+    casters turn over, first orders do not tell which gains more.
+
+    Args:
+        chosen: candidates that are refitted.
+        able: candidates that may be.
+        single: instances and ports of balances; others are groups of them.
+        least: gain below which a group is no rival.
+    """
+    members = {
+        kind(s.candidate) for s in chosen if (s.candidate.instance, s.candidate.port) in single
+    }
+    known = {s.candidate.label for s in chosen}
+    groups = [
+        s
+        for s in able
+        if s.candidate.label not in known
+        and (s.candidate.instance, s.candidate.port) not in single
+        and kind(s.candidate) in members
+        and s.score.gain > least
+    ]
+    return groups[:WHOLES]
