@@ -161,17 +161,11 @@ class Descent:
         self.jacobian = self.problem.jacobian(
             self.theta, self.purpose, central=central, relative=relative
         )
-        self.uneven = any(unevenness(self.problem, item) > UNEVEN for item in self.jacobian)
-        # unstable runs are rough at any step
-        if central and self.uneven and not self.problem.unstable:
-            self.jacobian = smoothest(self.problem, self.theta, self.jacobian)
         normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-        rough = {
-            item.run for item in self.jacobian
-            if item.run in normal.rough and unevenness(self.problem, item) > ROUGH
-        }  # fmt: skip
-        if not rough:
-            return normal
+        return self._directed(normal, set(normal.rough), relative) if normal.rough else normal
+
+    def _directed(self, normal: Normal, rough: set[str], relative: float) -> Normal:
+        """Normal equations with the derivatives of runs that jump taken along main directions."""
         for place, item in enumerate(self.jacobian):
             if item.run in rough:
                 part = normal.calm[np.ix_(item.columns, item.columns)]
@@ -179,6 +173,21 @@ class Descent:
                     self.theta, item.run, np.linalg.eigh(part)[1], relative=relative
                 )
         return Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
+
+    def smooth(self) -> None:
+        """Last steps, with derivatives that avoid jumps; long ones across them have led here."""
+        p = self.problem
+        if p.unstable:  # rough at any step
+            return
+        self.uneven = any(unevenness(p, item) > UNEVEN for item in self.jacobian)
+        if not self.uneven:
+            return
+        self.jacobian = smoothest(p, self.theta, self.jacobian)
+        normal = Normal(p, self.theta, self.jacobian, self.residuals, self.loss)
+        jumps = {item.run for item in self.jacobian if unevenness(p, item) > ROUGH}
+        if rough := jumps & set(normal.rough):
+            normal = self._directed(normal, rough, STEPS[-1])
+        self.settle(normal, CORRECTIONS)
 
     def attempt(self, theta: Vector) -> bool:
         """Go there, inside the bounds, if it is better."""
@@ -365,6 +374,8 @@ def fit(
         return estimated(run)
     if near:
         run.correct(draft=draft)
+        if not draft:
+            run.smooth()
         return estimated(run, confirm=not draft)
     if robust and _uneven(run):
         run = Descent(problem, _calmest(run), run.theta)
@@ -384,6 +395,8 @@ def fit(
         run.polish()
     elif not rough:
         run.normal(STEPS[-1], central=True)
+    if not rough:
+        run.smooth()
     return estimated(run, confirm=not rough)
 
 
