@@ -19,10 +19,10 @@ class Law(NamedTuple):
     place: str
 
 
-def fit(effect: str, place: str, gain: float) -> Any:
-    """A fit with what it gains."""
+def fit(effect: str, place: str, gain: float, own: int = 1) -> Any:
+    """A fit with what it gains, and how many parameters its law has."""
     law = Law(effect, place)
-    signature = SimpleNamespace(candidate=law, probe=SimpleNamespace(own=1), same=())
+    signature = SimpleNamespace(candidate=law, probe=SimpleNamespace(own=own), same=())
     return SimpleNamespace(effects=(law,), signature=signature, complexity=9, gain=gain)
 
 
@@ -54,11 +54,13 @@ def test_another_law_is_tried_before_the_same_one_at_a_fourth_place() -> None:
     assert found[1:] == [g.effects[-1] for g in gains[1:MOST]]
 
 
-@pytest.mark.parametrize(("gain", "challenges"), [(96.0, True), (90.0, False)])
+@pytest.mark.parametrize(
+    ("gain", "own", "challenges"), [(96.0, 1, True), (90.0, 1, False), (96.0, 2, False)]
+)
 def test_another_law_elsewhere_is_fitted_as_far_if_it_is_close(
-    gain: float, challenges: bool
+    gain: float, own: int, challenges: bool
 ) -> None:
-    winner, other = fit("gain", "sensor", 100.0), fit("radius_offset", "wheel", gain)
+    winner, other = fit("gain", "sensor", 100.0), fit("radius_offset", "wheel", gain, own)
     found = places(_alike(SEARCH, None, stage([winner, other]), set()))  # type: ignore[arg-type]
     assert (other.effects[-1] in found) is challenges
 
