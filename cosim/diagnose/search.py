@@ -54,8 +54,8 @@ full: by their logarithm, fits end far from their minima, and beside that much, 
 casters turn over are small."""
 SIMPLER = 1
 """Simpler laws at the best one's place that are fitted as far where much more is missing."""
-UNWANTED = 2
-"""So many where unused runs want none."""
+UNWANTED, SLIGHT = 2, 0.1
+"""So many where unused runs want none, if they gain this share of what the best one gains."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
 gains to first order are no rivals."""
@@ -463,7 +463,9 @@ class Search(LateFitter):
         alone = bool(good) and not near[1:] and not uncorrected
         if not good and self.lacking(base):
             gains = sorted(current.fitted, key=lambda f: -self.gain(base, f))
-            near = [f for f in gains if self.gain(base, f) > GATE][:UNWANTED]
+            sizes = [self.gain(base, f) for f in gains]
+            least = max(SLIGHT * max(sizes, default=0.0), GATE)
+            near = [f for f, gain in zip(gains, sizes, strict=True) if gain > least][:UNWANTED]
         better = {
             id(f): self.refined(base, f if alone else self.sharpened(f, base, draft=True))
             for f in near
