@@ -304,8 +304,6 @@ class Descent:
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
-        if not draft and self.problem.unstable:  # far to go; both sides cost twice as much
-            self.correct(draft=True)
         for _ in range(DRAFTED if draft else RENEWALS):
             before = self.cost
             normal = self.normal(STEPS[-1], central=not draft)
