@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import pytest
 
@@ -96,3 +96,27 @@ def test_a_fit_without_corrections_gets_them_before_its_other_parameters_are_tri
     current = Round(base, [], {}, fitted=[base])
     search.finish(base, current, CLOSE, uncorrected=uncorrected)
     assert calls == ["corrected"] * uncorrected + ["refined"]
+
+
+@pytest.mark.parametrize(("second", "fits"), [(38.0, 1), (400.0, 2)])
+def test_where_unused_runs_want_none_only_what_gains_nearly_as_much_is_fitted(
+    second: float, fits: int
+) -> None:
+    gains = [fit("pivot_torque", "floor", 1319.0), fit("stribeck", "swivel", second)]
+    thorough = []
+
+    def sharpened(fitted: Any, base: Any, *, draft: bool) -> Any:
+        thorough.append(fitted.gain)
+        return fitted
+
+    search: Any = SimpleNamespace(
+        total=lambda base, f: f.gain,
+        gain=lambda base, f: f.gain,
+        accepted=lambda base, f: False,
+        lacking=lambda base: True,
+        sharpened=sharpened,
+        refined=lambda base, f: f,
+    )
+    current: Any = SimpleNamespace(fitted=gains)
+    Search.finish(search, cast(Any, None), current, CLOSE)
+    assert len(thorough) == fits
