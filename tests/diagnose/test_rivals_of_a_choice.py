@@ -99,7 +99,7 @@ def test_a_fit_without_corrections_gets_them_before_its_other_parameters_are_tri
 
 
 @pytest.mark.parametrize(("second", "fits"), [(38.0, 1), (400.0, 2)])
-def test_where_unused_runs_want_none_only_what_gains_nearly_as_much_is_fitted(
+def test_where_unused_runs_want_none_what_gains_little_beside_the_best_is_not_fitted(
     second: float, fits: int
 ) -> None:
     gains = [fit("pivot_torque", "floor", 1319.0), fit("stribeck", "swivel", second)]
