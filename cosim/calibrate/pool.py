@@ -2,21 +2,29 @@
 
 A fit simulates many problems that differ in what is held and what is measured only. To prepare a
 run (to create its FMUs and bind them) takes as long as a short simulation, so idle sessions are
-kept for whoever runs the same next.
+kept for whoever runs the same next. What was simulated with the very same values is kept too: the
+stages of a fit hand their values on, and each begins where the one before has ended.
 """
 
 from __future__ import annotations
 
+import math
 import threading
-from collections.abc import Hashable
+from collections import OrderedDict
+from collections.abc import Hashable, Mapping
 from typing import NamedTuple
 
-from ..session import Session
+import numpy as np
+
+from ..session import RUNAWAY, Session
 from ..system import System
+from .parts import Vector
 
 MOST = 128
 """Idle sessions that are kept, each with some megabytes; a fit of ten runs in three step sizes and
 two threads needs half of them."""
+KEPT = 2**27
+"""Bytes of simulated rows that are kept, those asked for last: a few hundred runs of a minute."""
 
 
 class Key(NamedTuple):
@@ -31,11 +39,36 @@ class Key(NamedTuple):
     run: Hashable
 
 
+class Ran(NamedTuple):
+    """A simulated run.
+
+    Attributes:
+        names: recorded.
+        times: at which [s].
+        rows: one per time, with a column per name.
+        cost: processor time [s].
+        inputs: what the key identifies, kept alive with it.
+    """
+
+    names: tuple[str, ...]
+    times: Vector
+    rows: Vector
+    cost: float
+    inputs: object
+
+    def within(self, limit: float) -> bool:
+        """Whether a run with this limit on its processor time would have come to its end too."""
+        calm = math.isinf(limit) or float(np.abs(self.rows).max(initial=0.0)) <= RUNAWAY
+        return self.cost <= limit and calm
+
+
 class Pool:
-    """Idle sessions and the systems that they run, the ones used last."""
+    """Idle sessions, the systems that they run and what they gave, the ones used last."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._ran: OrderedDict[tuple[Key, Hashable], Ran] = OrderedDict()
+        self._size = 0
         self._idle: dict[Key, list[tuple[object, Session]]] = {}
         self._count = 0
         self._systems: dict[Hashable, System] = {}
@@ -72,6 +105,29 @@ class Pool:
         found = self._idle.pop(key, [])
         self._count -= len(found)
         return found
+
+    def ran(self, key: Key, values: Mapping[str, float], limit: float) -> Ran | None:
+        """What was simulated with these values before, if that was within the limit."""
+        with self._lock:
+            found = self._ran.get((key, frozenset(values.items())))
+            if found is None or not found.within(limit):
+                return None
+            self._ran.move_to_end((key, frozenset(values.items())))
+            return found
+
+    def remember(self, key: Key, values: Mapping[str, float], ran: Ran) -> None:
+        """Keep what was simulated; nobody writes to its rows."""
+        place = (key, frozenset(values.items()))
+        with self._lock:
+            self._forget(place)
+            self._ran[place] = ran
+            self._size += ran.rows.nbytes
+            while self._size > KEPT:
+                self._forget(next(iter(self._ran)))
+
+    def _forget(self, place: tuple[Key, Hashable]) -> None:
+        old = self._ran.pop(place, None)
+        self._size -= old.rows.nbytes if old else 0
 
     def system(self, kind: Hashable) -> System | None:
         """The system of a kind of problem, if it was kept."""

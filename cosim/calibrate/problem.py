@@ -44,7 +44,7 @@ from .parts import (
     free_parameter,
 )
 from .pieces import relative_pose
-from .pool import Key, Pool
+from .pool import Key, Pool, Ran
 
 Vector = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Problem:
         pool: sessions shared with problems that this one was made from.
 
     Attributes:
-        evaluations: simulated runs so far.
+        evaluations: simulated runs so far, without those known from before.
         costs: processor time that a run took, the last time [s].
         limits: processor time that it may take, no limit if not given [s].
     """
@@ -298,27 +298,34 @@ class Problem:
             ValueRangeError: a value outside the bounds that its FMU declares.
         """
         run = self.run(run) if isinstance(run, str) else run
-        key = self._key(run)
+        ran = self._ran(self.values(theta, run), run)
+        with self._lock:
+            self.costs[run.name] = ran.cost
+        place = {name: column for column, name in enumerate(ran.names)}
+        sampler = Sampler(run.times, ran.times)
+        read = np.column_stack([c.of(sampler, ran.rows[:, place[c.signal]]) for c in self.channels])
+        for names in self.relative:
+            pose = [[c.name for c in self.channels].index(name) for name in names]
+            read[:, pose] = relative_pose(read[:, pose], run.anchor)
+        return read
+
+    def _ran(self, values: dict[str, float], run: Run) -> Ran:
+        key, limit = self._key(run), self.limits.get(run.name, math.inf)
+        if (known := self._pool.ran(key, values, limit)) is not None:
+            return known
         with self._lock:
             self.evaluations += 1
             session = self._pool.take(key) or self.session(run)
         begun = time.thread_time()
         try:
-            limit = self.limits.get(run.name, math.inf)
-            times, rows = session.run(self.values(theta, run), limit=limit)
+            times, rows = session.run(values, limit=limit)
         except FmuCallError:
             session.close()
             raise
-        with self._lock:
-            self.costs[run.name] = time.thread_time() - begun
+        ran = Ran(session.names, times, rows, time.thread_time() - begun, run.inputs)
         self._pool.give(key, session, run.inputs)
-        place = {name: column for column, name in enumerate(session.names)}
-        sampler = Sampler(run.times, times)
-        read = np.column_stack([c.of(sampler, rows[:, place[c.signal]]) for c in self.channels])
-        for names in self.relative:
-            pose = [[c.name for c in self.channels].index(name) for name in names]
-            read[:, pose] = relative_pose(read[:, pose], run.anchor)
-        return read
+        self._pool.remember(key, values, ran)
+        return ran
 
     def spread(self, function: Any, items: Sequence[Any]) -> list[Any]:
         """Apply a function that simulates to items, in threads."""

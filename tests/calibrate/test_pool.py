@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cosim.calibrate import Problem
-from cosim.calibrate.pool import Pool
-from cosim.errors import UnknownNameError
-from cosim.session import Session
+from cosim.calibrate.pool import Pool, Ran
+from cosim.errors import StepError, UnknownNameError
+from cosim.session import RUNAWAY, Session
 
 
 def alone(problem: Problem) -> Problem:
@@ -49,7 +49,7 @@ def test_what_is_held_does_not_stay_in_a_shared_session(
     for value in (whole.lower[place], whole.upper[place]):
         held = whole.hold({name: float(value)})
         assert same(held, np.delete(truth, place))
-    assert same(whole, truth)  # free again
+    assert same(whole, 1.01 * truth)  # free again
     assert same(whole.hold({other: float(whole.upper[1])}), np.delete(truth, 1))
     own = 4 * len(whole.runs)  # of the problems that are compared with
     assert len(counted) == before + own
@@ -88,7 +88,8 @@ def test_sessions_that_were_not_used_for_long_are_freed(
 
 def test_a_closed_problem_can_still_be_used(short: Problem, truth: np.ndarray) -> None:
     whole = alone(short)
-    first = whole.residuals(truth, None)
+    first = alone(short).residuals(truth, None)
+    whole.residuals(1.01 * truth, None)
     whole.close()
     assert all(
         np.array_equal(a, b)
@@ -100,3 +101,69 @@ def test_a_constant_that_the_system_lacks_is_named(short: Problem, truth: np.nda
     wrong = short._with(constants={**short.constants, "motor.nonsense": 1.0}, pool=Pool())
     with pytest.raises(UnknownNameError, match="nonsense"):
         wrong.residuals(truth)
+
+
+@pytest.fixture
+def ran(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
+    """Sessions that were run."""
+    made: list[Session] = []
+    run = Session.run
+
+    def listed(self: Session, *args, **kwargs):
+        made.append(self)
+        return run(self, *args, **kwargs)
+
+    monkeypatch.setattr(Session, "run", listed)
+    return made
+
+
+def test_what_was_simulated_before_is_not_simulated_again(
+    short: Problem, truth: np.ndarray, ran: list[Session]
+) -> None:
+    whole = alone(short)
+    whole.residuals(truth, None)
+    first, count = len(ran), len(whole.runs)
+    assert (first, whole.evaluations) == (count, count)
+    held = whole.hold({whole.names[0]: float(truth[0])})
+    changed = whole.with_data({"sines": np.ones_like(whole.run("sines").data)})
+    for problem, theta in ((whole, truth), (held, truth[1:]), (changed, truth)):
+        problem.residuals(theta, None)
+    assert len(ran) == first
+    assert held.evaluations == 0
+    assert changed.simulate(truth, "sines") is not whole.simulate(truth, "sines")
+    assert same(held, truth[1:]) and same(changed, truth)
+    before = len(ran)
+    whole.residuals(np.nextafter(truth, np.inf), None)
+    assert len(ran) == before + count
+
+
+def test_a_known_run_counts_within_its_limit_only(
+    short: Problem, truth: np.ndarray, ran: list[Session]
+) -> None:
+    whole = alone(short).only(["sines"])
+    whole.simulate(truth, "sines")
+    cost = whole.costs["sines"]
+    assert cost > 0.0
+    whole.limits = {"sines": 2.0 * cost}
+    whole.simulate(truth, "sines")
+    assert (len(ran), whole.costs["sines"]) == (1, cost)
+    whole.limits = {"sines": 1e-9}
+    with pytest.raises(StepError, match="processor time"):
+        whole.simulate(truth, "sines")
+    assert len(ran) == 2
+    known = Ran(("x",), np.zeros(2), np.array([[0.0], [2.0 * RUNAWAY]]), 1.0, None)
+    assert known.within(np.inf)
+    assert not known.within(2.0)  # a run with a limit would have been stopped
+
+
+def test_runs_that_were_not_asked_for_long_are_forgotten(
+    short: Problem, truth: np.ndarray, ran: list[Session], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = alone(short)._with(workers=1)
+    one = whole.session(whole.run("sines")).run(whole.values(truth, "sines"))[1].nbytes
+    monkeypatch.setattr("cosim.calibrate.pool.KEPT", 2 * one)
+    del ran[:]
+    for factor, simulated in ((1.0, 1), (1.01, 2), (1.0, 2), (1.02, 3), (1.0, 3), (1.01, 4)):
+        whole.simulate(factor * truth, "sines")
+        assert len(ran) == simulated
+    assert whole._pool._size == 2 * one
