@@ -336,6 +336,33 @@ def exchanged(
     return result
 
 
+def restarted(search: Search, fitted: Fitted, base: Fitted, simpler: list[Fitted]) -> Fitted:
+    """A model that is far off fitted from nominal values; from where a simpler law does better.
+
+    Args:
+        search: fits and judges.
+        fitted: the model.
+        base: model without its last effect.
+        simpler: models with laws that the last effect contains, fitted so.
+    """
+    near = min(simpler, key=lambda f: f.estimate.robust, default=fitted)
+    if fitted.signature is None or not near.estimate.robust < fitted.estimate.robust - GATE:
+        return search.sharper(search.retried(fitted, base), base)
+    name = fitted.effects[-1].label
+    try:
+        less = base.problem._with(runs=near.problem.runs)
+        found = exchanged(search, near, fitted.signature, fitted, less)
+    except CosimError as error:
+        search.say(f"{name} from {near.effects[-1].label}: {error}")
+        return fitted
+    if not found.estimate.robust < near.estimate.robust - GATE:
+        return fitted
+    search.say(f"{name}: a better minimum from {near.effects[-1].label}")
+    found.p_value = fitted.p_value
+    found.gate = compare(search.check_data, base.check, found.check, search.checking)
+    return found
+
+
 def _begun(
     whole: Problem, values: dict[str, float], fixed: dict[str, float]
 ) -> tuple[Problem, Vector]:

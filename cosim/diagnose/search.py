@@ -18,7 +18,7 @@ from ..variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
 from .established import needed, settle
-from .exchange import challenged, is_open, nearly, reconsidered
+from .exchange import challenged, is_open, nearly, reconsidered, restarted
 from .fitter import Say
 from .judge import ALIKE
 from .late import LateFitter
@@ -303,10 +303,11 @@ class Search(LateFitter):
         promising = self.promising(current)
         self._build(start.problem, (item.candidate.change for item in promising))
         most = max((s.score.gain for s in promising), default=0.0)
+        early = not self.raw.unstable  # `opened` fits the best from nominal values
         for item in promising:
             explained = self.explained(base, current.fitted)
             if not explained or item.score.gain >= RIVAL * most:
-                self.tried(start, current, item, again=not explained)
+                self.tried(start, current, item, again=early and not explained)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         current.near = nearly(self, base, current)
@@ -349,7 +350,9 @@ class Search(LateFitter):
                 if f.effects[-1] in current.near and f.effects[-1].place == winner.effects[-1].place
                 and f.quantity == winner.quantity and f.complexity < winner.complexity
             ][:SIMPLER]  # fmt: skip
-        begun = {id(f): self.sharper(self.retried(f, base), base) for f in models}
+        begun: dict[int, Fitted] = {}
+        for f in reversed(models):
+            begun[id(f)] = restarted(self, f, base, list(begun.values()))
         if self.raw.far:  # near now, and fitted without regard to errors of the exchange
             begun = {key: self.sharpened(f, base, draft=True) for key, f in begun.items()}
         current.fitted = [begun.get(id(f), f) for f in current.fitted]

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, cast
 import pytest
 
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.exchange import MOST, _alike, _others
-from cosim.diagnose.models import Gate
+from cosim.diagnose.exchange import MOST, _alike, _others, restarted
+from cosim.diagnose.models import GATE, Gate
 from cosim.diagnose.search import CLOSE, Round, Search
 
 
@@ -120,3 +120,71 @@ def test_where_unused_runs_want_none_what_gains_little_beside_the_best_is_not_fi
     current: Any = SimpleNamespace(fitted=gains)
     Search.finish(search, cast(Any, None), current, CLOSE)
     assert len(thorough) == fits
+
+
+def rough(effect: str, robust: float) -> Any:
+    """A quick fit that is still far off."""
+    law = SimpleNamespace(label=effect)
+    problem = SimpleNamespace(runs=(), _with=lambda runs: None)
+    return SimpleNamespace(
+        effects=(law,), signature=law, problem=problem, p_value=0.0, check=None,
+        estimate=SimpleNamespace(robust=robust),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("simple", "reached", "anew", "better"),
+    [
+        (None, 0.0, True, True),  # nothing to begin from
+        (1000.0, 0.0, True, True),  # worse than the quick fit
+        (500.0, 400.0, False, True),
+        (500.0, 500.0 - 0.5 * GATE, False, False),  # its further parameters bring nothing
+    ],
+)
+def test_a_general_law_begins_where_a_simpler_one_has_done_better(
+    monkeypatch: pytest.MonkeyPatch,
+    simple: float | None,
+    reached: float,
+    anew: bool,
+    better: bool,
+) -> None:
+    general = rough("asymmetric_coulomb", 800.0)
+    begun: list[Any] = []
+
+    def retried(fitted: Any, base: Any) -> Any:
+        begun.append(fitted)
+        return rough("asymmetric_coulomb", 300.0)
+
+    search = SimpleNamespace(
+        retried=retried, sharper=lambda fitted, base: fitted, say=lambda text: None,
+        check_data=None, checking=None,
+    )  # fmt: skip
+    monkeypatch.setattr("cosim.diagnose.exchange.exchanged", lambda *_: rough("a", reached))
+    monkeypatch.setattr("cosim.diagnose.exchange.compare", lambda *_: None)
+    known = [] if simple is None else [rough("coulomb", simple)]
+    found = restarted(cast(Any, search), general, rough("", 9e9), known)
+    assert bool(begun) is anew
+    assert (found is not general) is better
+
+
+class Seen(Exception):
+    """What follows the quick fits is of no interest."""
+
+
+@pytest.mark.parametrize(("unstable", "again"), [(False, True), (True, False)])
+def test_quick_fits_begin_from_nominal_values_too_unless_the_best_one_does_later(
+    unstable: bool, again: bool
+) -> None:
+    def tried(start: Any, current: Any, item: Any, again: bool) -> None:
+        raise Seen(again)
+
+    item = SimpleNamespace(candidate=SimpleNamespace(change=()), score=SimpleNamespace(gain=9.0))
+    search: Any = SimpleNamespace(
+        raw=SimpleNamespace(unstable=unstable), tried=tried,
+        scored=lambda start: stage([fit("coulomb", "wheel", 9.0)]),
+        promising=lambda current: [item], explained=lambda base, fits: False,
+        _build=lambda problem, changes: None,
+    )  # fmt: skip
+    with pytest.raises(Seen) as seen:
+        Search._round(search, cast(Any, None), cast(Any, SimpleNamespace(problem=None)))
+    assert seen.value.args == (again,)
