@@ -10,7 +10,7 @@ bias of several of their tiny standard deviations; that would test the tick and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,11 +50,13 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Bench:
-    """One bench: its parameters, and an effect that its sheet does not declare."""
+    """One bench: its parameters, and one or two effects that its sheet does not declare."""
 
     parameters: dict[str, float]
     effect: str = "none"
     size: float = 0.0
+    second: str = "none"
+    second_size: float = 0.0
 
 
 def draw(random: np.random.Generator, effect: str = "none", factor: float = 1.0) -> Bench:
@@ -99,7 +101,12 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
         return np.array([b.parameters[name] for b in benches])
 
     def size(name: str) -> Vector:
-        return np.array([b.size if b.effect == name else 0.0 for b in benches])
+        return np.array(
+            [
+                b.size * (b.effect == name) + b.second_size * (b.second == name)
+                for b in benches
+            ]
+        )
 
     resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")
     kp, ki, acc = of("Kp_v"), of("Ki_v"), of("acc_max")
@@ -204,7 +211,7 @@ def drives(seed: int, seconds: float, names: tuple[str, ...] = ()) -> list[Drive
 
 def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:
     """What each bench's effect changes, without noise: run -> channel -> values."""
-    twins = [replace(bench, effect="none", size=0.0) for bench in benches]
+    twins = [Bench(bench.parameters) for bench in benches]
     found: list[dict[str, dict[str, Vector]]] = [{} for _ in benches]
     for drive in drives(seed, seconds):
         values = simulate([*benches, *twins], drive.w_ref, drive.start)

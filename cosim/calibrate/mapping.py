@@ -333,9 +333,16 @@ class _Mapping:
         return found
 
     def value(self, entry: Any, run: str, where: str) -> float:
-        """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`)."""
+        """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
+
+        `begin:x` is an entry that tells when the log begins, for the simulation, which begins
+        before it by `lead`.
+        """
         if isinstance(entry, (int, float)):
             return float(entry)
+        if entry.startswith("begin:"):
+            known = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
+            return known - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
             log = self.logs[run]
             values = log[entry.removeprefix("first:")][log.time >= 0.0]

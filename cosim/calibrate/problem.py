@@ -437,6 +437,7 @@ class Problem:
                 continue
             before = old.members[name].description.variables
             strengths = set(member.description.extra.get("strengths", ()))
+            stated = {n for run in self.runs for n in run.starts}
             mixes, tries, lattices, visits = (
                 member.description.extra.get(hints, {})
                 for hints in ("mixes", "tries", "lattices", "visits")
@@ -447,6 +448,7 @@ class Problem:
                     adjustable(variable)
                     and variable.name not in before
                     and full not in changed.constants
+                    and full not in stated
                 ):
                     parameter = free_parameter(
                         variable, full, full, strength=variable.name in strengths

@@ -61,7 +61,9 @@ def nearly(search: Search, base: Fitted, stage: Round) -> frozenset[Candidate]:
 def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
     """The model with early choices exchanged where that is better.
 
-    Rounds get the winner and the rivals that the last model shows.
+    Rounds get the winner and the rivals that the last model shows. One that was not open is asked
+    again only where later effects have joined its own: beside what lacked these, a law with more
+    parameters had made up for them.
 
     Args:
         search: judges.
@@ -69,7 +71,10 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
         rounds: those that found them.
     """
     for stage in rounds:
-        if not stage.open or stage.winner is None or stage.winner.effects[-1] not in fitted.effects:
+        if stage.winner is None or stage.winner.effects[-1] not in fitted.effects:
+            continue
+        effects = frozenset(fitted.effects)
+        if not stage.open and effects <= (stage.compared or set(stage.winner.effects)):
             continue
         present = _seen_last(fitted, stage.winner)
         rivals: list[Fitted] = []
@@ -97,6 +102,7 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
                 rivals.append(trial)
         if present.estimate is not fitted.estimate:
             fitted = search.sharpened(present, stage.base)
+        stage.compared = frozenset(fitted.effects)
         stage.rivals = search.rivals(present, rivals)
         stage.scores = [
             search.gain(present, f)

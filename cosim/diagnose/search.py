@@ -83,6 +83,8 @@ class Round:
         probes: all candidates that were simulated, with the systems they were simulated in.
         quick: what the best quick fit gained on all runs [nats].
         near: candidates whose quick fits gained nearly as much.
+        compared: effects of the model in which its winner was last compared with others; empty if
+            that was the round's own.
     """
 
     base: Fitted
@@ -97,6 +99,7 @@ class Round:
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0
     near: frozenset[Candidate] = frozenset()
+    compared: frozenset[Candidate] = frozenset()
 
 
 class Search(LateFitter):
@@ -215,7 +218,8 @@ class Search(LateFitter):
         probes = {s.candidate: s.probe for s in signatures}
         aside: tuple[str, ...] = ()
         if layout is not self.fitting:
-            kept = worthy(signatures)
+            stated = {n.rpartition(".")[0] + "." for r in self.raw.runs for n in r.starts}
+            kept = worthy(signatures, stated)
             labels = {s.candidate.label for s in kept}
             aside = tuple(s.candidate.label for s in signatures if s.candidate.label not in labels)
             self.say(f"run {layout.names[0]} leaves {len(kept)} of {len(signatures)} candidates")

@@ -92,10 +92,15 @@ def unscored(probe: Probe) -> Signature:
     return Signature(probe, probe.strength.span, nothing, nothing, none, 0.0)
 
 
-def worthy(found: Sequence[Signature]) -> list[Signature]:
+def worthy(found: Sequence[Signature], starts: Container[str] = ()) -> list[Signature]:
     """Of candidates seen in one run, those worth a simulation of all runs, the best first.
 
     What calibration absorbs in this run alone may still tell something in all of them together.
+
+    Args:
+        found: candidates.
+        starts: prefixes of those that differ from run to run by values that the runs state; one
+            run says nothing of these.
     """
     best = max((s.score.gain for s in found), default=0.0)
     kept = [
@@ -104,7 +109,12 @@ def worthy(found: Sequence[Signature]) -> list[Signature]:
         if s.score.gain > max(EVIDENT, SHARE * best) or (s.score.size > 0.0 and s.absorbed > HIDDEN)
     ]
     kept.sort(key=lambda s: -s.score.gain)
-    return kept[:KEPT]
+    kept = kept[:KEPT]
+    known = {s.candidate for s in kept}
+    return kept + [
+        s for s in found
+        if s.candidate.prefix in starts and s.score.size > 0.0 and s.candidate not in known
+    ]  # fmt: skip
 
 
 def merge(signatures: list[Signature]) -> list[Signature]:

@@ -131,6 +131,7 @@ def gear(
             counts as supplied.
     """
     eta, friction = m.parameter(ETA), m.parameter(B)
+    friction = friction + effort(m, "friction", "coefficient", "N.m.s/rad", value=friction)
     motor = coils.emf * (coils.current if acting is None else acting)
     share = factor(eta, motor * servo.speed)
     driving = share * motor
