@@ -26,6 +26,9 @@ SHORT = 50
 """Fewer samples than this are no run."""
 FOLLOWS = 0.9
 """Correlation from which a column counts as following a signal."""
+STRANGE = 8.0
+"""A column that is so many times too large is no measurement of the signal. By less, it may be
+what the model lacks, unless the factor is one of those below: cold grease triples a current."""
 FACTORS = {
     "degrees instead of radians": 180.0 / np.pi,
     "radians instead of degrees": np.pi / 180.0,
@@ -227,7 +230,8 @@ def _check_scale(problem: Problem, models: dict[str, Vector], index: int) -> Ite
         known = abs(np.log(size / FACTORS[near])) < 0.2
         reason = f"the unit looks wrong: {near}" if known else "unit or scale look wrong"
         text = f"is {size:.4g} times what the model has [{channel.unit}]; {reason}"
-        yield Finding("error", "unit", "", channel.name, text)
+        sure = known or not 1.0 / STRANGE < size < STRANGE
+        yield Finding("error" if sure else "warning", "unit", "", channel.name, text)
 
 
 def _check_swaps(problem: Problem, models: dict[str, Vector], named: set[str]) -> Iterator[Finding]:

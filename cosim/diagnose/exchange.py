@@ -103,7 +103,7 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
         if present.estimate is not fitted.estimate:
             fitted = search.sharpened(present, stage.base)
         stage.compared = frozenset(fitted.effects)
-        stage.rivals = search.rivals(present, rivals)
+        stage.rivals = search.rivals(stage.base, present, rivals)
         stage.scores = [
             search.gain(present, f)
             + compare(search.check_data, present.check, f.check, search.checking).gain

@@ -40,6 +40,9 @@ DOUBLINGS = 6
 """Times at most that a strength to begin with is doubled."""
 SHARP = 0.01
 """Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
+SUPERFLUOUS = 0.5
+"""An effect that later ones have made superfluous explains less than this share of what the model
+leaves without it, in the runs that were fitted; unused runs may be too few to miss it."""
 AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
@@ -448,6 +451,11 @@ class Fitter(Judge):
         result.signature = fitted.signature
         return result
 
+    def carries(self, less: Fitted, fitted: Fitted) -> bool:
+        """Whether a model explains a share of what one with fewer effects leaves beyond noise."""
+        beyond = less.estimate.robust - 0.5 * less.estimate.count
+        return self.gain(less, fitted) > max(SUPERFLUOUS * beyond, 10.0 * GATE)
+
     def eliminated(self, fitted: Fitted) -> Fitted:
         """The model without effects that later ones have made superfluous."""
         for effect in fitted.effects[:-1]:
@@ -457,10 +465,10 @@ class Fitter(Judge):
                 self.say(f"without {effect.label}: {error}")
                 continue
             gate = compare(self.check_data, less.check, fitted.check, self.checking)
-            if gate.passed:
+            if gate.passed or self.carries(less, fitted):
                 less = self.approached(less, fitted, fitted)
                 gate = compare(self.check_data, less.check, fitted.check, self.checking)
-            if not gate.passed:
+            if not gate.passed and not self.carries(less, fitted):
                 self.say(f"dropped again: {effect.label}")
                 return self.eliminated(less)
         return fitted

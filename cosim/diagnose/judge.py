@@ -22,6 +22,8 @@ FAR = 4.0
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
 ALIKE = 1e-5
 """Share of what they explain by which models may differ that are one to first order."""
+SAME = 2e-4
+"""The same for one effect at two places, each fitted."""
 EXPLAINED, CONCENTRATED = 0.98, 0.9
 """Share of what a model leaves beyond noise from which a candidate explains nearly all of it; the
 second where much counts by its logarithm (`loss.Windowed`)."""
@@ -138,8 +140,10 @@ class Judge:
         fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
         return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
 
-    def rivals(self, winner: Fitted, others: list[Fitted]) -> list[Fitted]:
+    def rivals(self, base: Fitted, winner: Fitted, others: list[Fitted]) -> list[Fitted]:
         """Models that no run tells from the winner, but for more general ones of these or of it.
+
+        The winner's last effect elsewhere counts as such where it does as well but for a hair.
 
         Friction that may differ between the directions is no rival of friction that does not,
         wherever the latter is named; nor is a law of the same quantity with more parameters than
@@ -147,13 +151,29 @@ class Judge:
         """
         near = [
             f for f in others
-            if f is not winner and not self.apart(f, winner)
+            if f is not winner and (not self.apart(f, winner) or self.elsewhere(base, f, winner))
             and not (f.quantity == winner.quantity != "" and f.complexity > winner.complexity)
         ]  # fmt: skip
         return [
             f for f in near
             if not any(more_general(f, g) for g in (winner, *near) if g is not f)
         ]  # fmt: skip
+
+    def elsewhere(self, base: Fitted, other: Fitted, winner: Fitted) -> bool:
+        """Whether a model has the winner's last effect elsewhere, and does as well but for a hair.
+
+        A left wheel too large is a right one too small with another mean radius; fits end at
+        different distances from the minimum that they have in common.
+        """
+        last, mine = other.effects[-1], winner.effects[-1]
+        if last.effect != mine.effect or last.place == mine.place:
+            return False
+
+        def over(first: Fitted, second: Fitted) -> float:
+            unused = compare(self.check_data, first.check, second.check, self.checking).gain
+            return self.gain(first, second) + unused
+
+        return abs(over(other, winner)) < SAME * over(base, winner)
 
     def test(self, first: Fitted, second: Fitted) -> Score:
         """Score of the step between two models on unused runs."""

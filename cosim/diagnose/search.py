@@ -338,7 +338,7 @@ class Search(LateFitter):
             self.follow(current, self.sharpened(current.winner, base))
             settle(self, base, current)
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
-            current.rivals = self.rivals(current.winner, wanted)
+            current.rivals = self.rivals(base, current.winner, wanted)
             mine = self.total(base, current.winner)
             current.scores = [self.total(base, f) - mine for f in current.rivals]
         return current

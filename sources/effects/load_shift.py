@@ -30,7 +30,7 @@ DIRECTION = Quantity(
 
 EFFECT = Effect(
     "load_shift",
-    "Mass centre away from its nominal place.",
+    "Mass centre away from its nominal place, as a load off the centre puts it.",
     ("position",),
     SHIFT,
     source="crawler paper, Table 1",

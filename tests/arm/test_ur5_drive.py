@@ -312,3 +312,17 @@ def test_finite_at_rest(fidelity: str) -> None:
     ]
     for result in results:
         assert all(np.isfinite(np.asarray(item)).all() for item in result)
+
+
+@pytest.mark.parametrize(("place", "joints"), [("friction_2", [1]), ("friction", range(6))])
+def test_gears_warm_up_since_power_on(place: str, joints: list[int]) -> None:
+    """b (1 + k exp(-(t_on + t)/t_w)) at the joints that have it, the others as before."""
+    cold = oracle(f"ur5_drive.ur5_lab/sampled+warm_up@{place}")
+    moving = {f"qd[{i + 1}]": 0.1 * (i + 1) for i in range(6)}
+    own = {"k": 0.5, "t_w": 80.0, "t_on": 30.0}
+    friction = value("ur5_lab", "b")
+    warm = oracle("ur5_drive.ur5_lab/sampled").outputs(moving, 10.0)
+    found = cold.outputs(moving | {f"{place}.warm_up.{n}": v for n, v in own.items()}, 10.0)
+    for i in range(6):
+        more = -0.5 * np.exp(-0.5) * friction[i] * 0.1 * (i + 1) if i in joints else 0.0
+        assert found[f"tau[{i + 1}]"] - warm[f"tau[{i + 1}]"] == pytest.approx(more, rel=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,22 @@ def test_a_round_that_decided_is_not_reconsidered(stage: tuple[Search, Round]) -
         assert reconsidered(search, found.winner, [found]) is found.winner
     finally:
         found.open = True
+
+
+def test_it_is_where_a_later_effect_has_joined(stage: tuple[Search, Round]) -> None:
+    """Once for each set of effects."""
+    search, found = stage
+    wrong = fitted(found, WRONG)
+    later = replace(wrong.effects[-1], effect="another")
+    both = replace(wrong, effects=(*wrong.effects, later))
+    found.winner, found.open, found.compared = wrong, False, frozenset()
+    try:
+        last = reconsidered(search, both, [found])
+        assert RIGHT in [e.label for e in last.effects]
+        assert found.compared == frozenset(last.effects)
+        assert reconsidered(search, last, [found]) is last
+    finally:
+        found.open, found.compared = True, frozenset()
 
 
 @pytest.mark.parametrize("known_before", [True, False])
