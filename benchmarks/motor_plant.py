@@ -102,10 +102,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
 
     def size(name: str) -> Vector:
         return np.array(
-            [
-                b.size * (b.effect == name) + b.second_size * (b.second == name)
-                for b in benches
-            ]
+            [b.size * (b.effect == name) + b.second_size * (b.second == name) for b in benches]
         )
 
     resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")

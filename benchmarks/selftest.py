@@ -1,13 +1,15 @@
 """Does the diagnosis name undeclared effects, and stay quiet without? Data of an independent plant.
 
     python -m benchmarks.selftest --repeats 3 --out out/selftest
+    python -m benchmarks.selftest --pairs 20 --repeats 0 --clean 0 --out out/pairs
     python -m benchmarks.selftest --example DATASET --out out/mirror
 
 Every effect is put into rigs with other parameters and sizes; some of the data sets have none.
 Prints the confusion matrix, false alarms and the coverage of the 95 % intervals, and writes them as
 a table. An effect is hidden if what calibration cannot absorb of it stays below the least size that
 the diagnosis names; being quiet about it is right. With `--example` the data come from our own
-FMUs, for any rig that has a mapping.
+FMUs, for any rig that has a mapping. Of two effects in one bench, all that the data show must be
+named, and nothing else.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,19 +39,32 @@ from cosim.diagnose.linear import MATERIAL, Absorber, Layout
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
 SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml"
+PAIR = "two effects"
 EXTREME = 300.0
 """RMS over the noise from which an effect is made smaller: a machine that oscillates is no test."""
 
 
-def benches(repeats: int, clean: int, seed: int) -> list[Bench]:
-    """Effects at 0.5, 1 and 2 times their size, and clean ones."""
+def benches(repeats: int, clean: int, seed: int, pairs: int = 0) -> list[Bench]:
+    """Effects at 0.5, 1 and 2 times their size, clean ones, and some with two effects."""
     random = np.random.default_rng(seed)
     found = [draw(random) for _ in range(clean)]
     for name in EFFECTS:
         if name != "none":
             for index in range(repeats):
                 found.append(draw(random, name, (1.0, 2.0, 0.5)[index % 3]))
+    kinds = [name for name in EFFECTS if name != "none"]
+    for _ in range(pairs):
+        first, second = random.choice(kinds, 2, replace=False).tolist()
+        sizes = random.choice([0.5, 1.0, 2.0], 2)
+        bench = draw(random, first, float(sizes[0]))
+        found.append(replace(bench, second=second, second_size=sizes[1] * EFFECTS[second][0]))
     return found
+
+
+def parts(bench: Bench) -> list[Bench]:
+    """The bench with each of its effects alone."""
+    one = replace(bench, second="none", second_size=0.0)
+    return [one, replace(one, effect=bench.second, size=bench.second_size)]
 
 
 def over_noise(problem: Problem, change: Change, layout: Layout) -> Vector:
@@ -116,18 +132,37 @@ def judged(
     }  # fmt: skip
 
 
+def judged_pair(row: dict[str, Any], bench: Bench, sizes: list[float]) -> dict[str, Any]:
+    """The row of a bench with two effects: right if those that show are named, and no others."""
+    wanted = [
+        set(EFFECTS[part.effect][1])
+        for part, size in zip(parts(bench), sizes, strict=True)
+        if size >= MATERIAL
+    ]
+    named = row["named"]
+    right = len(named) == len(wanted) and all(names & set(named) for names in wanted)
+    found = {"truth": PAIR, "pair": [bench.effect, bench.second], "right": right, "rival": right}
+    return {**row, **found, "sizes": [bench.size, bench.second_size], "shown": max(sizes)}
+
+
 def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[str, Any]]:
     """Rows of sets from the independent motor bench."""
-    chosen = benches(arguments.repeats, arguments.clean, arguments.seed)
+    chosen = benches(arguments.repeats, arguments.clean, arguments.seed, arguments.pairs)
     places = write_sets(folder, chosen, SHEET, arguments.seed, arguments.seconds)
-    effects = changes(chosen, arguments.seed, arguments.seconds)
-    for bench, place, change in zip(chosen, places, effects, strict=True):
+    alone = [part for bench in chosen for part in parts(bench)]
+    effects = iter(changes(alone, arguments.seed, arguments.seconds))
+    for bench, place in zip(chosen, places, strict=True):
         problem = read_problem(place, workers=arguments.workers)
-        size = shown(problem, bench.parameters, change)
+        both = [next(effects), next(effects)]
+        size = shown(problem, bench.parameters, both[0])
         row = judged(
             diagnose(problem), bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters
         )
-        yield {**row, "shown": size}
+        if bench.second != "none":
+            other = shown(problem, bench.parameters, both[1])
+            yield judged_pair(row, bench, [size, other])
+        else:
+            yield {**row, "shown": size}
 
 
 def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[str, Any]]:
@@ -198,6 +233,7 @@ def main() -> None:
     )  # fmt: skip
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clean", type=int, default=20)
+    parser.add_argument("--pairs", type=int, default=0, help="benches with two effects")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--workers", type=int, default=2)

@@ -94,9 +94,9 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
         for trial, known in _told_apart(search, present, stage.base, trials):
             gain, unused = _gains(search, present, trial)
             alike = not search.apart(present, trial)
-            simpler = alike and more_general(present, trial)
+            simpler = alike and (more_general(present, trial) or _wider(present, trial))
             if simpler or (not alike and gain > GATE and unused > 0.0):
-                rivals.append(present)
+                rivals += [] if simpler else [present]
                 present, stage.winner = trial, known or trial
             elif alike:
                 rivals.append(trial)
@@ -110,6 +110,20 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
             for f in stage.rivals
         ]
     return fitted
+
+
+def _wider(first: Fitted, second: Fitted) -> bool:
+    """Whether a law of the same quantity at the same place has more parameters, fitted or held.
+
+    How sharply a law sticks, held at another value than usual, makes no law of a simpler one.
+    """
+    if first.signature is None or second.signature is None or not first.quantity:
+        return False
+    return (
+        first.effects[-1].place == second.effects[-1].place
+        and first.quantity == second.quantity
+        and first.signature.probe.own > second.signature.probe.own
+    )
 
 
 def _gains(search: Search, present: Fitted, trial: Fitted) -> tuple[float, float]:

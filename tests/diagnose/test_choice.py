@@ -184,21 +184,28 @@ def test_a_law_more_general_than_a_rival_is_none() -> None:
     judge: Any = SimpleNamespace(
         apart=lambda first, second: False, elsewhere=lambda base, first, second: False
     )
-    assert Search.rivals(judge, winner, winner, [winner, elsewhere, general, other]) == [elsewhere, other]
-    assert Search.rivals(judge, winner, winner, [general]) == [general]  # nothing simpler was fitted there
+
+    def rivals(mine: Any, others: list[Any]) -> list[Any]:
+        return Search.rivals(judge, mine, mine, others)
+
+    assert rivals(winner, [winner, elsewhere, general, other]) == [
+        elsewhere,
+        other,
+    ]
+    assert rivals(winner, [general]) == [general]  # nothing simpler was fitted there
     judge.apart = lambda first, second: first is other
-    assert Search.rivals(judge, winner, winner, [elsewhere, other]) == [elsewhere]
+    assert rivals(winner, [elsewhere, other]) == [elsewhere]
     judge.apart = lambda first, second: True
-    assert Search.rivals(judge, winner, winner, [elsewhere, other]) == []
+    assert rivals(winner, [elsewhere, other]) == []
     judge.elsewhere = lambda base, first, second: first is elsewhere
-    assert Search.rivals(judge, winner, winner, [elsewhere, other]) == [elsewhere]
+    assert rivals(winner, [elsewhere, other]) == [elsewhere]
     simple = model("coulomb", "base.left.axle", 9, "tau_c")
     free = model("bristle", "gearbox.flange_a", 12, "tau_c")
     spring = model("hose_spring", "motor.shaft", 12, "k")
     same = model("coulomb", "gearbox.flange_a", 9, "tau_c")
     judge.apart = lambda first, second: False
-    assert Search.rivals(judge, simple, simple, [free, spring, same]) == [spring, same]
-    assert Search.rivals(judge, free, free, [simple, free]) == [simple]
+    assert rivals(simple, [free, spring, same]) == [spring, same]
+    assert rivals(free, [simple, free]) == [simple]
 
 
 def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(
