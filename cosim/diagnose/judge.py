@@ -151,7 +151,8 @@ class Judge:
         """
         near = [
             f for f in others
-            if f is not winner and (not self.apart(f, winner) or self.elsewhere(base, f, winner))
+            if f.effects[-1] != winner.effects[-1]
+            and (not self.apart(f, winner) or self.elsewhere(base, f, winner))
             and not (f.quantity == winner.quantity != "" and f.complexity > winner.complexity)
         ]  # fmt: skip
         return [

@@ -63,7 +63,7 @@ def test_the_right_choice_stays(stage: tuple[Search, Round]) -> None:
 
 def test_a_round_that_decided_is_not_reconsidered(stage: tuple[Search, Round]) -> None:
     search, found = stage
-    found.winner, found.open = fitted(found, WRONG), False
+    found.winner, found.open, found.compared = fitted(found, WRONG), False, frozenset()
     try:
         assert reconsidered(search, found.winner, [found]) is found.winner
     finally:
