@@ -71,10 +71,12 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
         rounds: those that found them.
     """
     for stage in rounds:
-        if stage.winner is None or stage.winner.effects[-1] not in fitted.effects:
+        if stage.winner is None:
             continue
         effects = frozenset(fitted.effects)
         if not stage.open and effects <= (stage.compared or set(stage.winner.effects)):
+            continue
+        if stage.winner.effects[-1] not in effects:
             continue
         present = _seen_last(fitted, stage.winner)
         rivals: list[Fitted] = []

@@ -12,7 +12,7 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.candidates import candidates
+from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.search import Search
 from cosim.diagnose.signature import worthy
 
@@ -80,14 +80,14 @@ def test_friction_that_fades_from_run_to_run(cold: float, tmp_path: Path) -> Non
 def test_one_run_does_not_rule_it_out() -> None:
     """What differs from run to run goes on whatever one run says of it."""
 
-    def scored(prefix: str, gain: float, size: float = 1.0) -> Any:
-        candidate = SimpleNamespace(prefix=prefix)
+    def scored(place: str, gain: float, size: float = 1.0) -> Any:
+        candidate = Candidate("drive", "ur5_drive", "warm_up", place)
         return SimpleNamespace(
             candidate=candidate, score=SimpleNamespace(gain=gain, size=size), absorbed=0.97
         )
 
-    many = [scored(f"other_{i}.", 1000.0) for i in range(50)]
-    mine, unseen = scored("drive.warm_up.", 1.0), scored("drive.absent.", 0.0, size=0.0)
+    many = [scored(f"other_{i}", 1000.0) for i in range(50)]
+    mine, unseen = scored("friction_2", 1.0), scored("friction_3", 0.0, size=0.0)
     assert mine not in worthy([*many, mine])
-    kept = worthy([*many, mine, unseen], {"drive.warm_up.", "drive.absent."})
+    kept = worthy([*many, mine, unseen], {mine.candidate.prefix, unseen.candidate.prefix})
     assert mine in kept and unseen not in kept
