@@ -62,6 +62,17 @@ def test_one_column(noisy, column, function, kind, reason) -> None:
     assert any(reason in f.text for f in mine), [str(f) for f in mine]
 
 
+@pytest.mark.parametrize(
+    ("factor", "severity"), [(3.0, "warning"), (np.pi / 30, "error"), (20.0, "error")]
+)
+def test_a_factor_that_no_unit_explains_may_be_what_the_model_lacks(
+    noisy, factor: float, severity: str
+) -> None:
+    """Cold grease triples a current; neither rpm nor a factor of twenty is physics."""
+    found = findings(changed(noisy(0), "current", lambda x: factor * x))
+    assert [f.severity for f in found if (f.column, f.kind) == ("current", "unit")] == [severity]
+
+
 def test_late_column(noisy) -> None:
     found = [f for f in findings(changed(noisy(0), "speed", late)) if f.kind == "clock"]
     assert [f.column for f in found] == ["speed"]
