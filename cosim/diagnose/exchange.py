@@ -90,11 +90,11 @@ def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
             trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
-            gain = _gains(search, present, trial)[0]
+            gain = search.gains(present, trial)[0]
             search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")
             trials.append((trial, known))
         for trial, known in _told_apart(search, present, stage.base, trials):
-            gain, unused = _gains(search, present, trial)
+            gain, unused = search.gains(present, trial)
             alike = not search.apart(present, trial)
             simpler = alike and (more_general(present, trial) or _wider(present, trial))
             if simpler or (not alike and gain > GATE and unused > 0.0):
@@ -128,12 +128,6 @@ def _wider(first: Fitted, second: Fitted) -> bool:
     )
 
 
-def _gains(search: Search, present: Fitted, trial: Fitted) -> tuple[float, float]:
-    """What a model gains over another one on all runs, and on unused ones [nats]."""
-    unused = compare(search.check_data, present.check, trial.check, search.checking).gain
-    return search.gain(present, trial) + unused, unused
-
-
 def _told_apart(
     search: Search, present: Fitted, base: Fitted, trials: list[tuple[Fitted, Fitted | None]]
 ) -> list[tuple[Fitted, Fitted | None]]:
@@ -145,7 +139,7 @@ def _told_apart(
         base: model without the effect.
         trials: quick fits, with those of the round.
     """
-    gains = [_gains(search, present, trial)[0] for trial, _ in trials]
+    gains = [search.gains(present, trial)[0] for trial, _ in trials]
     most = max(gains, default=0.0)
     order = np.argsort(gains, kind="stable")[::-1].tolist()
     near = [i for i in order if gains[i] > max(NEARLY * most, GATE)][:MOST]
@@ -153,7 +147,7 @@ def _told_apart(
     for place, i in enumerate(near if near[1:] else []):
         trial, known = trials[i]
         found[place] = search.sharpened(trial, base, draft=True), known
-    return sorted(found, key=lambda pair: -_gains(search, present, pair[0])[0])
+    return sorted(found, key=lambda pair: -search.gains(present, pair[0])[0])
 
 
 def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:

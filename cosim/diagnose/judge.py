@@ -169,12 +169,12 @@ class Judge:
         last, mine = other.effects[-1], winner.effects[-1]
         if last.effect != mine.effect or last.place == mine.place:
             return False
+        return abs(self.gains(other, winner)[0]) < SAME * self.gains(base, winner)[0]
 
-        def over(first: Fitted, second: Fitted) -> float:
-            unused = compare(self.check_data, first.check, second.check, self.checking).gain
-            return self.gain(first, second) + unused
-
-        return abs(over(other, winner)) < SAME * over(base, winner)
+    def gains(self, first: Fitted, second: Fitted) -> tuple[float, float]:
+        """What a model gains over another one on all runs, and on unused ones [nats]."""
+        unused = compare(self.check_data, first.check, second.check, self.checking).gain
+        return self.gain(first, second) + unused, unused
 
     def test(self, first: Fitted, second: Fitted) -> Score:
         """Score of the step between two models on unused runs."""

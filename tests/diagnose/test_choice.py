@@ -353,17 +353,14 @@ def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others
     ],
 )
 def test_the_same_effect_elsewhere_may_be_worse_by_a_hair(
-    effect: str, place: str, worse: float, alike: bool, monkeypatch: pytest.MonkeyPatch
+    effect: str, place: str, worse: float, alike: bool
 ) -> None:
     def model(effect: str, place: str, cost: float) -> Any:
         return SimpleNamespace(
             effects=(SimpleNamespace(effect=effect, place=place),), cost=cost, check=None
         )
 
-    monkeypatch.setattr("cosim.diagnose.judge.compare", lambda *_: SimpleNamespace(gain=0.0))
-    judge: Any = SimpleNamespace(
-        gain=lambda first, second: first.cost - second.cost, check_data=None, checking=None
-    )
+    judge: Any = SimpleNamespace(gains=lambda first, second: (first.cost - second.cost, 0.0))
     base, winner = model("", "", 1e5), model("gain", "left", 0.0)
     assert Search.elsewhere(judge, base, model(effect, place, worse), winner) == alike
 
