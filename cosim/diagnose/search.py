@@ -280,6 +280,18 @@ class Search(LateFitter):
             chosen += groups_of(chosen, able, single, PART * best)
         return sorted(chosen, key=lambda s: -s.score.gain)
 
+    def remaining(self, current: Round, tried: list[Signature]) -> list[Signature]:
+        """The next candidates of a round, where unused runs want none of the first.
+
+        What a far-off model lacks is in the variance of its blocks, so a law far down the list by
+        significance may be the right one.
+        """
+        known = {s.candidate.label for s in tried}
+        return [
+            s for s in current.signatures
+            if s.candidate.label not in known and not s.unseen and s.score.z > GATE_Z
+        ][:REFITS]  # fmt: skip
+
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.
 
@@ -305,10 +317,44 @@ class Search(LateFitter):
         current = self.scored(start)
         current.base = base
         promising = self.promising(current)
-        self._build(start.problem, (item.candidate.change for item in promising))
-        most = max((s.score.gain for s in promising), default=0.0)
+        base = self.attempted(start, current, promising)
+        if current.winner is None and is_open(base.estimate):
+            remaining = self.remaining(current, promising)
+            if remaining:
+                self.say(f"unused runs want none of them; the next {len(remaining)}:")
+                base = self.attempted(start, current, remaining)
+        if current.winner is None:
+            return current
+        if not current.open:
+            challenged(self, base, current)
+            self.follow(current, self.released(current.winner, base))
+            needed(self, base, current)
+            if current.winner is None:
+                return current
+            self.follow(current, self.sharpened(current.winner, base))
+            settle(self, base, current)
+            wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
+            current.rivals = self.rivals(base, current.winner, wanted)
+            mine = self.total(base, current.winner)
+            current.scores = [self.total(base, f) - mine for f in current.rivals]
+        return current
+
+    def attempted(self, start: Fitted, current: Round, items: list[Signature]) -> Fitted:
+        """Refit candidates and choose among all that a round has fitted.
+
+        Args:
+            start: model whose parameters fits begin with.
+            current: the round; gets the fits and the winner, if unused runs want one.
+            items: candidates, the best gains first.
+
+        Returns:
+            The base of the round, which counts residuals in another way if the winner is near.
+        """
+        base = current.base
+        self._build(start.problem, (item.candidate.change for item in items))
+        most = max((s.score.gain for s in items), default=0.0)
         early = not self.raw.unstable  # `opened` fits the best from nominal values
-        for item in promising:
+        for item in items:
             explained = self.explained(base, current.fitted)
             if not explained or item.score.gain >= RIVAL * most:
                 self.tried(start, current, item, again=early and not explained)
@@ -327,21 +373,7 @@ class Search(LateFitter):
             current.winner = self.chosen(base, current.fitted)
             if current.winner is not None:
                 self.follow(current, self.snapped(self.released(current.winner, base), base))
-        if current.winner is None:
-            return current
-        if not current.open:
-            challenged(self, base, current)
-            self.follow(current, self.released(current.winner, base))
-            needed(self, base, current)
-            if current.winner is None:
-                return current
-            self.follow(current, self.sharpened(current.winner, base))
-            settle(self, base, current)
-            wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
-            current.rivals = self.rivals(base, current.winner, wanted)
-            mine = self.total(base, current.winner)
-            current.scores = [self.total(base, f) - mine for f in current.rivals]
-        return current
+        return base
 
     def opened(self, base: Fitted, current: Round) -> None:
         """Fit a model that evidently lacks more; if it still does, others are compared later."""

@@ -178,13 +178,56 @@ def test_quick_fits_begin_from_nominal_values_too_unless_the_best_one_does_later
     def tried(start: Any, current: Any, item: Any, again: bool) -> None:
         raise Seen(again)
 
-    item = SimpleNamespace(candidate=SimpleNamespace(change=()), score=SimpleNamespace(gain=9.0))
+    item: Any = SimpleNamespace(
+        candidate=SimpleNamespace(change=()), score=SimpleNamespace(gain=9.0)
+    )
     search: Any = SimpleNamespace(
-        raw=SimpleNamespace(unstable=unstable), tried=tried,
-        scored=lambda start: stage([fit("coulomb", "wheel", 9.0)]),
-        promising=lambda current: [item], explained=lambda base, fits: False,
+        raw=SimpleNamespace(unstable=unstable), tried=tried, explained=lambda base, fits: False,
         _build=lambda problem, changes: None,
     )  # fmt: skip
+    current = stage([fit("coulomb", "wheel", 9.0)])
     with pytest.raises(Seen) as seen:
-        Search._round(search, cast(Any, None), cast(Any, SimpleNamespace(problem=None)))
+        Search.attempted(search, cast(Any, SimpleNamespace(problem=None)), current, [item])
     assert seen.value.args == (again,)
+
+
+LABELS = [f"law {index}" for index in range(10)]
+
+
+@pytest.mark.parametrize(
+    ("mean_square", "right", "attempts"),
+    [
+        (100.0, "law 3", [LABELS[:2], LABELS[2:4] + LABELS[5:9]]),
+        (100.0, "none", [LABELS[:2], LABELS[2:4] + LABELS[5:9]]),
+        (100.0, "law 1", [LABELS[:2]]),
+        (3.0, "law 3", [LABELS[:2]]),
+    ],
+    ids=["found by the second", "found by none", "found by the first", "near the noise"],
+)
+def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_none_of_the_first(
+    mean_square: float, right: str, attempts: list[list[str]]
+) -> None:
+    signatures = [
+        SimpleNamespace(
+            candidate=SimpleNamespace(label=label), unseen=False,
+            score=SimpleNamespace(z=1.0 if label == LABELS[4] else 3.5),
+        )
+        for label in LABELS
+    ]  # fmt: skip
+    base = SimpleNamespace(estimate=SimpleNamespace(robust=0.5 * mean_square * 100, count=100))
+    made: list[list[str]] = []
+
+    def attempted(start: Any, current: Any, items: list[Any]) -> Any:
+        made.append([item.candidate.label for item in items])
+        current.winner = object() if right in made[-1] else None
+        return base
+
+    current = SimpleNamespace(signatures=signatures, winner=None, open=True)
+    search: Any = SimpleNamespace(
+        scored=lambda start: current, promising=lambda current: signatures[:2],
+        attempted=attempted, say=lambda text: None,
+    )  # fmt: skip
+    search.remaining = lambda *known: Search.remaining(search, *known)
+    found = Search._round(search, cast(Any, base), cast(Any, base))
+    assert made == attempts
+    assert (found.winner is not None) is any(right in labels for labels in attempts)
