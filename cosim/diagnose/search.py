@@ -287,10 +287,10 @@ class Search(LateFitter):
         significance may be the right one.
         """
         known = {s.candidate.label for s in tried}
-        return [
-            s for s in current.signatures
-            if s.candidate.label not in known and not s.unseen and s.score.z > GATE_Z
-        ][:REFITS]  # fmt: skip
+        able = [s for s in current.signatures if not s.unseen and s.score.z > GATE_Z]
+        best = max((s.score.gain for s in able), default=0.0)
+        few = [s for s in able if s.score.gain > PART * best]
+        return [s for s in few if s.candidate.label not in known][:REFITS]
 
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.

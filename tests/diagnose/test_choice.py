@@ -296,19 +296,25 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
     assert [s.candidate.label for s in Search.promising(search, found)] == expected
 
 
-@pytest.mark.parametrize("close", [None, 2.0])
+@pytest.mark.parametrize(
+    "close, limit",
+    [(None, None), (2.0, PATIENCE * 2.0), (0.001, 0.3)],
+    ids=["nothing known", "a multiple", "what costs next to nothing"],
+)
 def test_quick_fits_have_a_limit_on_time(
-    close: float | None, monkeypatch: pytest.MonkeyPatch
+    close: float | None, limit: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     search: Any = Search.__new__(Search)
     search.judged = lambda estimate: estimate
     monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda problem, *_, **__: problem.limits)
     monkeypatch.setattr("cosim.diagnose.fitter.Known.of", lambda estimate: None)
     known: Any = None if close is None else SimpleNamespace(
-        problem=SimpleNamespace(costs={"A": close})
+        problem=SimpleNamespace(
+            costs={"A": close}, run=lambda name: SimpleNamespace(times=np.arange(301) / 10)
+        )
     )  # fmt: skip
     limits = search.fitted(SimpleNamespace(limits={}), [0.0], known)
-    assert limits == ({} if close is None else {"A": PATIENCE * close})
+    assert limits == ({} if limit is None else {"A": pytest.approx(limit)})
 
 
 @pytest.mark.parametrize(

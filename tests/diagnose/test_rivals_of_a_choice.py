@@ -197,8 +197,8 @@ LABELS = [f"law {index}" for index in range(10)]
 @pytest.mark.parametrize(
     ("mean_square", "right", "attempts"),
     [
-        (100.0, "law 3", [LABELS[:2], LABELS[2:4] + LABELS[5:9]]),
-        (100.0, "none", [LABELS[:2], LABELS[2:4] + LABELS[5:9]]),
+        (100.0, "law 3", [LABELS[:2], [*LABELS[2:4], *LABELS[5:6], *LABELS[7:]]]),
+        (100.0, "none", [LABELS[:2], [*LABELS[2:4], *LABELS[5:6], *LABELS[7:]]]),
         (100.0, "law 1", [LABELS[:2]]),
         (3.0, "law 3", [LABELS[:2]]),
     ],
@@ -210,7 +210,9 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
     signatures = [
         SimpleNamespace(
             candidate=SimpleNamespace(label=label), unseen=False,
-            score=SimpleNamespace(z=1.0 if label == LABELS[4] else 3.5),
+            score=SimpleNamespace(
+                z=1.0 if label == LABELS[4] else 3.5, gain=1.9 if label == LABELS[6] else 10.0
+            ),
         )
         for label in LABELS
     ]  # fmt: skip
