@@ -233,6 +233,16 @@ class Search(LateFitter):
         signatures.sort(key=lambda s: -s.score.gain)
         return Round(base, signatures, named, aside, probes=probes)
 
+    def able(self, current: Round) -> list[Signature]:
+        """Candidates that show in the fitted runs and ask for enough to matter, best gains first."""
+        return [
+            s
+            for s in current.signatures
+            if not s.unseen
+            and s.score.gain > GATE
+            and self.fitting.largest(s.asked) > NEARLY * MATERIAL
+        ]
+
     def promising(self, current: Round) -> list[Signature]:
         """Candidates worth a refit: significant, not too small to matter, the best gains first.
 
@@ -240,13 +250,7 @@ class Search(LateFitter):
         moments has few blocks to prove itself), unused runs decide alone. So they do on a few that
         gain more than any significant one, or half as much where the model is far off.
         """
-        able = [
-            s
-            for s in current.signatures
-            if not s.unseen
-            and s.score.gain > GATE
-            and self.fitting.largest(s.asked) > NEARLY * MATERIAL
-        ]
+        able = self.able(current)
         good = [s for s in able if current.corrected[s.candidate.label] < LEVEL]
         if not good and self.lacking(current.base):
             good = [s for s in able if s.score.z > GATE_Z]
@@ -287,7 +291,7 @@ class Search(LateFitter):
         significance may be the right one.
         """
         known = {s.candidate.label for s in tried}
-        able = [s for s in current.signatures if not s.unseen and s.score.z > GATE_Z]
+        able = [s for s in self.able(current) if s.score.z > GATE_Z]
         best = max((s.score.gain for s in able), default=0.0)
         few = [s for s in able if s.score.gain > PART * best]
         return [s for s in few if s.candidate.label not in known][:REFITS]

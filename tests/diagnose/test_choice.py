@@ -48,6 +48,7 @@ def chosen(
     search: Any = SimpleNamespace(
         fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: True
     )
+    search.able = lambda current: Search.able(search, current)
     return [s.candidate.label for s in Search.promising(search, round_)]
 
 
@@ -222,6 +223,7 @@ def test_without_significance_unused_runs_decide_where_something_is_evidently_mi
             fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking
         )
         found: Any = SimpleNamespace(signatures=[item], corrected={"a": 0.8}, base=near())
+        search.able = lambda current: Search.able(search, current)
         return len(Search.promising(search, found))
 
     assert refitted(True, 2.5) == 1
@@ -293,6 +295,7 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
         signatures=signatures, base=near(mean_square),
         corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
     )  # fmt: skip
+    search.able = lambda current: Search.able(search, current)
     assert [s.candidate.label for s in Search.promising(search, found)] == expected
 
 

@@ -209,9 +209,9 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
 ) -> None:
     signatures = [
         SimpleNamespace(
-            candidate=SimpleNamespace(label=label), unseen=False,
+            candidate=SimpleNamespace(label=label), unseen=False, asked=1.0,
             score=SimpleNamespace(
-                z=1.0 if label == LABELS[4] else 3.5, gain=1.9 if label == LABELS[6] else 10.0
+                z=1.0 if label == LABELS[4] else 3.5, gain=19.0 if label == LABELS[6] else 100.0
             ),
         )
         for label in LABELS
@@ -227,8 +227,9 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
     current = SimpleNamespace(signatures=signatures, winner=None, open=True)
     search: Any = SimpleNamespace(
         scored=lambda start: current, promising=lambda current: signatures[:2],
-        attempted=attempted, say=lambda text: None,
+        attempted=attempted, say=lambda text: None, fitting=SimpleNamespace(largest=float),
     )  # fmt: skip
+    search.able = lambda current: Search.able(search, current)
     search.remaining = lambda *known: Search.remaining(search, *known)
     found = Search._round(search, cast(Any, base), cast(Any, base))
     assert made == attempts
