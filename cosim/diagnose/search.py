@@ -234,7 +234,7 @@ class Search(LateFitter):
         return Round(base, signatures, named, aside, probes=probes)
 
     def able(self, current: Round) -> list[Signature]:
-        """Candidates that show in the fitted runs and ask for enough to matter, best gains first."""
+        """Candidates that show in the fitted runs and ask for enough to matter, by gain."""
         return [
             s
             for s in current.signatures
