@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -15,6 +16,18 @@ Role = Literal["input", "state", "parameter", "discrete", "output"]
 
 class ModelError(ValueError):
     """A description that cannot become a model; the text names the culprit and the way out."""
+
+
+class Symbols:
+    """Declared symbols by their names, as the formulas write them: `p.k * x.twist`."""
+
+    def __init__(self, named: Mapping[str, SX]) -> None:
+        self._named = dict(named)
+
+    def __getattr__(self, name: str) -> SX:
+        if name.startswith("__") or name not in self._named:
+            raise AttributeError(f"no symbol {name!r}; declared are {', '.join(self._named)}")
+        return self._named[name]
 
 
 @dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from .declarations import SX, Attachment, Balance, Clock, ModelError
+from .declarations import SX, Attachment, Balance, Clock, ModelError, Symbols
 from .model import Model, total
 from .quantity import Quantity
 
@@ -53,6 +53,10 @@ class EffectModel:
         """A signal of the balance, see `effect.KINDS`."""
         return self._balance.signals[name]
 
+    def signals(self, *names: str) -> Symbols:
+        """Signals of the balance; `s = e.signals("velocity")` gives `s.velocity`."""
+        return Symbols({name: self.signal(name) for name in names})
+
     def offers(self, name: str) -> bool:
         """Whether the balance has this optional signal."""
         return name in self._balance.signals
@@ -63,6 +67,14 @@ class EffectModel:
         if self._grouped and known is not None:
             return known
         return self._parameters.parameter(quantity)
+
+    def parameters(self, *quantities: Quantity) -> Symbols:
+        """Declare parameters, in this order; `p = e.parameters(K)` gives `p.k`."""
+        return Symbols({item.name: self.parameter(item) for item in quantities})
+
+    def states(self, *quantities: Quantity) -> Symbols:
+        """Declare states, in this order; `x = e.states(Z)` gives `x.z`."""
+        return Symbols({item.name: self.state(item) for item in quantities})
 
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state of the effect."""

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from .component import Component, Port, Solver
-from .declarations import SX, Attachment, Balance, Clock, ModelError, Role, Variable, misfit
+from .declarations import SX, Attachment, Balance, Clock, ModelError, Role, Symbols, Variable, misfit
 from .effect import KINDS
 from .quantity import Quantity
 
@@ -140,6 +140,18 @@ class Model:
     def input(self, quantity: Quantity) -> SX:
         """Declare an input, held by the master over a communication step."""
         return self._declare(quantity, "input")
+
+    def parameters(self, *quantities: Quantity) -> Symbols:
+        """Declare parameters, in this order; `p = m.parameters(K, D)` gives `p.k` and `p.d`."""
+        return Symbols({item.name: self.parameter(item) for item in quantities})
+
+    def inputs(self, *quantities: Quantity) -> Symbols:
+        """Declare inputs, in this order; `u = m.inputs(TAU_A)` gives `u.tau_a`."""
+        return Symbols({item.name: self.input(item) for item in quantities})
+
+    def states(self, *quantities: Quantity) -> Symbols:
+        """Declare states, in this order; `x = m.states(TWIST)` gives `x.twist`."""
+        return Symbols({item.name: self.state(item) for item in quantities})
 
     def input_rate(self, symbol: SX, rate: SX) -> None:
         """Say how an input moves that others of the inputs determine, e.g. an angle by its speed.
