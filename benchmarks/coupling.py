@@ -28,17 +28,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.monolith import Monolith
-from cosim import scenario as scenarios
-from cosim.cli import default_provider
+from cosim.data.recording import Recording
+from cosim.data.signals import Constant
 from cosim.errors import CosimError
-from cosim.master import Driver, Master
-from cosim.recording import Recording
-from cosim.session import Session
-from cosim.signals import Constant
-from cosim.system import System
-from cosim.system_file import read_system
-from cosim.units import conversion, parse
-from cosim.variants import apply
+from cosim.installation.builder import default_provider
+from cosim.master.master import Driver, Master
+from cosim.master.session import Session
+from cosim.scenario import scenario as scenarios
+from cosim.spec.units import conversion, parse
+from cosim.system.system import System
+from cosim.system.toml import read_system
+from cosim.system.variants import apply
 from sources.variant import build_model
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -32,8 +32,8 @@ from rich.table import Table
 
 from benchmarks.chain import DRIVES, EVERY, RECORD, STEP, build_chain
 from cosim import Master, ssp
-from cosim.kernel import SOURCE, cache_folder, library_name
-from cosim.session import Session
+from cosim.master.kernel import SOURCE, cache_folder, library_name
+from cosim.master.session import Session
 from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
 

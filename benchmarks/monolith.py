@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from cosim.system import System
+from cosim.system.system import System
 from sources.function import Functions, build_functions
 from sources.model import Model
 from sources.variant import build_model

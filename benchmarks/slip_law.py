@@ -22,9 +22,9 @@ from cosim.calibrate.estimate import Estimate
 from cosim.calibrate.fit import fit
 from cosim.calibrate.parts import Channel, Parameter, Run
 from cosim.calibrate.problem import Problem
-from cosim.cli import default_provider
-from cosim.signals import Constant
-from cosim.system_file import read_system
+from cosim.data.signals import Constant
+from cosim.installation.builder import default_provider
+from cosim.system.toml import read_system
 from sources.tools.crawler_identification import Constants, Turns
 from sources.tools.slip_laws import (
     CANDIDATES,

@@ -21,11 +21,11 @@ from functools import partial
 from typing import Any
 
 from benchmarks.coupling import of_scenario
-from cosim import kernel
-from cosim.execution import Execution
-from cosim.master import Master
-from cosim.plan import Op, operations
-from cosim.session import Session
+from cosim.master import kernel
+from cosim.master.execution import Execution
+from cosim.master.master import Master
+from cosim.master.plan import Op, operations
+from cosim.master.session import Session
 
 RECORD = ["base.x"]
 

@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from cosim.cli import default_provider
+from cosim.installation.builder import default_provider
 from cosim.study import Progress, parallel, run_study, study_from
 from cosim.study.compute import Outcome, Pool
 from cosim.study.planning import Plan, Task, make_plan

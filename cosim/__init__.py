@@ -6,15 +6,15 @@ result.recording.to_pandas()
 result.recording.plot(path="bench.png")
 """
 
+from .data.recording import Recording, read_recording
+from .data.signals import Constant, Function, Table
 from .errors import CosimError
-from .instance import Instance
-from .master import Master
-from .provider import FolderProvider
-from .recording import Recording, read_recording
-from .runner import Result, RunResult, run
-from .signals import Constant, Function, Table
-from .system import System
-from .system_file import read_system
+from .fmu.instance import Instance
+from .master.master import Master
+from .scenario.runner import Result, RunResult, run
+from .system.provider import FolderProvider
+from .system.system import System
+from .system.toml import read_system
 
 __all__ = [
     "Constant",

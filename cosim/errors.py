@@ -27,7 +27,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .recording import Recording
+    from .data.recording import Recording
 
 
 class CosimError(Exception):

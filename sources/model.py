@@ -13,7 +13,17 @@ from typing import Any
 import casadi as ca
 
 from .component import Component, Port, Solver
-from .declarations import SX, Attachment, Balance, Clock, ModelError, Role, Symbols, Variable, misfit
+from .declarations import (
+    SX,
+    Attachment,
+    Balance,
+    Clock,
+    ModelError,
+    Role,
+    Symbols,
+    Variable,
+    misfit,
+)
 from .effect import KINDS
 from .quantity import Quantity
 

@@ -35,14 +35,14 @@ def test_cosim_imports_nothing_of_the_sources(path: Path) -> None:
     assert not imported(tree, depth) & (FORBIDDEN | {"beyond"})
 
 
-def test_only_the_command_line_and_the_algorithms_import_by_name() -> None:
+def test_only_the_builder_and_the_algorithms_import_by_name() -> None:
     users = {
         path.relative_to(ROOT).as_posix()
         for path in MODULES
         if "import_module" in path.read_text(encoding="utf-8")
     }
-    # algorithms/__init__ imports its own submodules, cli the sources
-    assert users == {"cosim/algorithms/__init__.py", "cosim/cli.py"}
+    # algorithms/__init__ imports its own submodules, the builder the sources
+    assert users == {"cosim/master/algorithms/__init__.py", "cosim/installation/builder.py"}
 
 
 def test_a_run_from_a_folder_of_fmus_needs_no_sources(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
+from ..data.logs import Log
 from ..errors import ScenarioError, listing
-from ..measurement import Log
 from .parts import COINCIDENT
 
 Vector = NDArray[np.float64]

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import library
+from ..data.logs import DataSet, Log, read_data_set
+from ..data.logs import Run as DataRun
+from ..data.segments import pieces, relative_pose, windows
+from ..data.signals import Table
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
-from ..measurement import DataSet, Log, read_data_set
-from ..measurement import Run as DataRun
-from ..provider import Provider
-from ..signals import Table
-from ..system_file import SystemFile, read_system
+from ..installation import builder, places
+from ..system.provider import Provider
+from ..system.toml import SystemFile, read_system
 from .columns import ITEM, expand, prepared
 from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
-from .pieces import pieces, relative_pose, windows
 from .problem import Problem
 
 Vector = NDArray[np.float64]
@@ -52,7 +52,7 @@ def find_mapping(folder: Path, rig: str) -> Path:
         if (place / "dataset.toml").is_file():
             return place / "dataset.toml"
     known = []
-    for path in sorted(library.scenarios().rglob("dataset.toml")):
+    for path in sorted(places.scenarios().rglob("dataset.toml")):
         name = str(read_toml(path).get("rig", path.parent.name))
         if name == rig:
             return path
@@ -69,13 +69,13 @@ def find_system(path: Path, name: str) -> SystemFile:
     Raises:
         UnknownNameError: there is none.
     """
-    places = [path.parent / name] if name.endswith(".toml") else []
-    for folder in (path.parent, *path.parents, library.scenarios()):
-        places.append(folder / "systems" / f"{name}.toml")
-    for place in places:
-        if place.is_file():
-            return read_system(place)
-    known = [item.stem for item in sorted((library.scenarios() / "systems").glob("*.toml"))]
+    files = [path.parent / name] if name.endswith(".toml") else []
+    for folder in (path.parent, *path.parents, places.scenarios()):
+        files.append(folder / "systems" / f"{name}.toml")
+    for file in files:
+        if file.is_file():
+            return read_system(file)
+    known = [item.stem for item in sorted((places.scenarios() / "systems").glob("*.toml"))]
     raise UnknownNameError(f"{path}: there is no system {name!r}; {listing(known, name)}")
 
 
@@ -121,9 +121,7 @@ def read_problem(
         ScenarioError, UnknownNameError: a file or a name in it is wrong.
     """
     if provider is None:
-        from ..cli import default_provider  # the only place that knows the sources
-
-        provider = default_provider()
+        provider = builder.default_provider()
     folder = Path(folder)
     if (folder / "set.toml").is_file():
         data = read_data_set(folder)

@@ -9,9 +9,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description import Variable
+from ..data.signals import Signal
 from ..errors import ValueRangeError
-from ..signals import Signal
+from ..fmu.description import Variable
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..session import RUNAWAY, Session
-from ..system import System
+from ..master.session import RUNAWAY, Session
+from ..system.system import System
 from .parts import Vector
 
 MOST = 128

@@ -24,13 +24,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.segments import relative_pose
 from ..errors import FmuCallError, UnknownNameError, listing
-from ..master import Master
-from ..provider import Provider
-from ..session import Session
-from ..system import System
-from ..system_file import SystemFile
-from ..variants import apply
+from ..master.master import Master
+from ..master.session import Session
+from ..system.provider import Provider
+from ..system.system import System
+from ..system.toml import SystemFile
+from ..system.variants import apply
 from .differences import STEP, directional, jacobian
 from .parts import (
     COINCIDENT,
@@ -43,7 +44,6 @@ from .parts import (
     adjustable,
     free_parameter,
 )
-from .pieces import relative_pose
 from .pool import Key, Pool, Ran
 
 Vector = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from ..variants import apply
+from ..system.variants import apply
 from .parts import Parameter, adjustable, free_parameter
 from .problem import Problem
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..calibrate.refinement import Refinement
-from ..variants import component
+from ..system.variants import component
 
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 

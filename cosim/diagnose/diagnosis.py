@@ -16,8 +16,8 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.problem import Problem
 from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError, ScenarioError
-from ..provider import locate
-from ..variants import apply
+from ..system.provider import locate
+from ..system.variants import apply
 from .bursts import bursts, times
 from .deferred import step_error
 from .exchange import is_open, reconsidered

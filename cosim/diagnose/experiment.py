@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..calibrate.fit import STEPS
 from ..calibrate.parts import Run
+from ..data.signals import Table
 from ..errors import CosimError
-from ..signals import Table
 from .linear import Layout
 from .models import Fitted
 from .secant import model_values

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..calibrate.nuisance import late_estimated, released, settled
 from ..calibrate.problem import Problem
 from ..errors import VariantError
-from ..variants import apply
+from ..system.variants import apply
 from .models import Fitted
 
 Vector = NDArray[np.float64]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..calibrate.fit import Known, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
-from ..provider import locate
-from ..variants import apply
+from ..system.provider import locate
+from ..system.variants import apply
 from .candidates import Candidate, balances, candidates
 from .deferred import corrected
 from .established import needed, settle

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from .. import archive
-from ..description import read_units
 from ..errors import InputError, ScenarioError
-from ..units import Unit
+from ..fmu import archive
+from ..fmu.description import read_units
+from ..spec.units import Unit
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 SSD, SSC, SSV, SSM, SSB = (

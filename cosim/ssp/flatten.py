@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from ..archive import Fmu, open_fmu
-from ..description import Variable
 from ..errors import ConnectError, UnitError, listing
-from ..units import Unit, conversion
+from ..fmu.archive import Fmu, open_fmu
+from ..fmu.description import Variable
+from ..spec.units import Unit, conversion
 from .document import Element, End, File, Link, Structure, Transformation
 
 Path = tuple[str, ...]

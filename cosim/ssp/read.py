@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..archive import Fmu
-from ..signals import Signal
-from ..system import System
-from ..system_file import SystemFile, Wire
+from ..data.signals import Signal
+from ..fmu.archive import Fmu
+from ..system.system import System
+from ..system.toml import SystemFile, Wire
 from . import flatten
 from .document import File, Structure, open_package, read_structure
 from .flatten import Net, shown

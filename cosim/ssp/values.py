@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import UnitError
-from ..units import Unit, conversion
+from ..spec.units import Unit, conversion
 from .document import (
     INTEGERS,
     NAMES,

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ..archive import Fmu
-from ..block import DTYPES
-from ..description import Variable
+from ..data.signals import Constant, Signal, as_signal
 from ..errors import GraphError, InputError, UnitError
 from ..files import atomic
-from ..signals import Constant, Signal, as_signal
-from ..system import Connection, Member, System
-from ..units import conversion, parse
+from ..fmu.archive import Fmu
+from ..fmu.description import Variable
+from ..fmu.exchange import DTYPES
+from ..spec.units import conversion, parse
+from ..system.system import Connection, Member, System
 from .document import FMU, SSC, SSD, SSV
 from .read import Experiment
 from .xml import Units, attributes, encode, pack, text

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..units import BASE, Unit
+from ..spec.units import BASE, Unit
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ..data.recording import Recording
 from ..errors import CosimError, StepError
-from ..provider import Provider
-from ..recording import Recording
-from ..runner import RunResult
-from ..session import Session
+from ..master.session import Session
+from ..scenario.runner import RunResult
+from ..system.provider import Provider
 from .planning import Group, Task
 
 

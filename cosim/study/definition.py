@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .. import library
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
+from ..installation import places
 
 KEYS = {
     "description", "scenario", "runs", "duration", "period", "algorithm", "step", "repeats",
@@ -133,7 +133,7 @@ def read_study(path: Path | str) -> Study:
     """
     path = Path(path)
     if path.suffix != ".toml" and not path.is_file():
-        known = {item.stem: item for item in (library.scenarios() / "studies").glob("*.toml")}
+        known = {item.stem: item for item in (places.scenarios() / "studies").glob("*.toml")}
         if str(path) not in known:
             raise UnknownNameError(
                 f"there is no study {str(path)!r}; {listing(sorted(known), str(path))}; or give "

@@ -20,9 +20,9 @@ import numpy as np
 
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
-from ..provider import Provider
-from ..runner import Prepared, adjusted, find_runs, prepare
-from ..scenario import Scenario
+from ..scenario.runner import Prepared, adjusted, find_runs, prepare
+from ..scenario.scenario import Scenario
+from ..system.provider import Provider
 from .definition import Study
 from .design import Point, points, reference_of
 

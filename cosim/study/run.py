@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..data.recording import Recording
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import write_text
-from ..provider import Provider
-from ..recording import Recording
+from ..installation import builder
+from ..system.provider import Provider
 from .compute import Outcome, Pool
 from .definition import Study, read_study
 from .parallel import in_threads, on_scheduler
@@ -148,9 +149,7 @@ def run_study(
     if not isinstance(study, Study):
         study = read_study(study)
     if provider is None:
-        from ..cli import default_provider  # the only place that knows the sources
-
-        provider = default_provider()
+        provider = builder.default_provider()
     if workers is not None and workers < 1:
         raise ValueRangeError(f"{workers} workers: at least 1 is needed")
     plan = make_plan(study, provider)

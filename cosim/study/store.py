@@ -13,9 +13,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ..data.recording import Recording, read_recording
 from ..errors import InputError
 from ..files import write_text
-from ..recording import Recording, read_recording
 
 NAME = "cosim study result"
 LEFT_OVER = 60.0

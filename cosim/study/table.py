@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import Reference, compare
+from ..data.comparison import Reference, compare
+from ..data.recording import Recording
 from ..errors import UnknownNameError
 from ..files import atomic
-from ..recording import Recording
 from .planning import Plan, Task
 from .store import Store
 

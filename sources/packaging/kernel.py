@@ -1,4 +1,4 @@
-"""Compile the master's executor (`cosim/kernel/kernel.c`) as the FMUs are compiled."""
+"""Compile the master's executor (`cosim/master/kernel/kernel.c`) as the FMUs are compiled."""
 
 from __future__ import annotations
 

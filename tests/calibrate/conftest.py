@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate import Problem, read_problem
-from cosim.signals import Table
+from cosim.data.signals import Table
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "scenarios" / "motor_bench" / "data" / "MB-12"

@@ -10,7 +10,7 @@ import pytest
 from cosim.calibrate import Problem
 from cosim.calibrate.pool import Pool, Ran
 from cosim.errors import StepError, UnknownNameError
-from cosim.session import RUNAWAY, Session
+from cosim.master.session import RUNAWAY, Session
 
 
 def alone(problem: Problem) -> Problem:

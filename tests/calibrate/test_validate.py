@@ -11,7 +11,7 @@ import pytest
 
 from cosim.calibrate import Problem
 from cosim.calibrate.validate import Finding, _check_swaps, check_data, check_model
-from cosim.signals import Table
+from cosim.data.signals import Table
 
 
 def findings(problem: Problem) -> list[Finding]:

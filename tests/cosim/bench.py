@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cosim.provider import Provider
-from cosim.system import System
+from cosim.system.provider import Provider
+from cosim.system.system import System
 
 WIRES = [
     ("motor.tau", "gearbox.tau_a"),

@@ -28,7 +28,9 @@ def provider() -> Built:
 def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     # unpacked FMUs of tests do not belong into the user's cache; built ones stay cached
     patch = pytest.MonkeyPatch()
-    patch.setattr("cosim.archive.cache_folder", lambda: tmp_path_factory.getbasetemp() / "cache")
+    patch.setattr(
+        "cosim.fmu.archive.cache_folder", lambda: tmp_path_factory.getbasetemp() / "cache"
+    )
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim import cli
+from cosim.cli import app as cli
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
 

@@ -12,9 +12,10 @@ import pytest
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-from cosim import System, draw, read_system
-from cosim.columns import Wire, columns
-from cosim.draw import _Drawing
+from cosim import System, read_system
+from cosim.drawing import svg as draw
+from cosim.drawing.layers import Wire, columns
+from cosim.drawing.svg import _Drawing
 from tests.fmus import fmu
 
 SYSTEMS = Path(__file__).parents[2] / "scenarios" / "systems"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim import archive
-from cosim.archive import open_fmu
 from cosim.errors import FmuFileError, InputError, PlatformError
-from cosim.instance import Instance
+from cosim.fmu import archive
+from cosim.fmu.archive import open_fmu
+from cosim.fmu.instance import Instance
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
 

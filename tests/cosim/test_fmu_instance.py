@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import FmuCallError, UnknownNameError, ValueRangeError
-from cosim.instance import Instance
-from cosim.units import parse
+from cosim.fmu.instance import Instance
+from cosim.spec.units import parse
 from tests.fmus import Slave, fmu
 
 BOTH = pytest.mark.parametrize("fmi", [2, 3])

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import Constant, Function, Master, System, Table, algorithms, kernel
+from cosim import Constant, Function, Master, System, Table
+from cosim.data.recording import Recording
 from cosim.errors import StepError, ValueRangeError
-from cosim.plan import operations
-from cosim.recording import Recording
+from cosim.master import algorithms, kernel
+from cosim.master.plan import operations
 from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
 from tests.cosim_fmus import slave

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.data.signals import Constant, Function, Table
 from cosim.errors import (
     AlgebraicLoopError,
     GraphError,
@@ -17,9 +18,8 @@ from cosim.errors import (
     UnknownNameError,
     ValueRangeError,
 )
-from cosim.master import Master
-from cosim.signals import Constant, Function, Table
-from cosim.system import System
+from cosim.master.master import Master
+from cosim.system.system import System
 from tests.cosim.bench import WIRES, bench
 from tests.fmus import Slave, fmu
 

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cosim.comparison import Reference, compare
+from cosim.data.comparison import Reference, compare
+from cosim.data.logs import read_data_set, read_log
+from cosim.data.recording import Recording, read_recording
 from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError, ValueRangeError
 from cosim.files import atomic
-from cosim.master import Master
-from cosim.measurement import read_data_set, read_log
-from cosim.recording import Recording, read_recording
+from cosim.master.master import Master
 from tests.cosim.bench import bench
 
 

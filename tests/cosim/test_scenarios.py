@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import scenario
-from cosim.checks import circle_radius
 from cosim.errors import InputError, ScenarioError, UnknownNameError, VariantError
-from cosim.runner import run
-from cosim.variants import apply, change
+from cosim.scenario import scenario
+from cosim.scenario.checks import circle_radius
+from cosim.scenario.runner import run
+from cosim.system.variants import apply, change
 
 SYSTEM = """
 connections = ["gearbox.tau_b -> load.tau", "gearbox.J_b -> load.J_added", "load.w -> gearbox.w_b"]

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.cli import default_provider
 from cosim.errors import StepError, UnknownNameError, ValueRangeError
-from cosim.master import Master
-from cosim.scenario import find
-from cosim.session import Session
+from cosim.installation.builder import default_provider
+from cosim.master.master import Master
+from cosim.master.session import Session
+from cosim.scenario.scenario import find
 
 RECORD = ["encoder.w_meas", "motor.i_measured", "load.w"]
 DURATION = 0.3
@@ -73,7 +73,7 @@ def test_a_limited_run_that_runs_away_is_stopped(parts, executor, monkeypatch) -
     master = Master(master.system, master.algorithm, master.step, executor=executor)
     with Session(master, DURATION, inputs=inputs, record=RECORD) as session:
         free = session.run(limit=60.0)
-        monkeypatch.setattr("cosim.session.RUNAWAY", 0.5 * np.abs(free[1]).max())
+        monkeypatch.setattr("cosim.master.session.RUNAWAY", 0.5 * np.abs(free[1]).max())
         with pytest.raises(StepError, match=r"\.[\w]+ passed .*: .* the system is unstable"):
             session.run(limit=60.0)
         assert np.array_equal(free[1], session.run()[1])  # a run without a limit is not watched

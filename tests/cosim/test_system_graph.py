@@ -16,10 +16,10 @@ from cosim.errors import (
     ValueRangeError,
     VariantError,
 )
-from cosim.graph import components, loops
-from cosim.provider import FolderProvider
-from cosim.system import System
-from cosim.system_file import read_system
+from cosim.system.feedthrough import components, loops
+from cosim.system.provider import FolderProvider
+from cosim.system.system import System
+from cosim.system.toml import read_system
 from tests.cosim.bench import bench
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from cosim.errors import UnitError
-from cosim.units import conversion, parse
+from cosim.spec.units import conversion, parse
 
 
 @pytest.mark.parametrize(

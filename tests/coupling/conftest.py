@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim import kernel
+from cosim.master import kernel
 from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
 from tests.cosim_fmus import SLAVE2, slave
@@ -37,7 +37,9 @@ def library() -> Path:
 def unpacked(tmp_path_factory: pytest.TempPathFactory) -> None:
     # unpacked FMUs of tests do not belong into the user's cache; built ones stay cached
     patch = pytest.MonkeyPatch()
-    patch.setattr("cosim.archive.cache_folder", lambda: tmp_path_factory.getbasetemp() / "cache")
+    patch.setattr(
+        "cosim.fmu.archive.cache_folder", lambda: tmp_path_factory.getbasetemp() / "cache"
+    )
 
 
 @pytest.fixture(scope="session")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.monolith import Monolith
+from cosim.data.recording import Recording
+from cosim.data.signals import as_signal
 from cosim.errors import InputError, StepError, UnknownNameError, ValueRangeError
-from cosim.master import Master
-from cosim.recording import Recording
-from cosim.signals import as_signal
-from cosim.system import System
+from cosim.master.master import Master
+from cosim.system.system import System
 
 WIRES = [
     ("motor.tau", "gearbox.tau_a"),
@@ -94,8 +94,8 @@ def test_substeps_are_the_same_bits_in_both_executors_and_help(provider, referen
 
 
 def test_sampled_signals_are_not_extrapolated(affine: Path, provider) -> None:
-    from cosim.coupling import means
-    from cosim.plan import lay_out
+    from cosim.master.extrapolation import means
+    from cosim.master.plan import lay_out
 
     system = System("mixed", provider)
     system.add("a", str(affine))
@@ -176,7 +176,7 @@ def test_step_control_stops_at_changes_of_inputs_and_takes_long_steps_at_rest(pr
 
 
 def test_step_control_gives_up_with_the_recording(provider, monkeypatch) -> None:
-    monkeypatch.setattr("cosim.step_control.SHORTEST", 0.3)
+    monkeypatch.setattr("cosim.master.step_control.SHORTEST", 0.3)
     master = Master(drive(provider), "adaptive", 1e-3, options={"tolerance": 1e-6})
     with pytest.raises(StepError, match="misses the tolerance 1e-06 of the step control") as caught:
         master.run(0.01, inputs=INPUTS)
@@ -184,7 +184,7 @@ def test_step_control_gives_up_with_the_recording(provider, monkeypatch) -> None
 
 
 def test_iterated_runs_repeat_bit_for_bit(provider) -> None:
-    from cosim.session import Session
+    from cosim.master.session import Session
 
     for algorithm in ("iterated", "adaptive"):
         master = Master(drive(provider), algorithm, 1e-3)

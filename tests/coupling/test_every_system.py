@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cosim import Master, read_system
-from cosim.provider import Provider
+from cosim.system.provider import Provider
 
 SYSTEMS = sorted((Path(__file__).parents[2] / "scenarios" / "systems").glob("*.toml"))
 STEP, COUNT = 5e-4, 100

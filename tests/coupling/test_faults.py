@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.control.linearize import linearize
 from cosim.errors import FmuCallError, StepError
-from cosim.linearize import linearize
-from cosim.master import Master
-from cosim.system import System
+from cosim.master.master import Master
+from cosim.system.system import System
 from tests.coupling.faulty import MODES, build_faulty
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test's FMU is for Linux")
@@ -87,7 +87,7 @@ def children() -> set[str]:
     listed = subprocess.run(
         ["ps", "-eo", "pid=,stat=,args="], capture_output=True, text=True, check=True
     ).stdout
-    return {line for line in listed.splitlines() if "cosim.isolated" in line}
+    return {line for line in listed.splitlines() if "cosim.master.isolation_worker" in line}
 
 
 @pytest.mark.parametrize(

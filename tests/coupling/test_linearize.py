@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cosim.cli import app
-from cosim.errors import InputError, UnknownNameError
-from cosim.linearize import (
+from cosim.cli.app import app
+from cosim.control.linearize import (
     RASTER,
     linearize,
     loop_margins,
@@ -23,8 +22,9 @@ from cosim.linearize import (
     tune_pi,
     tune_pid,
 )
-from cosim.master import Master
-from cosim.system import System
+from cosim.errors import InputError, UnknownNameError
+from cosim.master.master import Master
+from cosim.system.system import System
 
 S = control.tf("s")
 
@@ -137,7 +137,7 @@ def test_without_python_control_the_extra_is_named(monkeypatch) -> None:
 
 
 def test_the_command_prints_poles_and_loops(provider, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("cosim.cli.default_provider", lambda: provider)
+    monkeypatch.setattr("cosim.installation.builder.default_provider", lambda: provider)
     arguments = ["linearize", "mir250", "--at", "0.1", "--cut", "motor_left.w", "--json",
                  "--out", str(tmp_path)]  # fmt: skip
     result = CliRunner().invoke(app, arguments)

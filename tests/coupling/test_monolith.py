@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.monolith import Monolith
-from cosim.master import Master
+from cosim.master.master import Master
 from tests.coupling.test_coupling_orders import INPUTS, SIGNALS, drive
 
 

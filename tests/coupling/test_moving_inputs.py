@@ -9,11 +9,11 @@ import pytest
 
 from benchmarks.coupling import of_scenario
 from cosim.errors import StepError
-from cosim.master import Master
-from cosim.plan import Op
-from cosim.ramps import bend
-from cosim.session import Session
-from cosim.system import System
+from cosim.master.input_derivatives import bend
+from cosim.master.master import Master
+from cosim.master.plan import Op
+from cosim.master.session import Session
+from cosim.system.system import System
 from tests.coupling.faulty import build_faulty
 from tests.coupling.test_coupling_orders import INPUTS, SIGNALS, drive
 from tests.fmus import fmu
@@ -81,7 +81,7 @@ def test_trial_steps_make_the_first_step_as_good_as_the_others(provider, monkeyp
         master = Master(drive(provider), "gauss_seidel", 5e-4, options={"extrapolation": 2})
         found = master.run(0.01, inputs=INPUTS, record=SIGNALS)
         errors.append(np.max(np.abs(found.values - fine.values[::10]), axis=0))
-        monkeypatch.setattr("cosim.execution.find_past", lambda run: None)
+        monkeypatch.setattr("cosim.master.execution.find_past", lambda run: None)
     # the first step is one of twenty, and the only one with held inputs
     assert errors[0][0] < 0.5 * errors[1][0] and errors[0][1] < errors[1][1]
 

@@ -10,15 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cosim import library
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
 from cosim.calibrate.problem import Problem
-from cosim.cli_diagnose import _spread
+from cosim.cli.diagnose import _spread
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis, _look_further
 from cosim.diagnose.further import carried, judged
 from cosim.errors import ScenarioError, VariantError
+from cosim.installation import places
 from cosim.report.page import _further
 
 COULOMB = Candidate("load", "inertial_load", "coulomb", "flange")
@@ -33,7 +33,7 @@ further = {further}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two motor runs, one of which is `warm` and has a system file of its own."""
     place = tmp_path_factory.mktemp("two")
-    bench = library.scenarios() / "motor_bench"
+    bench = places.scenarios() / "motor_bench"
     described = (bench / "data/MB-12/set.toml").read_text("utf-8")
     parts = [p for p in described.split("[[run]]") if "run" not in p or "ST1" in p or "MX1" in p]
     parts = [p + f"warm = {str('MX1' in p).lower()}\n" if "file" in p else p for p in parts]
@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         source = bench / f"data/MB-12/runs/{name}.parquet"
         (place / f"runs/{name}.parquet").write_bytes(source.read_bytes())
     (place / "motor_bench.toml").write_bytes((bench / "data/motor_bench.toml").read_bytes())
-    system = (library.scenarios() / "systems/motor_bench.toml").read_text("utf-8")
+    system = (places.scenarios() / "systems/motor_bench.toml").read_text("utf-8")
     (place / "warm_bench.toml").write_text(system, "utf-8")
     base = (bench / "dataset.toml").as_posix()
     (place / "dataset.toml").write_text(

@@ -15,7 +15,7 @@ import pytest
 from benchmarks.motor_plant import Bench, draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
-from cosim.cli_diagnose import _value
+from cosim.cli.diagnose import _value
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.search import Round, Search

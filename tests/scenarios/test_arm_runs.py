@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cosim import library
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
+from cosim.installation import places
 
-BENCH = library.scenarios() / "mobile_manipulator_bench"
+BENCH = places.scenarios() / "mobile_manipulator_bench"
 FOLDED = (3.14, -1.95, 2.25, -1.87, -1.57, 0.0)
 END = 6.0
 

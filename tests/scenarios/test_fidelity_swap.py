@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cosim.runner import run
-from cosim.scenario import find
-from cosim.variants import component
+from cosim.scenario.runner import run
+from cosim.scenario.scenario import find
+from cosim.system.variants import component
 from sources.variant import fidelities
 from tests.scenarios.running import PROVIDER
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cosim.plots import plot_overview
-from cosim.runner import run
-from cosim.scenario import find, scenario_files
+from cosim.scenario.plots import plot_overview
+from cosim.scenario.runner import run
+from cosim.scenario.scenario import find, scenario_files
 from tests.scenarios.running import PROVIDER, whole
 
 FILES = {file.name: file for file in scenario_files()}

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.real_logs import errors, inverse, model_of
-from cosim import library
 from cosim.calibrate import read_problem
 from cosim.files import read_toml
+from cosim.installation import places
 
 MAPPINGS = ("emps/dataset.toml", "emps/open_loop.toml", "bam_servo/dataset.toml",
             "kmutt_dcmotor/dataset.toml", "ur10e/dataset.toml", "ur10e/friction.toml")  # fmt: skip
@@ -43,7 +43,7 @@ def write_logs(folder: Path, mapping: Path) -> None:
 
 @pytest.mark.parametrize("name", MAPPINGS)
 def test_mapping_fits_its_system(name: str, tmp_path: Path) -> None:
-    mapping = library.scenarios() / name
+    mapping = places.scenarios() / name
     write_logs(tmp_path, mapping)
     problem = read_problem(tmp_path, mapping=mapping)
     assert {run.purpose for run in problem.runs} == {"identification", "validation"}
@@ -61,7 +61,7 @@ def test_mapping_fits_its_system(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["emps", "bam_servo", "kmutt_dcmotor", "ur10e"])
 def test_models_of_the_benchmark_can_be_simulated(name: str, tmp_path: Path) -> None:
-    folder = library.scenarios() / name
+    folder = places.scenarios() / name
     write_logs(tmp_path, folder / "dataset.toml")
     problem = read_problem(tmp_path, mapping=folder / "dataset.toml")
     table = read_toml(folder / "models.toml")
@@ -74,7 +74,7 @@ def test_models_of_the_benchmark_can_be_simulated(name: str, tmp_path: Path) -> 
 
 
 def test_inverse_model_of_its_own_motion_needs_the_commanded_force(tmp_path: Path) -> None:
-    folder = library.scenarios() / "emps"
+    folder = places.scenarios() / "emps"
     write_logs(tmp_path, folder / "dataset.toml")
     problem = read_problem(tmp_path, mapping=folder / "dataset.toml")
     theta, name = problem.nominal, problem.runs[0].name

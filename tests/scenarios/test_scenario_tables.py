@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.comparison import circle
+from cosim.data.comparison import circle
 from cosim.errors import InputError, ScenarioError
-from cosim.runner import run
-from cosim.scenario import find
+from cosim.scenario.runner import run
+from cosim.scenario.scenario import find
 from tests.scenarios.running import PROVIDER
 
 SYSTEM = """

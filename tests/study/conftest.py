@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cosim.cli import default_provider
+from cosim.installation.builder import default_provider
 from cosim.study import Study, StudyResult, run_study, study_from
 from tests.coupling.faulty import build_faulty
 

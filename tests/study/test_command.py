@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from cosim.cli import app
+from cosim.cli.app import app
 from cosim.errors import CosimError, InputError, StudyError
 from tests.outside import hear_interrupts
 from tests.study.conftest import BASE
@@ -98,7 +98,7 @@ def isolated(pid: int) -> list[int]:
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
         for child in map(int, path.read_text().split()):
             with suppress(OSError):  # it has ended
-                if b"cosim.isolated" in Path(f"/proc/{child}/cmdline").read_bytes():
+                if b"cosim.master.isolation_worker" in Path(f"/proc/{child}/cmdline").read_bytes():
                     found.append(child)
     return found
 

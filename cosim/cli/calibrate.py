@@ -1,0 +1,151 @@
+"""`cosim calibrate`: estimate the declared parameters of a system from measured runs."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from ..calibrate.estimate import Estimate, channel_rms
+from ..calibrate.fit import fit
+from ..calibrate.mapping import read_problem
+from ..calibrate.nuisance import settled
+from ..calibrate.sensitivity import Correlation, correlation_index, local, tornado
+from ..calibrate.validate import Finding, check_data, check_model
+from ..errors import InputError
+
+
+def calibrate_command(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    system: Annotated[
+        str | None, typer.Option(help="Another system than that of the mapping.")
+    ] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(help="Parameter sets for the correlation index, 0 for none.")
+    ] = 40,
+    out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON value to stdout.")
+    ] = False,
+) -> None:
+    """Estimate the declared parameters of a system from measured runs.
+
+    Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
+    """
+    started = time.perf_counter()
+    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    findings = check_data(problem)
+    if not any(f.severity == "error" for f in findings):
+        findings += check_model(problem)
+    for finding in findings:
+        typer.echo(str(finding), err=True)
+    if any(f.severity == "error" for f in findings):
+        raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
+    estimate = fit(problem)
+    correlation = correlation_index(problem, estimate.theta, samples) if samples else None
+    content = calibration_table(estimate, correlation, findings)
+    content["wall_s"] = time.perf_counter() - started
+    folder = out or Path("out") / problem.name
+    folder.mkdir(parents=True, exist_ok=True)
+    content["files"] = [str(folder / "calibration.json")]
+    if correlation is not None:
+        content["files"].append(str(tornado(correlation, folder / "tornado.png")))
+    text = json.dumps(content, indent=2)
+    (folder / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(text)
+    else:
+        _print(content)
+
+
+def calibration_table(
+    estimate: Estimate, correlation: Correlation | None, findings: list[Finding]
+) -> dict[str, Any]:
+    """What `--json` prints."""
+    problem = estimate.problem
+    fitted = channel_rms(problem, estimate.residuals)
+    unused = [run.name for run in problem.runs if run.purpose == "validation"]
+    checked = validation_rms(estimate) if unused else {}
+    return {
+        "dataset": problem.name,
+        "system": problem.file.name,
+        "parameters": {
+            p.name: {
+                "value": value,
+                "ci95": [low, high],
+                "unit": p.unit,
+                "identifiable": bool(known),
+                "nominal": p.nominal,
+                "at_bound": p.name in estimate.at_bound,
+            }
+            for p, value, low, high, known in zip(
+                problem.parameters, estimate.theta.tolist(), estimate.low.tolist(),
+                estimate.high.tolist(), estimate.identifiable, strict=True,
+            )
+            if p.role != "nuisance"
+        },
+        "not_separable": [str(item) for item in estimate.combinations if str(item)],
+        "channels": {
+            c.name: {
+                "unit": c.unit,
+                "noise_rms": c.sigma,
+                "identification": _scaled(fitted.get(c.name), c.sigma),
+                "validation": _scaled(checked.get(c.name), c.sigma),
+            }
+            for c in problem.channels
+        },
+        "sensitivity": {
+            "local": local(estimate),
+            "correlation": dict(correlation.index) if correlation else {},
+            "correlation_limit": correlation.limit if correlation else None,
+        },
+        "findings": [finding.to_dict() for finding in findings],
+        "evaluations": estimate.problem.evaluations,
+    }  # fmt: skip
+
+
+def validation_rms(estimate: Estimate) -> dict[str, float]:
+    """Residuals over sigma on the runs that were not fitted, their own values fitted."""
+    problem = estimate.problem
+    names = [run.name for run in problem.runs if run.purpose == "validation"]
+    return channel_rms(problem, problem.residuals(settled(problem, estimate.theta, names), names))
+
+
+def _scaled(value: float | None, sigma: float) -> float | None:
+    return None if value is None or math.isnan(value) else value * sigma
+
+
+def _print(content: dict[str, Any]) -> None:
+    console = Console()
+    console.print(f"{content['dataset']} with {content['system']}, {content['wall_s']:.1f} s")
+    table = Table("parameter", "value", "95 %", "unit", "nominal", "")
+    for name, item in content["parameters"].items():
+        low, high = item["ci95"]
+        note = "" if item["identifiable"] else "not identifiable"
+        table.add_row(
+            name, f"{item['value']:.5g}", f"{low:.5g} to {high:.5g}", item["unit"],
+            f"{item['nominal']:.5g}", note + (" at bound" if item["at_bound"] else ""),
+        )  # fmt: skip
+    console.print(table)
+    for text in content["not_separable"]:
+        console.print(f"the runs do not tell apart: {text} (in spans)")
+    table = Table("channel", "unit", "noise", "identification", "validation")
+    for name, item in content["channels"].items():
+        cells = (item["identification"], item["validation"])
+        table.add_row(
+            name, item["unit"], f"{item['noise_rms']:.4g}",
+            *("-" if value is None else f"{value:.4g}" for value in cells),
+        )  # fmt: skip
+    console.print(table)
+    for path in content["files"]:
+        console.print(path, soft_wrap=True)

@@ -1,0 +1,103 @@
+"""`cosim diagnose`: from measured data to the name of the missing physics."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from ..calibrate.mapping import read_problem
+from ..diagnose import Diagnosis, diagnose
+from ..diagnose.further import Further
+from ..report import write_page
+
+
+def diagnose_command(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    system: Annotated[
+        str | None, typer.Option(help="Another system than that of the mapping.")
+    ] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON value to stdout.")
+    ] = False,
+) -> None:
+    """Find what a model lacks: calibrate, test, attribute, add the effect, judge on unused runs.
+
+    Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
+    """
+    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    folder = out or Path("out") / problem.name
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = time.monotonic()
+    result = diagnose(
+        problem, folder,
+        lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
+    )  # fmt: skip
+    page, table = folder / "report.html", folder / "diagnosis.json"
+    write_page(result, page)
+    result.files += [page, table]
+    content = result.to_dict()
+    table.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(json.dumps(content, indent=2))
+    else:
+        _print(result)
+
+
+def _print(result: Diagnosis) -> None:
+    console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
+    console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
+    for effect in result.effects():
+        values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
+        console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    table = Table()
+    for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
+                 "after valid."):  # fmt: skip
+        table.add_column(head, no_wrap=True)
+    for name, row in result.to_dict()["channels"].items():
+        cells = [row["before"]["identification"], row["before"]["validation"],
+                 row["after"]["identification"], row["after"]["validation"]]  # fmt: skip
+        table.add_row(
+            name, row["unit"], f"{row['noise_rms']:.4g}",
+            *("-" if value is None else f"{value:.4g}" for value in cells),
+        )  # fmt: skip
+    console.print(table)
+    for item in result.further:
+        console.print(_spread(item), soft_wrap=True)
+    console.print(f"in {result.files[-1].parent}", soft_wrap=True)
+
+
+def _spread(further: Further) -> str:
+    """How far runs of another system are from the noise, least and most over channels and runs."""
+    spans = []
+    for which in ("before", "after"):
+        sizes = [
+            size
+            for run in further.problem.runs
+            for column in range(len(further.problem.channels))
+            if (size := further.rms(which, column, run.name)) is not None
+        ]
+        spans.append(f"{min(sizes):.2f} to {max(sizes):.2f}" if sizes else "-")
+    runs = ", ".join(run.name for run in further.problem.runs)
+    return (
+        f"{runs} with {further.problem.file.path.stem}, residuals over the noise: "
+        f"before {spans[0]}, after {spans[1]}"
+    )
+
+
+def _value(name: str, entry: dict[str, Any]) -> str:
+    """A parameter with its interval; open if the data say no more than its bounds."""
+    low, high = entry["ci95"]
+    tail = "" if entry["identifiable"] else " (open)"
+    return f"{name} = {entry['value']:.4g} [{low:.4g}, {high:.4g}] {entry['unit']}{tail}"

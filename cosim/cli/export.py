@@ -1,0 +1,58 @@
+"""`cosim export` and `cosim draw`: a scenario's system as SSP archive or picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from ..files import write_text
+from ..installation import builder
+from ..scenario import scenario as scenarios
+from ..scenario.scenario import Scenario
+from ..ssp import export
+from ..system.variants import apply
+
+Name = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="Name, folder or .toml file, with /RUN.")
+]
+
+
+def _only(name: str) -> Scenario:
+    file, wanted = scenarios.find(name)
+    if not wanted and len(file.runs) > 1:
+        raise InputError(
+            f"{name} has {len(file.runs)} runs; name one, e.g. {name}/{next(iter(file.runs))}"
+        )
+    return file.scenario(wanted or next(iter(file.runs)))
+
+
+def export_command(
+    name: Name,
+    ssp: Annotated[Path, typer.Option(help="The .ssp file to write.")],
+    ssp_version: Annotated[str, typer.Option(help="1.0 or 2.0.")] = "1.0",
+) -> None:
+    """Write a scenario's system, inputs and FMUs as an SSP archive for other tools.
+
+    Example: `cosim export mobile_manipulator/IY --ssp iy.ssp`
+    """
+    if ssp_version not in ("1.0", "2.0"):
+        raise InputError(f"--ssp-version {ssp_version}: must be 1.0 or 2.0")
+    print(export(_only(name), ssp, builder.default_provider(), version=ssp_version))
+
+
+def draw_command(
+    name: Name, out: Annotated[Path, typer.Option(help="The .svg file to write.")]
+) -> None:
+    """Draw a scenario's system as SVG.
+
+    Example: `cosim draw mobile_manipulator/IY --out iy.svg`
+    """
+    item, provider = _only(name), builder.default_provider()
+    instances = apply(item.system.instances, item.variants, provider, item.folder)
+    system = replace(item.system, instances=instances).build(provider, item.parameters)
+    write_text(out, system.svg())
+    print(out)

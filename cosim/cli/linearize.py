@@ -1,0 +1,141 @@
+"""`cosim linearize`: poles and open loops of a system, or of one FMU, at an operating point."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from ..control.linearize import Linear, Margins, connect, loop_margins, operating_point, plot_bode
+from ..files import atomic, write_text
+from ..installation import builder
+from ..master.master import Driver, Master
+from ..scenario import scenario as scenarios
+from ..system.system import System
+from ..system.variants import apply
+
+MOST = 24
+"""Loops that are looked at if none are named."""
+
+
+def linearize_command(
+    name: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario, run, or an .fmu.")],
+    at: Annotated[float, typer.Option(help="Time of the operating point [s].")] = 0.0,
+    cut: Annotated[
+        list[str] | None,
+        typer.Option(help="Connected input at which a loop is cut [all that feed back]."),
+    ] = None,
+    delay: Annotated[float, typer.Option(help="Dead time added to each loop [s].")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Folder for bode.png and linear.json.")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON value to stdout.")
+    ] = False,
+) -> None:
+    """Linearize a system: poles, margins of its loops, Bode plot.
+
+    Example: `cosim linearize motor_bench --at 1 --cut motor.w --out out/linear`
+    """
+    master, inputs = _master(name)
+    parts, notes = operating_point(master, at, inputs)
+    system = connect(master, parts, notes)
+    names = cut or [wire.target for wire in master.system.connections]
+    loops = loop_margins(master, parts, names[:MOST] if not cut else names, delay)
+    content = _content(name, system, loops)
+    if out is not None:
+        if loops:
+            with atomic(out / "bode.png") as picture:
+                plot_bode(loops, picture)
+        matrices = {key: getattr(system, key).tolist() for key in "abcd"}
+        text = json.dumps({**content, **matrices}, indent=1)
+        write_text(out / "linear.json", text + "\n")
+    if as_json:
+        typer.echo(json.dumps(content, indent=2))
+    else:
+        _print(content, out)
+
+
+def _master(name: str) -> tuple[Master, dict[str, Driver]]:
+    if name.endswith(".fmu"):
+        system = System(Path(name).stem)
+        system.add("fmu", name)
+        return Master(system), {}
+    file, run = scenarios.find(name)
+    item = file.scenario(run or next(iter(file.runs)))
+    provider = builder.default_provider()
+    instances = apply(item.system.instances, item.variants, provider, item.folder)
+    document = item.system
+    system = System(document.name, provider, document.text)
+    for instance, reference in instances.items():
+        system.add(instance, reference, base=document.path.parent)
+    for wire in document.connections:
+        system.connect(
+            wire.source, wire.target, factor=wire.factor, offset=wire.offset, convert=wire.convert
+        )
+    for key, value in {**document.parameters, **item.parameters}.items():
+        system.set(key, value)
+    master = Master(system, item.algorithm, item.step, item.tolerance, item.name)
+    return master, dict(item.inputs)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _content(name: str, system: Linear, loops: list[Margins]) -> dict[str, Any]:
+    return {
+        "of": name,
+        "time_s": _finite(system.time),
+        "states": list(system.states),
+        "inputs": list(system.inputs),
+        "outputs": list(system.outputs),
+        "poles": [
+            {
+                "real_1_per_s": float(pole.real),
+                "imag_rad_per_s": float(pole.imag),
+                "frequency_Hz": abs(pole) / (2.0 * math.pi),
+                "damping": float(-pole.real / abs(pole)) if abs(pole) > 0.0 else None,
+            }
+            for pole in system.poles
+        ],
+        "loops": [
+            {
+                "cut": loop.name,
+                "crossover_Hz": _finite(loop.crossover),
+                "phase_margin_deg": _finite(loop.phase),
+                "gain_margin": _finite(loop.gain),
+            }
+            for loop in loops
+        ],
+        "notes": list(system.notes),
+    }
+
+
+def _print(content: dict[str, Any], out: Path | None) -> None:
+    console = Console()
+    console.print(
+        f"{content['of']} at t = {content['time_s'] or 0.0:g} s: {len(content['states'])} states",
+        soft_wrap=True,
+    )
+    table = Table("pole [1/s]", "frequency [Hz]", "damping")
+    for pole in content["poles"]:
+        if pole["imag_rad_per_s"] >= 0.0:
+            imag = pole["imag_rad_per_s"]
+            text = f"{pole['real_1_per_s']:.4g}" + (f" ± {imag:.4g}j" if imag else "")
+            damping = "-" if pole["damping"] is None else f"{pole['damping']:.3f}"
+            table.add_row(text, f"{pole['frequency_Hz']:.4g}", damping)
+    console.print(table)
+    if content["loops"]:
+        table = Table("loop cut at", "crossover [Hz]", "phase margin [deg]", "gain margin")
+        for loop in content["loops"]:
+            cells = [loop[key] for key in ("crossover_Hz", "phase_margin_deg", "gain_margin")]
+            table.add_row(loop["cut"], *("-" if x is None else f"{x:.4g}" for x in cells))
+        console.print(table)
+    for note in content["notes"]:
+        console.print(f"note: {note}", soft_wrap=True)
+    if out is not None:
+        console.print(f"in {out}", soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Systems as control engineers look at them."""

@@ -1,0 +1,1 @@
+"""Numbers over time: recordings, signals, logs of measurements, and how they compare."""

@@ -1,0 +1,136 @@
+"""How far a recording is from a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UnitError, ValueRangeError
+from ..spec.units import conversion, parse
+from .recording import Recording
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a signal, or a path of several signals, is compared with.
+
+    Attributes:
+        signals: names in the recording; of several, all of one unit, the distance is taken.
+        times: sample times [s].
+        values: samples, one column per signal; gaps are NaN.
+        unit: of the values, "" if the signals'.
+        text: where it comes from.
+    """
+
+    signals: tuple[str, ...]
+    times: Vector
+    values: Vector
+    unit: str
+    text: str
+
+    @property
+    def name(self) -> str:
+        """The signals in one text."""
+        return ", ".join(self.signals)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Differences `simulated - reference` on the reference's time grid, in the signals' unit.
+
+    Attributes:
+        signals: names in the recording.
+        unit: of the signals.
+        rms, max: root mean square and largest magnitude of the differences.
+        count: number of samples compared.
+        reference: where the reference comes from.
+        times, differences: the differences themselves; of a path the distances.
+    """
+
+    signals: tuple[str, ...]
+    unit: str
+    rms: float
+    max: float
+    count: int
+    reference: str
+    times: Vector
+    differences: Vector
+
+
+def circle(times: Vector, start: Sequence[float], centre: Sequence[float], rate: float) -> Vector:
+    """Points, one row per time, of a motion about a centre at a constant rate [rad/s]."""
+    x, y = start[0] - centre[0], start[1] - centre[1]
+    c, s = np.cos(rate * times), np.sin(rate * times)
+    return np.column_stack([centre[0] + c * x - s * y, centre[1] + s * x + c * y])
+
+
+def _unit(recording: Recording, reference: Reference) -> str:
+    units = {recording.units.get(name, "") for name in reference.signals}
+    if len(units) > 1:
+        raise UnitError(
+            f"cannot take the distance of {reference.name}: their units are "
+            f"{', '.join(sorted(units))}; compare them one by one"
+        )
+    return units.pop()
+
+
+def convert_reference(recording: Recording, reference: Reference) -> Vector:
+    """The reference's values in the signals' unit, one column per signal.
+
+    Raises:
+        UnitError: the units do not convert.
+    """
+    unit = _unit(recording, reference)
+    if not reference.unit or not unit:
+        return reference.values
+    try:
+        gain, offset = conversion(parse(reference.unit), parse(unit))
+    except UnitError as error:
+        raise UnitError(f"cannot compare {reference.name} with {reference.text}: {error}") from None
+    return reference.values * gain + offset
+
+
+def compare(recording: Recording, reference: Reference) -> Comparison:
+    """Compare a signal, or a path, with a reference.
+
+    The recording is interpolated linearly to the reference's times; samples outside the recording
+    and gaps (NaN) are left out.
+
+    Raises:
+        UnknownNameError: the signal was not recorded.
+        UnitError: the units do not convert.
+        ValueRangeError: no sample of the reference lies within the recording.
+    """
+    values = convert_reference(recording, reference)
+    margin = 1e-9  # sample times and k * h differ by rounding
+    inside = (
+        np.isfinite(values).all(axis=1)
+        & (reference.times >= recording.time[0] - margin)
+        & (reference.times <= recording.time[-1] + margin)
+    )
+    times = reference.times[inside]
+    if not times.size:
+        raise ValueRangeError(
+            f"{reference.text}: no sample lies within the recording of {reference.name} "
+            f"({recording.time[0]:g} s to {recording.time[-1]:g} s)"
+        )
+    apart = [
+        np.interp(times, recording.time, recording[name]) - values[inside, column]
+        for column, name in enumerate(reference.signals)
+    ]
+    differences = apart[0] if len(apart) == 1 else np.sqrt(np.sum(np.square(apart), axis=0))
+    return Comparison(
+        signals=reference.signals,
+        unit=_unit(recording, reference),
+        rms=float(np.sqrt(np.mean(differences**2))),
+        max=float(np.max(np.abs(differences))),
+        count=int(times.size),
+        reference=reference.text,
+        times=times,
+        differences=differences,
+    )

@@ -1,0 +1,250 @@
+"""Measured data: one run's columns (`Log`), and folders of runs with a rig sheet (`DataSet`).
+
+A data set is a folder with `set.toml` (rig, sheet, runs with file and purpose) and, beside it or
+up to two folders above, the rig sheet that it names, which gives the columns' units and noise.
+Plain CSV, Parquet and npz files are logs too; CSV heads such as `speed [rad/s]` carry units.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ScenarioError, UnknownNameError, listing
+from ..files import read_toml
+
+Vector = NDArray[np.float64]
+_HEAD = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
+
+
+@dataclass(frozen=True)
+class Log:
+    """Columns over time.
+
+    Attributes:
+        name: of the run or file, for texts.
+        columns: by name; gaps are NaN.
+        units: by column; "" where unknown.
+        noise: standard deviation by column, where the rig sheet gives it.
+        values: further entries of the run in `set.toml`, e.g. start values and purpose.
+    """
+
+    name: str
+    columns: Mapping[str, Vector]
+    units: Mapping[str, str] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, column: str) -> Vector:
+        """A column.
+
+        Raises:
+            UnknownNameError: with the nearest names.
+        """
+        if column not in self.columns:
+            raise UnknownNameError(
+                f"{self.name}: has no column {column!r}; {listing(self.columns, column)}"
+            )
+        return self.columns[column]
+
+    @property
+    def time(self) -> Vector:
+        """Sample times [s]."""
+        return self["time"]
+
+
+def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+    with path.open(encoding="utf-8-sig", newline="") as handle:
+        rows = [row for row in csv.reader(handle) if row and not row[0].startswith("#")]
+    if not rows:
+        raise ScenarioError(f"{path}: is empty")
+    units, names = {}, []
+    for head in rows[0]:
+        match = _HEAD.fullmatch(head.strip())
+        name = match["name"] if match else head.strip()
+        names.append(name)
+        units[name] = match["unit"] if match else ""
+    columns: dict[str, Vector] = {}
+    for index, name in enumerate(names):
+        texts = [row[index].strip() if index < len(row) else "" for row in rows[1:]]
+        try:
+            columns[name] = np.array([float(text) if text else np.nan for text in texts])
+        except ValueError:
+            continue  # a column of text is no signal
+    return columns, units
+
+
+def _parquet(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise ScenarioError(f"{path}: is not a Parquet file ({error})") from error
+    columns, units = {}, {}
+    for item in table.schema:
+        if pa.types.is_floating(item.type) or pa.types.is_integer(item.type):
+            columns[item.name] = table[item.name].to_numpy().astype(np.float64)
+            units[item.name] = (item.metadata or {}).get(b"unit", b"").decode()
+    return columns, units
+
+
+def _split(name: str, values: Vector) -> dict[str, Vector]:
+    """A column, or the columns `name_1`, `name_2` of a table with one row per sample."""
+    if values.ndim == 1:
+        return {name: values}
+    if values.ndim == 2:
+        return {f"{name}_{i}": column for i, column in enumerate(values.T, 1)}
+    return {}
+
+
+def _npz(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+    try:
+        with np.load(path) as archive:
+            columns = {
+                one: values
+                for name in archive.files
+                if archive[name].dtype.kind in "fiub"
+                for one, values in _split(name, archive[name].astype(np.float64)).items()
+            }
+    except (ValueError, OSError, EOFError) as error:
+        raise ScenarioError(f"{path}: is not an npz archive of numbers ({error})") from error
+    return columns, {}
+
+
+def _mat(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, squeeze_me=True)
+    except (ValueError, OSError, NotImplementedError) as error:
+        raise ScenarioError(
+            f"{path}: is not a MATLAB file of version 7 or older ({error}); save it with -v7"
+        ) from error
+    columns = {
+        name: np.asarray(value, dtype=np.float64)
+        for name, value in content.items()
+        if not name.startswith("__")
+        and getattr(value, "ndim", 0) == 1
+        and value.dtype.kind in "fiub"
+    }
+    return columns, {}
+
+
+_READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mat": _mat}
+
+
+def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log:
+    """Read a CSV, Parquet, npz or MATLAB file.
+
+    Raises:
+        ScenarioError: missing or unreadable.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ScenarioError(f"{path}: there is no such file")
+    reader = _READERS.get(path.suffix)
+    if reader is None:
+        raise ScenarioError(f"{path}: logs are {', '.join(_READERS)} files")
+    columns, found = reader(path)
+    return Log(path.name, columns, {**found, **(units or {})})
+
+
+@dataclass(frozen=True)
+class Run:
+    """An entry of `set.toml`.
+
+    Attributes:
+        name: of the run.
+        file: path of its log.
+        purpose: identification or validation.
+        values: all entries, e.g. start values.
+    """
+
+    name: str
+    file: Path
+    purpose: str
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A folder of runs.
+
+    Attributes:
+        folder: where it is.
+        name, rig: as in `set.toml`.
+        runs: by name.
+        sheet: content of the rig sheet.
+        units, noise: of the columns, from the sheet.
+    """
+
+    folder: Path
+    name: str
+    rig: str
+    runs: Mapping[str, Run]
+    sheet: Mapping[str, Any]
+    units: Mapping[str, str]
+    noise: Mapping[str, float]
+
+    def log(self, run: str) -> Log:
+        """Read a run.
+
+        Raises:
+            UnknownNameError: no such run.
+            ScenarioError: its file is missing or unreadable.
+        """
+        if run not in self.runs:
+            raise UnknownNameError(f"data set {self.name}: {listing(self.runs, run)} as run")
+        entry = self.runs[run]
+        log = read_log(entry.file, units=self.units)
+        return Log(f"{self.name}/{run}", log.columns, log.units, self.noise, entry.values)
+
+
+def _sheet(folder: Path, name: str) -> dict[str, Any]:
+    for place in (folder, folder.parent, folder.parent.parent):
+        if (place / name).is_file():
+            return read_toml(place / name)
+    raise ScenarioError(
+        f"{folder / 'set.toml'}: the rig sheet {name!r} is not here nor in the two folders above"
+    )
+
+
+def read_data_set(folder: Path | str) -> DataSet:
+    """Read a data set's description; the logs are read when asked for.
+
+    Raises:
+        ScenarioError: `set.toml` or the sheet is missing or wrong.
+    """
+    folder = Path(folder)
+    table = read_toml(folder / "set.toml")
+    sheet = _sheet(folder, table["sheet"]) if "sheet" in table else {}
+    try:
+        runs = {
+            entry["name"]: Run(
+                entry["name"], folder / entry["file"], entry.get("purpose", ""), dict(entry)
+            )
+            for entry in table.get("run", [])
+        }
+        signals = sheet.get("signal", [])
+        units = {entry["name"]: entry.get("unit", "") for entry in signals}
+        noise = {entry["name"]: float(entry.get("noise_sigma", 0.0)) for entry in signals}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ScenarioError(f"{folder / 'set.toml'}: an entry is incomplete ({error})") from error
+    return DataSet(
+        folder,
+        table.get("set", folder.name),
+        table.get("rig", ""),
+        runs,
+        sheet,
+        units,
+        noise,
+    )

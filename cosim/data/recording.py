@@ -1,0 +1,209 @@
+"""What a run recorded: columns over time, with units and where they come from."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ScenarioError, UnknownNameError, listing
+from ..files import atomic
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+Vector = NDArray[np.float64]
+_META = b"cosim"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Signals over time.
+
+    Attributes:
+        time: communication points [s].
+        values: one row per time, one column per signal.
+        names: full scalar names, `instance.variable`.
+        units: unit by name, "" where the FMU declares none.
+        provenance: FMU files and hashes, parameters, algorithm, step, versions.
+        bond_energy: energy that the coupling invented at each power bond [J], positive if the two
+            ends together received more than was sent.
+        error: why the run stopped before its end, "" if it did not.
+    """
+
+    time: Vector
+    values: Vector
+    names: tuple[str, ...]
+    units: Mapping[str, str]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    bond_energy: Mapping[str, float] = field(default_factory=dict)
+    error: str = ""
+
+    @property
+    def energy_residual(self) -> float:
+        """Energy that the coupling invented at all power bonds together [J]."""
+        return float(sum(self.bond_energy.values()))
+
+    def find(self, name: str) -> list[int]:
+        """Columns of a signal, or of all elements of a vector.
+
+        Raises:
+            UnknownNameError: it was not recorded.
+        """
+        if name in self.names:
+            return [self.names.index(name)]
+        found: list[int] = []
+        while f"{name}[{len(found) + 1}]" in self.names:
+            found.append(self.names.index(f"{name}[{len(found) + 1}]"))
+        if not found:
+            raise UnknownNameError(f"no signal {name!r} was recorded; {listing(self.names, name)}")
+        return found
+
+    def __getitem__(self, name: str) -> Vector:
+        """A signal over time; a vector has one column per element."""
+        columns = self.find(name)
+        whole = self.values[:, columns]
+        return whole[:, 0] if name in self.names else whole
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        end = f"{self.time[-1]:g} s" if len(self.time) else "empty"
+        failed = f", stopped: {self.error}" if self.error else ""
+        return f"<Recording of {len(self.names)} signals, {len(self)} times to {end}{failed}>"
+
+    # -- other forms -----------------------------------------------------------------------------
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A data frame over time [s]; units and provenance are in its `attrs`."""
+        import pandas as pd
+
+        frame = pd.DataFrame(
+            self.values, index=pd.Index(self.time, name="time"), columns=list(self.names)
+        )
+        frame.attrs.update(
+            units=dict(self.units), provenance=dict(self.provenance), error=self.error
+        )
+        return frame
+
+    def _meta(self) -> dict[str, Any]:
+        return {
+            "units": {"time": "s", **self.units},
+            "provenance": dict(self.provenance),
+            "bond_energy_J": dict(self.bond_energy),
+            "error": self.error,
+        }
+
+    def write_csv(self, path: Path | str) -> Path:
+        """Write a CSV file whose head names each column with its unit, `motor.w [rad/s]`."""
+        path = Path(path)
+        heads = ["time [s]"] + [
+            f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.names
+        ]
+        with (
+            atomic(path) as temporary,
+            temporary.open("w", encoding="utf-8", newline="") as handle,
+        ):
+            writer = csv.writer(handle)
+            writer.writerow(heads)
+            for time, row in zip(self.time.tolist(), self.values.tolist(), strict=True):
+                writer.writerow([repr(time), *map(repr, row)])
+        return path
+
+    def write_parquet(self, path: Path | str) -> Path:
+        """Write a Parquet file; unit in each column's metadata, the rest in the schema's."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path = Path(path)
+        fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})] + [
+            pa.field(name, pa.float64(), metadata={"unit": self.units.get(name, "")})
+            for name in self.names
+        ]
+        columns = [self.time, *self.values.T]
+        schema = pa.schema(fields, metadata={_META: json.dumps(self._meta()).encode()})
+        with atomic(path) as temporary:
+            pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
+        return path
+
+    def plot(
+        self,
+        signals: Sequence[str] | None = None,
+        path: Path | str | None = None,
+        references: Mapping[str, tuple[Vector, Vector, str]] | None = None,
+    ) -> Figure:
+        """Plot signals over time, those with the same unit in one axes.
+
+        Args:
+            signals: names (vectors too); all if not given.
+            path: where to write the figure; the suffix says how.
+            references: signal -> (times, values, label), drawn with it.
+        """
+        from matplotlib.figure import Figure
+
+        wanted = list(signals) if signals is not None else list(self.names)
+        names = [self.names[column] for name in wanted for column in self.find(name)]
+        groups: dict[str, list[str]] = {}
+        for name in names:
+            groups.setdefault(self.units.get(name, ""), []).append(name)
+        figure = Figure(figsize=(9.0, 1.0 + 2.2 * max(len(groups), 1)), layout="constrained")
+        axes = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, (unit, members) in zip(axes, groups.items(), strict=False):
+            for name in members:
+                times, values, label = (references or {}).get(name, (None, None, ""))
+                if times is not None:
+                    axis.plot(times, values, color="0.6", linewidth=2.0, label=label)
+                axis.plot(self.time, self[name], linewidth=1.0, label=name)
+            axis.set_ylabel(f"[{unit}]" if unit else "")
+            axis.grid(True, alpha=0.3)
+            if len(members) <= 12:
+                axis.legend(loc="upper right", fontsize="small")
+        axes[-1].set_xlabel("time [s]")
+        title = str(self.provenance.get("scenario") or self.provenance.get("system") or "")
+        figure.suptitle(title + (f" (stopped: {self.error[:80]})" if self.error else ""))
+        if path is not None:
+            with atomic(Path(path)) as temporary:
+                figure.savefig(temporary, dpi=120)
+        return figure
+
+
+def read_recording(path: Path | str) -> Recording:
+    """Read a recording that `write_parquet` wrote.
+
+    Raises:
+        ScenarioError: missing, or not such a file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = Path(path)
+    if not path.is_file():
+        raise ScenarioError(f"{path}: there is no such file")
+    try:
+        table = pq.read_table(path)
+    except pa.ArrowInvalid as error:
+        raise ScenarioError(f"{path}: is not a Parquet file ({error})") from error
+    metadata = table.schema.metadata or {}
+    if _META not in metadata or "time" not in table.column_names:
+        raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
+    meta = json.loads(metadata[_META])
+    names = tuple(name for name in table.column_names if name != "time")
+    columns = [table[name].to_numpy() for name in names]
+    time = table["time"].to_numpy()
+    return Recording(
+        time=time,
+        values=np.column_stack(columns) if columns else np.zeros((len(time), 0)),
+        names=names,
+        units={name: unit for name, unit in meta["units"].items() if name != "time"},
+        provenance=meta["provenance"],
+        bond_energy=meta["bond_energy_J"],
+        error=meta["error"],
+    )

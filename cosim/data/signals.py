@@ -1,0 +1,150 @@
+"""What drives an open input over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ValueRangeError
+
+Vector = NDArray[np.float64]
+CLOCK = 1e-3
+"""Fraction of a sample interval within which two times are the same: logs keep sample times
+rounded (often to 32 bits), so a sample may seem to come just after the communication point that it
+belongs to."""
+
+
+class Signal(Protocol):
+    """Values over time, in `unit`."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values; "" if it is the input's."""
+        ...
+
+    @property
+    def text(self) -> str:
+        """Where it comes from, for recordings and error texts."""
+        ...
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times."""
+        ...
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value at all times."""
+
+    value: float
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.value):
+            raise ValueRangeError(f"constant input {self.value} is not finite")
+
+    @property
+    def text(self) -> str:
+        """The value."""
+        return f"{self.value:g} {self.unit}".strip()
+
+    def at(self, times: Vector) -> Vector:
+        """The value, once per time."""
+        return np.full(times.shape, self.value)
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of time that takes and returns arrays (or numbers)."""
+
+    function: Callable[[Vector], ArrayLike]
+    unit: str = ""
+    text: str = "function of time"
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times."""
+        values = np.asarray(self.function(times), dtype=np.float64)
+        return np.broadcast_to(values, times.shape)
+
+
+class Table:
+    """Samples, held until the next one or connected linearly.
+
+    Args:
+        times: increasing [s].
+        values: one per time.
+        unit: of the values.
+        interpolation: `hold` (a set value held between samples) or `linear`.
+        text: where it comes from.
+        extend: hold the first and last value beyond the table; else leaving it by more than its
+            longest sample interval is an error.
+
+    Raises:
+        ValueRangeError: times that do not increase, or values that are not finite.
+    """
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        values: ArrayLike,
+        *,
+        unit: str = "",
+        interpolation: Literal["hold", "linear"] = "hold",
+        text: str = "table",
+        extend: bool = False,
+    ) -> None:
+        self.times = np.asarray(times, dtype=np.float64)
+        self.values = np.asarray(values, dtype=np.float64)
+        self.unit, self.interpolation, self.text, self.extend = unit, interpolation, text, extend
+        if self.times.ndim != 1 or self.times.shape != self.values.shape or not self.times.size:
+            raise ValueRangeError(
+                f"{text}: {self.times.size} times and {self.values.size} values; give one value "
+                "per time"
+            )
+        if interpolation not in ("hold", "linear"):
+            raise ValueRangeError(f"{text}: interpolation {interpolation!r} is not hold or linear")
+        bad = np.flatnonzero(np.diff(self.times) <= 0.0)
+        if bad.size:
+            raise ValueRangeError(f"{text}: times do not increase at {self.times[bad[0]]:.9g} s")
+        bad = np.flatnonzero(~(np.isfinite(self.values) & np.isfinite(self.times)))
+        if bad.size:
+            raise ValueRangeError(
+                f"{text}: {bad.size} of {self.values.size} values are not finite, the first "
+                f"({self.values[bad[0]]}) at t = {self.times[bad[0]]:.9g} s; an input needs a "
+                "value at all times: fill the gap or choose another column"
+            )
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times.
+
+        Raises:
+            ValueRangeError: outside the table (without `extend`).
+        """
+        intervals = np.diff(self.times)
+        clock = CLOCK * float(np.median(intervals)) if intervals.size else 0.0
+        if not self.extend and times.size:
+            first, last = self.times[0], self.times[-1]
+            margin = clock + (float(np.max(intervals)) if intervals.size else 0.0)
+            if times[0] < first - margin or times[-1] > last + margin:
+                raise ValueRangeError(
+                    f"{self.text}: covers {first:.9g} s to {last:.9g} s, but the run needs "
+                    f"{times[0]:.9g} s to {times[-1]:.9g} s; shorten the run or extend the table"
+                )
+        if self.interpolation == "linear":
+            return np.interp(times, self.times, self.values)
+        index = np.searchsorted(self.times, times + clock, side="right") - 1
+        return self.values[np.maximum(index, 0)]
+
+
+def as_signal(value: Signal | float | Callable[[Vector], ArrayLike]) -> Signal:
+    """A signal from a number or a function of time."""
+    if isinstance(value, (int, float)):
+        return Constant(float(value))
+    if hasattr(value, "at"):
+        return value  # type: ignore[return-value]
+    return Function(value)

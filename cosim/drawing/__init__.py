@@ -1,0 +1,1 @@
+"""Pictures of systems: a layered drawing of boxes and wires, as SVG."""

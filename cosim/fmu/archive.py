@@ -1,0 +1,183 @@
+"""An .fmu file on disk: unpacked once into a cache folder named by its content."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import struct
+import sys
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Literal
+
+from ..errors import FmuFileError, PlatformError
+from .description import Description, read_description
+
+
+def cache_folder() -> Path:
+    """Where FMUs are unpacked: `COSIM_CACHE`, else the platform's cache folder."""
+    wanted = os.environ.get("COSIM_CACHE")
+    if wanted:
+        return Path(wanted)
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / "cosim"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "cosim" / "Cache"
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "cosim"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "cosim"
+
+
+def platform_folders(fmi: Literal[2, 3]) -> tuple[str, ...]:
+    """Folders below `binaries/` that hold a binary for this machine, preferred first."""
+    machine = platform.machine().lower()
+    arch = {"amd64": "x86_64", "x64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    tuple_ = f"{arch}-{system}"
+    if fmi == 3:
+        return (tuple_,)
+    short = {"windows": "win64", "darwin": "darwin64", "linux": "linux64"}[system]
+    if arch == "x86_64":
+        return (short, tuple_)
+    # FMI 2 has no names of its own for ARM; universal macOS binaries live in darwin64.
+    return (tuple_, short) if system == "darwin" else (tuple_,)
+
+
+def library_suffix() -> str:
+    """Suffix of shared libraries on this machine."""
+    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+@dataclass(frozen=True)
+class Fmu:
+    """An unpacked FMU.
+
+    Attributes:
+        path: the .fmu file.
+        digest: SHA-256 of its content.
+        folder: where it is unpacked.
+        description: what it says about itself.
+    """
+
+    path: Path
+    digest: str
+    folder: Path
+    description: Description
+
+    def __repr__(self) -> str:
+        return f"Fmu({str(self.path)!r}, {self.description.name!r}, FMI {self.description.fmi})"
+
+    def platforms(self) -> tuple[str, ...]:
+        """The platforms that it has binaries for."""
+        binaries = self.folder / "binaries"
+        if not binaries.is_dir():
+            return ()
+        return tuple(sorted(item.name for item in binaries.iterdir() if item.is_dir()))
+
+    @cached_property
+    def binary(self) -> Path:
+        """The shared library for this machine.
+
+        Raises:
+            PlatformError: it has none; the text lists those that it has.
+            FmuFileError: it is cut short; loading it would end the process.
+        """
+        wanted = platform_folders(self.description.fmi)
+        name = self.description.identifier + library_suffix()
+        for folder in wanted:
+            path = self.folder / "binaries" / folder / name
+            if path.is_file():
+                size, needed = path.stat().st_size, _elf_size(path)
+                if size < needed:
+                    raise FmuFileError(
+                        f"{self.path}: its binary binaries/{folder}/{name} is cut short: {size} "
+                        f"bytes of at least {needed}. Build or fetch it again"
+                    )
+                return path
+        present = ", ".join(self.platforms()) or "none at all"
+        raise PlatformError(
+            f"{self.path.name}: has no binary for this machine ({wanted[0]}); it has {present}. "
+            "Build it for this platform ('cosim fmus build --platform all') or ask its supplier"
+        )
+
+
+def _elf_size(path: Path) -> int:
+    """Bytes that the segments of a 64-bit ELF library reach to, 0 for other formats.
+
+    The loaders of the other formats refuse a library that is cut short; that of ELF maps it and the
+    process dies of a bus error.
+    """
+    with path.open("rb") as file:
+        header = file.read(64)
+        if len(header) < 64 or header[:6] != b"\x7fELF\x02\x01":
+            return 0
+        table = int(struct.unpack_from("<Q", header, 32)[0])
+        entry, count = (int(value) for value in struct.unpack_from("<HH", header, 54))
+        file.seek(table)
+        entries = file.read(entry * count)
+    needed = table + entry * count
+    for place in range(0, len(entries) - 39, entry):
+        offset, size = (int(struct.unpack_from("<Q", entries, place + at)[0]) for at in (8, 32))
+        needed = max(needed, offset + size)
+    return needed
+
+
+def unpack(path: Path, folder: Path) -> None:
+    """Unpack an archive into a new folder, whole or not at all."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=".unpack-", dir=folder.parent))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(temporary)  # checks the CRC of each member
+        try:
+            temporary.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # else another process was faster
+                raise
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def open_fmu(path: Path | str) -> Fmu:
+    """Unpack an .fmu into the cache (if it is not there yet) and read its description.
+
+    Raises:
+        FmuFileError: missing, corrupt, truncated, or not an FMU.
+    """
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise FmuFileError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise FmuFileError(f"{path}: cannot be read ({error.strerror})") from error
+    digest = hashlib.sha256(content).hexdigest()
+    folder = cache_folder() / "unpacked" / digest[:32]
+    if not folder.is_dir():
+        try:
+            unpack(path, folder)
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+            raise FmuFileError(
+                f"{path}: is not a complete FMU archive ({error}); "
+                f"it has {len(content)} bytes. Build or fetch it again"
+            ) from error
+        except OSError as error:
+            raise FmuFileError(
+                f"{path}: cannot be unpacked into {folder.parent} ({error}); "
+                "set COSIM_CACHE to a folder that can be written"
+            ) from error
+    return Fmu(path, digest, folder, _described(folder, str(path)))
+
+
+@lru_cache(maxsize=256)
+def _described(folder: Path, where: str) -> Description:
+    """Description of an unpacked FMU; its folder is named after its content."""
+    return read_description(folder, where)

@@ -1,0 +1,153 @@
+"""The C interface of FMI 2.0 for co-simulation, behind the names of `binding.Binding`."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any, ClassVar
+
+from .archive import Fmu, library_suffix
+from .messages import LOGGER2, environment
+
+_P, _I, _D, _S, _U, _Z = ct.c_void_p, ct.c_int, ct.c_double, ct.c_char_p, ct.c_uint32, ct.c_size_t
+_CALLOC = ct.CFUNCTYPE(_P, _Z, _Z)
+_FREE = ct.CFUNCTYPE(None, _P)
+
+
+class _Callbacks(ct.Structure):
+    _fields_: ClassVar = [
+        ("logger", type(LOGGER2)),
+        ("allocate", _CALLOC),
+        ("free", _FREE),
+        ("step_finished", _P),
+        ("environment", _P),
+    ]
+
+
+def _allocator() -> tuple[Any, Any]:
+    runtime = ct.cdll.msvcrt if sys.platform == "win32" else ct.CDLL(None)
+    return _CALLOC(("calloc", runtime)), _FREE(("free", runtime))
+
+
+def _format_in_c(callbacks: _Callbacks) -> Any:
+    """Let the logger see formatted text: ctypes cannot read C's variable arguments, fmpy's can."""
+    found = importlib.util.find_spec("fmpy")
+    folder = {"win32": "win64", "darwin": "darwin64"}.get(sys.platform, "linux64")
+    if found is None or not found.submodule_search_locations:
+        return None
+    root = Path(found.submodule_search_locations[0])
+    path = root / "logging" / folder / f"logging{library_suffix()}"
+    try:
+        library = ct.CDLL(str(path))
+        library.addLoggerProxy.argtypes = [_P]
+        library.addLoggerProxy.restype = None
+        library.addLoggerProxy(ct.byref(callbacks))
+    except (OSError, AttributeError):  # no such binary for this machine: unformatted text
+        return None
+    return library
+
+
+class Fmi2:
+    """FMI 2.0 functions of one shared library."""
+
+    version = 2
+    SIGNATURES: ClassVar[dict[str, tuple[Any, ...]]] = {
+        "fmi2SetupExperiment": (_P, _I, _D, _D, _I, _D),
+        "fmi2EnterInitializationMode": (_P,),
+        "fmi2ExitInitializationMode": (_P,),
+        "fmi2Terminate": (_P,),
+        "fmi2Reset": (_P,),
+        "fmi2DoStep": (_P, _D, _D, _I),
+        "fmi2GetReal": (_P, _P, _Z, _P),
+        "fmi2SetReal": (_P, _P, _Z, _P),
+        "fmi2GetInteger": (_P, _P, _Z, _P),
+        "fmi2SetInteger": (_P, _P, _Z, _P),
+        "fmi2GetBoolean": (_P, _P, _Z, _P),
+        "fmi2SetBoolean": (_P, _P, _Z, _P),
+        "fmi2GetString": (_P, _P, _Z, _P),
+        "fmi2SetString": (_P, _P, _Z, _P),
+    }
+    OPTIONAL: ClassVar[dict[str, tuple[Any, ...]]] = {
+        "fmi2GetFMUstate": (_P, _P),
+        "fmi2SetFMUstate": (_P, _P),
+        "fmi2FreeFMUstate": (_P, _P),
+        "fmi2SerializedFMUstateSize": (_P, _P, _P),
+        "fmi2SerializeFMUstate": (_P, _P, _P, _Z),
+        "fmi2DeSerializeFMUstate": (_P, _P, _Z, _P),
+        "fmi2GetDirectionalDerivative": (_P, _P, _Z, _P, _Z, _P, _P),
+        "fmi2SetRealInputDerivatives": (_P, _P, _Z, _P, _P),
+    }
+    STATE = "FMUstate"
+    GET: ClassVar[dict[str, str]] = {
+        "Float64": "fmi2GetReal",
+        "Int32": "fmi2GetInteger",
+        "Boolean2": "fmi2GetBoolean",
+        "String": "fmi2GetString",
+    }
+    SET: ClassVar[dict[str, str]] = {key: name.replace("Get", "Set") for key, name in GET.items()}
+
+    def __init__(self, library: Any) -> None:
+        self.instantiate_ = library.fmi2Instantiate
+        self.instantiate_.argtypes = [_S, _I, _S, _S, _P, _I, _I]
+        self.instantiate_.restype = _P
+        self.free_ = library.fmi2FreeInstance
+        self.free_.argtypes, self.free_.restype = [_P], None
+
+    def instantiate(self, fmu: Fmu, name: str, key: int, logging: bool) -> tuple[int | None, Any]:
+        """Create an instance; returns its address and what must be kept alive."""
+        calloc, free = _allocator()
+        callbacks = _Callbacks(LOGGER2, calloc, free, None, environment(key))
+        proxy = _format_in_c(callbacks)
+        resources = (fmu.folder / "resources").resolve().as_uri()
+        address = self.instantiate_(
+            name.encode(), 1, fmu.description.token.encode(), resources.encode(),
+            ct.addressof(callbacks), 0, int(logging),
+        )  # fmt: skip
+        return address, (callbacks, calloc, free, proxy)
+
+    @staticmethod
+    def enter_calls(
+        start: float, stop: float | None, tolerance: float | None
+    ) -> list[tuple[str, tuple[Any, ...]]]:
+        """Calls (after the instance argument) that begin initialization."""
+        return [
+            (
+                "fmi2SetupExperiment",
+                (tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0),
+            ),
+            ("fmi2EnterInitializationMode", ()),
+        ]
+
+    @staticmethod
+    def values_arguments(references: Any, values: Any) -> tuple[Any, ...]:
+        """Arguments of a get or set call, after the instance."""
+        return (references.ctypes.data, references.size, values.ctypes.data)
+
+    @staticmethod
+    def text_arguments(reference: Any, value: Any) -> tuple[Any, ...]:
+        """Arguments of a get or set call of one string, after the instance."""
+        return (ct.addressof(reference), 1, ct.addressof(value))
+
+    @staticmethod
+    def step_arguments() -> tuple[Any, ...]:
+        """Arguments of a step after the instance, time and step size."""
+        return (1,)
+
+    @staticmethod
+    def stopped() -> bool:
+        """Whether the last step ended the simulation (FMI 2 says so by its status)."""
+        return False
+
+    @staticmethod
+    def directional_arguments(
+        unknowns: Any, knowns: Any, seed: Any, sensitivity: Any
+    ) -> tuple[Any, ...]:
+        """Arguments of a directional derivative, after the instance."""
+        return (
+            unknowns.ctypes.data, unknowns.size, knowns.ctypes.data, knowns.size,
+            seed.ctypes.data, sensitivity.ctypes.data,
+        )  # fmt: skip
+
+    DIRECTIONAL = "fmi2GetDirectionalDerivative"

@@ -1,0 +1,112 @@
+"""The C interface of FMI 3.0 for co-simulation, with the same Python face as `fmi2`."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any, ClassVar
+
+from .archive import Fmu
+from .messages import LOGGER3, environment
+
+_P, _D, _S, _B, _Z = ct.c_void_p, ct.c_double, ct.c_char_p, ct.c_bool, ct.c_size_t
+
+NUMERIC = (
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
+    "Boolean",
+)  # fmt: skip
+
+
+class Fmi3:
+    """FMI 3.0 functions of one shared library."""
+
+    version = 3
+    SIGNATURES: ClassVar[dict[str, tuple[Any, ...]]] = {
+        "fmi3EnterInitializationMode": (_P, _B, _D, _D, _B, _D),
+        "fmi3ExitInitializationMode": (_P,),
+        "fmi3Terminate": (_P,),
+        "fmi3Reset": (_P,),
+        "fmi3DoStep": (_P, _D, _D, _B, _P, _P, _P, _P),
+        "fmi3GetString": (_P, _P, _Z, _P, _Z),
+        "fmi3SetString": (_P, _P, _Z, _P, _Z),
+        **{f"fmi3Get{name}": (_P, _P, _Z, _P, _Z) for name in NUMERIC},
+        **{f"fmi3Set{name}": (_P, _P, _Z, _P, _Z) for name in NUMERIC},
+    }
+    OPTIONAL: ClassVar[dict[str, tuple[Any, ...]]] = {
+        "fmi3GetFMUState": (_P, _P),
+        "fmi3SetFMUState": (_P, _P),
+        "fmi3FreeFMUState": (_P, _P),
+        "fmi3SerializedFMUStateSize": (_P, _P, _P),
+        "fmi3SerializeFMUState": (_P, _P, _P, _Z),
+        "fmi3DeserializeFMUState": (_P, _P, _Z, _P),
+        "fmi3GetDirectionalDerivative": (_P, _P, _Z, _P, _Z, _P, _Z, _P, _Z),
+    }
+    STATE = "FMUState"
+    GET: ClassVar[dict[str, str]] = {name: f"fmi3Get{name}" for name in (*NUMERIC, "String")}
+    SET: ClassVar[dict[str, str]] = {name: f"fmi3Set{name}" for name in (*NUMERIC, "String")}
+
+    def __init__(self, library: Any) -> None:
+        self.instantiate_ = library.fmi3InstantiateCoSimulation
+        self.instantiate_.argtypes = [_S, _S, _S, _B, _B, _B, _B, _P, _Z, _P, _P, _P]
+        self.instantiate_.restype = _P
+        self.free_ = library.fmi3FreeInstance
+        self.free_.argtypes, self.free_.restype = [_P], None
+        self._event, self._stop, self._early = ct.c_bool(), ct.c_bool(), ct.c_bool()
+        self._last = ct.c_double()
+
+    def instantiate(self, fmu: Fmu, name: str, key: int, logging: bool) -> tuple[int | None, Any]:
+        """Create an instance; returns its address and what must be kept alive."""
+        # The resource path ends with a separator, as the standard asks for.
+        resources = str((fmu.folder / "resources").resolve() / "x")[:-1]
+        address = self.instantiate_(
+            name.encode(), fmu.description.token.encode(), resources.encode(), False, logging,
+            False, False, None, 0, environment(key), ct.cast(LOGGER3, _P), None,
+        )  # fmt: skip
+        return address, None
+
+    @staticmethod
+    def enter_calls(
+        start: float, stop: float | None, tolerance: float | None
+    ) -> list[tuple[str, tuple[Any, ...]]]:
+        """Calls (after the instance argument) that begin initialization."""
+        return [
+            (
+                "fmi3EnterInitializationMode",
+                (tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0),
+            )
+        ]
+
+    @staticmethod
+    def values_arguments(references: Any, values: Any) -> tuple[Any, ...]:
+        """Arguments of a get or set call, after the instance."""
+        return (references.ctypes.data, references.size, values.ctypes.data, values.size)
+
+    @staticmethod
+    def text_arguments(reference: Any, value: Any) -> tuple[Any, ...]:
+        """Arguments of a get or set call of one string, after the instance."""
+        return (ct.addressof(reference), 1, ct.addressof(value), 1)
+
+    def step_arguments(self) -> tuple[Any, ...]:
+        """Arguments of a step after the instance, time and step size."""
+        return (
+            True,
+            ct.addressof(self._event),
+            ct.addressof(self._stop),
+            ct.addressof(self._early),
+            ct.addressof(self._last),
+        )
+
+    def stopped(self) -> bool:
+        """Whether the last step ended the simulation."""
+        return bool(self._stop.value)
+
+    @staticmethod
+    def directional_arguments(
+        unknowns: Any, knowns: Any, seed: Any, sensitivity: Any
+    ) -> tuple[Any, ...]:
+        """Arguments of a directional derivative, after the instance."""
+        return (
+            unknowns.ctypes.data, unknowns.size, knowns.ctypes.data, knowns.size,
+            seed.ctypes.data, seed.size, sensitivity.ctypes.data, sensitivity.size,
+        )  # fmt: skip
+
+    DIRECTIONAL = "fmi3GetDirectionalDerivative"

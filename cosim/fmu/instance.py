@@ -1,0 +1,441 @@
+"""One FMU instance for co-simulation, FMI 2.0 or 3.0, through ctypes with one Python interface.
+
+The call sequence:
+
+1. `Instance(fmu, name)` creates it.
+2. `set` of parameters and start values.
+3. `enter_initialization(start, stop)`, then `set` of inputs and `get` of outputs as often as
+   needed, then `exit_initialization()`.
+4. `set` inputs, `step(time, size)`, `get` outputs, again and again; `save` and `restore` in
+   between if the FMU can.
+5. `reset()` returns to 2; `free()` ends it (a `with` block does that, and so does the garbage
+   collector).
+
+`address` and `functions` hold the addresses of the instance and of its C functions, so that
+compiled code can make the same calls; `Block` holds the arrays that go with them.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes as ct
+import math
+import os
+import sys
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import FmuCallError, FmuFileError, ValueRangeError
+from .archive import Fmu, open_fmu
+from .description import Variable
+from .exchange import Block, Part, check_values
+from .fmi2 import Fmi2
+from .fmi3 import Fmi3
+from .messages import STATUS, forget, new_key, take
+
+Vector = NDArray[np.float64]
+
+_libraries: dict[str, Any] = {}
+_functions: dict[tuple[str, int], dict[str, Any]] = {}
+_single: set[str] = set()
+
+
+def _library(fmu: Fmu) -> Any:
+    path = str(fmu.binary)
+    if path not in _libraries:
+        try:
+            if sys.platform == "win32":
+                with os.add_dll_directory(str(fmu.binary.parent)):
+                    _libraries[path] = ct.CDLL(path)
+            else:
+                _libraries[path] = ct.CDLL(path)
+        except OSError as error:
+            raise FmuFileError(
+                f"{fmu.path}: its binary cannot be loaded ({error}); it may need a library that "
+                "this machine lacks"
+            ) from error
+        # libraries of pythonfmu release their state twice when the process ends, unless told before
+        finalize = getattr(_libraries[path], "finalizePythonInterpreter", None)
+        if finalize is not None:
+            atexit.register(finalize)
+    return _libraries[path]
+
+
+def _bound(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
+    """A binding to an FMU's library, and its functions, made once for all instances."""
+    library = _library(fmu)
+    key = str(fmu.binary), fmu.description.fmi
+    try:
+        binding = Fmi2(library) if fmu.description.fmi == 2 else Fmi3(library)
+        if key not in _functions:
+            functions = {
+                name: _prototype(library, name, signature)
+                for name, signature in binding.SIGNATURES.items()
+            }
+            for name, signature in binding.OPTIONAL.items():
+                if hasattr(library, name):
+                    functions[name] = _prototype(library, name, signature)
+            _functions[key] = functions
+    except AttributeError as error:
+        raise FmuFileError(
+            f"{fmu.path}: its binary lacks a function of FMI {fmu.description.fmi}.0 ({error})"
+        ) from error
+    return binding, _functions[key]
+
+
+def _prototype(library: Any, name: str, signature: tuple[Any, ...]) -> Any:
+    function = library[name]  # a fresh object: prototypes are not shared between bindings
+    function.argtypes, function.restype = list(signature), ct.c_int
+    return function
+
+
+@dataclass(frozen=True)
+class State:
+    """A saved state; belongs to the instance that saved it until `release` or `free`."""
+
+    address: int
+
+
+class Instance:
+    """One FMU instance.
+
+    Args:
+        fmu: an opened FMU, or the path of one.
+        name: its name in messages.
+        logging: let the FMU log everything, not errors alone.
+
+    Raises:
+        FmuFileError: the file cannot be run here.
+        FmuCallError: the FMU refused to be created.
+    """
+
+    def __init__(self, fmu: Fmu | str | os.PathLike[str], name: str = "", *, logging: bool = False):
+        if not isinstance(fmu, Fmu):
+            fmu = open_fmu(os.fspath(fmu))
+        self.fmu = fmu
+        self.description = fmu.description
+        self.name = name or fmu.path.stem
+        self.label = f"{self.name} ({self.description.name})"
+        self.time = math.nan
+        once = self.description.can("canBeInstantiatedOnlyOncePerProcess")
+        if once and fmu.digest in _single:
+            raise FmuCallError(
+                f"{self.label}: the FMU says that it can be instantiated only once per process, "
+                "and it already is; run the other instance in a process of its own"
+            )
+        self.binding: Fmi2 | Fmi3
+        self.binding, self._functions = _bound(fmu)
+        self._step = self._functions[f"fmi{self.binding.version}DoStep"]
+        self._step_arguments = self.binding.step_arguments()
+        self._key = new_key()
+        address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
+        if not address:
+            messages = take(self._key)
+            forget(self._key)
+            raise FmuCallError(
+                f"{self.label}: the FMU could not be created" + _tail(messages), messages
+            )
+        self.address: int = address
+        if once:
+            _single.add(fmu.digest)
+        self._terminable = False
+        self._dead = [False]
+        self._finalizer = weakref.finalize(
+            self, _free, self.binding.free_, address, self._key, self._dead, self._alive,
+            fmu.digest,
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<Instance {self.label}, FMI {self.description.fmi}, t = {self.time}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.free()
+
+    # -- calls -----------------------------------------------------------------------------------
+
+    @property
+    def functions(self) -> dict[str, int]:
+        """Addresses of the C functions."""
+        return {
+            name: ct.cast(function, ct.c_void_p).value or 0
+            for name, function in self._functions.items()
+        }
+
+    def function(self, name: str) -> Any:
+        """A C function as a ctypes object; its first argument is `address`."""
+        return self._functions[name]
+
+    def failure(self, what: str, status: int) -> FmuCallError:
+        """The error for a call that returned `status`, with what the FMU logged."""
+        if status == 4:
+            self._dead[0] = True
+        self._terminable = False
+        messages = take(self._key)
+        when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
+        return FmuCallError(
+            f"{self.label}: {what}{when} failed with status "
+            f"{STATUS[min(status, 5)]!r}" + _tail(messages),
+            messages,
+        )
+
+    def refusal(self, what: str) -> FmuCallError:
+        """The error for a value that is not given to the FMU at all."""
+        when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
+        return FmuCallError(f"{self.label}: {what}{when}")
+
+    def take_messages(self) -> tuple[str, ...]:
+        """What the FMU logged since the last call."""
+        return take(self._key)
+
+    def _call(self, what: str, name: str, *arguments: Any) -> None:
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        if name not in self._functions:
+            raise FmuCallError(f"{self.label}: the FMU has no function {name}")
+        status = self._functions[name](self.address, *arguments)
+        if status > 1:
+            raise self.failure(what, status)
+
+    def get_part(self, part: Part) -> None:
+        """One get call for the values of a block's part."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
+        if status > 1:
+            raise self.failed_access(True, part, status)
+
+    def set_part(self, part: Part) -> None:
+        """One set call for the values of a block's part."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
+        if status > 1:
+            raise self.failed_access(False, part, status)
+
+    def ramp(
+        self, references: NDArray[np.uint32], orders: NDArray[np.int32], values: Vector
+    ) -> None:
+        """Derivatives of inputs in time, by which they move in the steps to come (FMI 2)."""
+        status = self._functions["fmi2SetRealInputDerivatives"](
+            self.address, references.ctypes.data, references.size, orders.ctypes.data,
+            values.ctypes.data,
+        )  # fmt: skip
+        if status > 1:
+            raise self.failed_ramp(references, status)
+
+    def failed_ramp(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
+        """The error for derivatives of inputs that the FMU refused."""
+        return self.failure(f"setting derivatives of {self._names(references, 'Float64')}", status)
+
+    def failed_access(self, getting: bool, part: Part, status: int) -> FmuCallError:
+        """The error for a get or set call that returned `status`."""
+        verb = "getting" if getting else "setting"
+        return self.failure(f"{verb} {self._names(part.references, part.type)}", status)
+
+    def _names(self, references: NDArray[np.uint32], type_: str) -> str:
+        wanted = {int(reference) for reference in references}
+        names = [
+            v.name
+            for v in self.description.variables.values()
+            if v.reference in wanted and v.type == type_ and v.causality != "local"
+        ]
+        return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+
+    # -- values ----------------------------------------------------------------------------------
+
+    def block(self, names: Iterable[str], values: Vector | None = None) -> Block:
+        """Preallocate an exchange of these variables; `q` means all of `q[1]` ... `q[n]`."""
+        return Block(self, [v for name in names for v in self.description.expand(name)], values)
+
+    def get(self, *names: str) -> Vector:
+        """Values of variables (a copy)."""
+        return self.block(names).get().copy()
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Set variables by name; a vector takes a list.
+
+        Raises:
+            ValueRangeError: outside the declared bounds, or not finite.
+            FmuCallError: the FMU refused.
+        """
+        for name, value in values.items():
+            variables = self.description.expand(name)
+            if variables[0].type == "String":
+                self._set_text(variables[0], str(value))
+                continue
+            block = Block(self, variables)
+            numbers = check_values(self.label, variables, value)
+            block.set(numbers)
+
+    def _set_text(self, variable: Variable, value: str) -> None:
+        reference, text = ct.c_uint32(variable.reference), ct.c_char_p(value.encode())
+        self._call(
+            f"setting {variable.name}",
+            self.binding.SET["String"],
+            *self.binding.text_arguments(reference, text),
+        )
+
+    # -- phases ----------------------------------------------------------------------------------
+
+    def enter_initialization(
+        self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """Begin initialization at time `start`."""
+        self.time = start
+        for name, arguments in self.binding.enter_calls(start, stop, tolerance):
+            self._call("initialization", name, *arguments)
+
+    def exit_initialization(self) -> None:
+        """End initialization; the instance is then at its first communication point."""
+        self._call("initialization", f"fmi{self.binding.version}ExitInitializationMode")
+        self._terminable = True
+
+    def step(self, time: float, size: float) -> None:
+        """Go from `time` to `time + size`."""
+        if not self._finalizer.alive:
+            raise FmuCallError(f"{self.label}: is freed; create a new instance")
+        self.time = time
+        status = self._step(self.address, time, size, *self._step_arguments)
+        if status > 1 or self.binding.stopped():
+            raise self.failed_step(size, status)
+        self.time = time + size
+
+    def failed_step(self, size: float, status: int) -> FmuCallError:
+        """The error for a step that returned `status` or asked to end the simulation."""
+        if 1 < status < 5:
+            return self.failure(f"a step of {size:.9g} s", status)
+        messages = take(self._key)
+        return FmuCallError(
+            f"{self.label}: the FMU asked to end the simulation after t = {self.time:.9g} s"
+            + _tail(messages),
+            messages,
+        )
+
+    def terminate(self) -> None:
+        """End the run; values can still be read."""
+        if self._terminable:
+            self._terminable = False
+            self._call("termination", f"fmi{self.binding.version}Terminate")
+
+    def reset(self) -> None:
+        """Return to the state after creation."""
+        self._call("reset", f"fmi{self.binding.version}Reset")
+        self._terminable = False
+        self.time = math.nan
+
+    def free(self) -> None:
+        """End it; calling it again does nothing."""
+        if self._finalizer.alive and self._terminable and not self._dead[0]:
+            with contextlib.suppress(FmuCallError):  # the run's errors were raised in the run
+                self.terminate()
+        self._finalizer()
+
+    # -- states and derivatives --------------------------------------------------------------------
+
+    def _state_function(self, verb: str) -> str:
+        if verb.startswith("De"):
+            verb = "DeSerialize" if self.binding.version == 2 else "Deserialize"
+        return f"fmi{self.binding.version}{verb}{self.binding.STATE}"
+
+    def _require(self, capability: str) -> None:
+        if not self.description.can(capability):
+            raise FmuCallError(
+                f"{self.label}: the FMU declares {capability} = false, so it can not do this"
+            )
+
+    def save(self) -> State:
+        """Save the state of the instance."""
+        self._require("canGetAndSetFMUState")
+        pointer = ct.c_void_p()
+        self._call("saving the state", self._state_function("Get"), ct.addressof(pointer))
+        return State(pointer.value or 0)
+
+    def restore(self, state: State) -> None:
+        """Return to a saved state; `time` is the caller's to track."""
+        self._call("restoring a state", self._state_function("Set"), state.address)
+
+    def release(self, state: State) -> None:
+        """Free a saved state."""
+        pointer = ct.c_void_p(state.address)
+        self._call("releasing a state", self._state_function("Free"), ct.addressof(pointer))
+
+    def serialize(self, state: State) -> bytes:
+        """A saved state as bytes, for another process or instance of the same FMU."""
+        self._require("canSerializeFMUState")
+        size = ct.c_size_t()
+        name = f"fmi{self.binding.version}Serialized{self.binding.STATE}Size"
+        self._call("serializing a state", name, state.address, ct.addressof(size))
+        buffer = ct.create_string_buffer(max(size.value, 1))
+        self._call(
+            "serializing a state",
+            self._state_function("Serialize"),
+            state.address,
+            ct.addressof(buffer),
+            size.value,
+        )
+        return buffer.raw[: size.value]
+
+    def deserialize(self, content: bytes) -> State:
+        """Make a state of this instance from bytes; release it later."""
+        self._require("canSerializeFMUState")
+        buffer = ct.create_string_buffer(content, max(len(content), 1))
+        pointer = ct.c_void_p()
+        self._call(
+            "deserializing a state",
+            self._state_function("Deserialize"),
+            ct.addressof(buffer),
+            len(content),
+            ct.addressof(pointer),
+        )
+        return State(pointer.value or 0)
+
+    def directional_derivative(
+        self, unknowns: Iterable[str], knowns: Iterable[str], seed: ArrayLike
+    ) -> Vector:
+        """d(unknowns)/d(knowns) times `seed` at the present communication point."""
+        self._require("providesDirectionalDerivatives")
+        rows = [v for name in unknowns for v in self.description.expand(name)]
+        columns = [v for name in knowns for v in self.description.expand(name)]
+        direction = np.ascontiguousarray(seed, dtype=np.float64)
+        result = np.zeros(sum(v.size for v in rows))
+        if direction.size != sum(v.size for v in columns):
+            raise ValueRangeError(
+                f"{self.label}: {direction.size} seeds for {len(columns)} known variables"
+            )
+        self._call(
+            "a directional derivative",
+            self.binding.DIRECTIONAL,
+            *self.binding.directional_arguments(
+                np.array([v.reference for v in rows], dtype=np.uint32),
+                np.array([v.reference for v in columns], dtype=np.uint32),
+                direction,
+                result,
+            ),
+        )
+        return result
+
+
+def _tail(messages: Sequence[str]) -> str:
+    return ": " + "; ".join(messages) if messages else " (the FMU logged nothing)"
+
+
+def _free(function: Any, address: int, key: int, dead: list[bool], alive: Any, digest: str) -> None:
+    if not dead[0]:
+        function(address)
+    forget(key)
+    _single.discard(digest)

@@ -1,0 +1,1 @@
+"""What is installed here: scenarios, FMUs, and the sources that build more of them."""

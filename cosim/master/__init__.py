@@ -1,0 +1,1 @@
+"""Runs a system: algorithms compile it into a plan, an execution goes through the plan."""

@@ -1,0 +1,53 @@
+"""Co-simulation algorithms: one file each, each compiles a system into a `plan.Plan`.
+
+A module here has `compile_plan(system, external, observed, **options) -> Plan` and is chosen by its
+name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...errors import UnknownNameError, listing
+from ...system.system import System
+from ..plan import Plan
+
+
+def names() -> list[str]:
+    """The algorithms that exist."""
+    return sorted(info.name for info in pkgutil.iter_modules(__path__))
+
+
+def compile_plan(
+    algorithm: str,
+    system: System,
+    external: Sequence[str],
+    observed: Sequence[str],
+    options: Mapping[str, Any] | None = None,
+) -> Plan:
+    """Compile a system by the named algorithm.
+
+    Raises:
+        UnknownNameError: there is no such algorithm, or it has no such option.
+    """
+    if algorithm not in names():
+        raise UnknownNameError(
+            f"there is no algorithm {algorithm!r}; {listing(names(), algorithm)}"
+        )
+    module = importlib.import_module(f"{__name__}.{algorithm}")
+    known = [
+        name
+        for name, parameter in inspect.signature(module.compile_plan).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+    for name in options or {}:
+        if name not in known:
+            raise UnknownNameError(
+                f"algorithm {algorithm!r} has no option {name!r}; {listing(known, name)}"
+            )
+    plan: Plan = module.compile_plan(system, external, observed, **(options or {}))
+    return plan

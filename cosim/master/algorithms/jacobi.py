@@ -1,0 +1,71 @@
+"""Jacobi: all inputs from the outputs at t_k, held over the step; then all instances step.
+
+    u_k = L y_k,   (x_{k+1}, y_{k+1}) = step(x_k, u_k)
+
+First order in the communication step. An output with direct feedthrough is that of the held inputs,
+so a chain of n such instances delays a signal by n steps. Independent of the order of instances.
+
+Options:
+    extrapolation: order 1 or 2 lets continuous inputs follow the polynomial through the last
+        outputs, and outputs with direct feedthrough are fetched anew at t_k; second order in the
+        communication step. FMUs that cannot interpolate inputs get the mean of the polynomial over
+        the step (weights of Adams and Bashforth).
+    substeps: instance -> n, for instances that go n steps per communication step and exchange at
+        each; what comes from slower instances is held. The energy of their power bonds is not
+        accounted for.
+
+Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (parallel scheme); Busch,
+Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ...system.system import System
+from ..algebraic_loops import consistent, find_loops, reached
+from ..extrapolation import factors, means, ramps, side_by_side, without_parts
+from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
+
+
+def compile_plan(
+    system: System,
+    external: Sequence[str],
+    observed: Sequence[str],
+    *,
+    extrapolation: int = 0,
+    substeps: Mapping[str, int] | None = None,
+) -> Plan:
+    """Compile a system."""
+    parts = factors(system, substeps)
+    layout = without_parts(lay_out(system, external, observed), parts)
+    everyone = range(len(layout.instances))
+    extrapolated, spans = means(system, layout, extrapolation)
+    loops = find_loops(system, layout)
+    fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
+    # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too
+    again = extrapolation == 0 or reached(system, layout)
+    step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
+    if extrapolated:
+        step.append((Op.NOTE,))
+    if max(parts.values()) > 1:
+        step += side_by_side(layout, parts, extrapolated, spans)
+    else:
+        step.append((Op.COPY, 0, len(layout.copy_source)))
+        if extrapolated:
+            step.append((Op.EXTRAPOLATE, 0, len(extrapolated)))
+        step += [(Op.SET, index) for index in everyone]
+        for index in everyone:
+            step += ramps(extrapolated, spans, index)
+        step += [(op, index) for op in (Op.STEP, Op.GET) for index in everyone]
+    step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
+    return Plan(
+        "jacobi",
+        layout,
+        initial_sweep(system, layout),
+        operations(step),
+        final_operations(fresh),
+        tuple(loop for _, loop in loops),
+        operations(consistent(system, layout, loops, only_loops=False)),
+        tuple(extrapolated),
+    )

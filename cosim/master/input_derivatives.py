@@ -1,0 +1,87 @@
+"""Inputs that move within a step: what FMUs are told of their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fmu.instance import Instance
+from .plan import Op, Plan
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Call:
+    """Derivatives of one order of one instance's inputs.
+
+    Attributes:
+        instance: position.
+        references: of the inputs.
+        orders: of the derivatives, one per input.
+        values: the derivatives, a part of `Ramps.slope` or `Ramps.curve`.
+    """
+
+    instance: int
+    references: NDArray[np.uint32]
+    orders: NDArray[np.int32]
+    values: Vector
+
+
+class Ramps:
+    """Derivatives of the inputs that move, at the begin of the step.
+
+    Attributes:
+        average: mean over the step, per mean of the plan (of bonds and of those that are held).
+        slope, curve: first and second derivative, likewise.
+        calls: per RAMP operation (first, behind last mean), what is told.
+    """
+
+    def __init__(self, plan: Plan, instances: Sequence[Instance]) -> None:
+        self._instances = instances
+        count = len(plan.means)
+        self.average, self.slope, self.curve = np.zeros(count), np.zeros(count), np.zeros(count)
+        self.calls: dict[tuple[int, int], tuple[Call, ...]] = {}
+        layout = plan.layout
+        for first, last in {(a, b) for op, a, b in plan.step.tolist() if op == Op.RAMP}:
+            means = plan.means[first:last]
+            index = means[0].instance
+            instance = instances[index]
+            begin = len(layout.instances[index]) + 1
+            references = np.array(
+                [
+                    instance.description.find(layout.names[m.target][begin:]).reference
+                    for m in means
+                ],
+                dtype=np.uint32,
+            )
+            derivatives = [self.slope, self.curve][: max(mean.order for mean in means)]
+            self.calls[first, last] = tuple(
+                Call(
+                    index,
+                    references,
+                    np.full(len(means), order, dtype=np.int32),
+                    values[first:last],
+                )
+                for order, values in enumerate(derivatives, start=1)
+            )
+
+    def tell(self, first: int, last: int) -> None:
+        """Tell an instance how its inputs move."""
+        for call in self.calls[first, last]:
+            self._instances[call.instance].ramp(call.references, call.orders, call.values)
+
+
+def bend(a: float, b: float, c: float, d: float) -> float:
+    """Second difference of the parabola through the last values, newest first.
+
+    Of the last two second differences the one nearer to zero, and zero if their signs differ. Where
+    a value moves smoothly they are alike; where it rings or has a kink, a parabola would feed that,
+    and the straight line takes its place.
+    """
+    last, before = a - 2.0 * b + c, b - 2.0 * c + d
+    nearer = last if abs(last) < abs(before) else before
+    return nearer if last * before > 0.0 else 0.0

@@ -1,0 +1,212 @@
+"""Runs in a process of their own: what an FMU does there cannot take this process with it.
+
+The other process (`isolation_worker`) gets the system and the table of external inputs,
+executes the plan in Python, and says before each call to an FMU which one it is. Recorded rows are
+in a shared file, so that they are there whatever happens. This process waits; it ends the other one
+if no call returns within the time limit.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.recording import Recording
+from ..errors import AlgebraicLoopError, FmuCallError, StepError
+from .plan import Op
+
+if TYPE_CHECKING:
+    from ..data.signals import Signal
+    from .master import Master
+
+Vector = NDArray[np.float64]
+INDEX, ROW, INSTANCE, OPERATION, CALLS = range(5)
+WHAT = {Op.SET: "taking inputs", Op.GET: "giving outputs", Op.STEP: "a step", Op.SUBSTEP: "a step"}
+STARTING = 30.0
+"""Longer than the limit, for Python to start and load the FMUs [s]."""
+LOADING = -1
+"""Operation while FMUs are loaded and initialized."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What the other process shall run."""
+
+    master: Master
+    external_names: tuple[str, ...]
+    external: Vector
+    observed: tuple[str, ...]
+    times: Vector
+    every: int
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What it says at the end; `kind` is ok, call, or loop."""
+
+    kind: str
+    text: str = ""
+    messages: tuple[str, ...] = ()
+    bond_energy: Mapping[str, float] | None = None
+    steps: int = 0
+
+
+def shared(folder: Path, rows: int, columns: int) -> tuple[NDArray[np.int64], Vector]:
+    """State and rows in files of the folder, made by whoever comes first."""
+    found: list[Any] = []
+    for name, dtype, shape in (("state", np.int64, (5,)), ("rows", np.float64, (rows, columns))):
+        path = folder / name
+        size = int(np.prod(shape)) * 8
+        if not size:
+            found.append(np.zeros(shape, dtype=dtype))
+            continue
+        if not path.exists():
+            path.write_bytes(bytes(size))
+        found.append(np.memmap(path, dtype=dtype, mode="r+", shape=shape))
+    return found[0], found[1]
+
+
+def run_isolated(
+    master: Master,
+    limit: float,
+    signals: Mapping[str, Signal],
+    external: Vector,
+    observed: Sequence[str],
+    times: Vector,
+    every: int,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Run a master in another process.
+
+    Args:
+        master: system, algorithm and step.
+        limit: longest time that one call to an FMU may take [s].
+        signals, external, observed, times, every: as prepared by `Master.run`.
+        progress: told now and then which fraction is done.
+
+    Raises:
+        StepError: an FMU failed, crashed or did not return; carries the recording up to then.
+        AlgebraicLoopError: initial values do not settle.
+    """
+    count = times.size - 1
+    with tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        state, rows = shared(folder, count // every + 1, len(observed))
+        state[OPERATION] = LOADING
+        plain = replace(
+            master, system=replace(master.system, provider=None), isolate=None, executor="python"
+        )
+        order = Order(plain, tuple(signals), external, tuple(observed), times, every, folder)
+        (folder / "order").write_bytes(pickle.dumps(order))
+        with open(folder / "errors", "wb") as errors:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "cosim.master.isolation_worker", str(folder / "order")],
+                stdin=subprocess.DEVNULL, stdout=errors, stderr=errors, env=_environment(),
+            )  # fmt: skip
+            try:
+                hung = _wait(process, state, limit, count, progress)
+            finally:
+                if process.poll() is None:
+                    process.kill()
+                process.wait()
+        last = min(int(state[INDEX]), count)
+
+        def recording(error: str, outcome: Outcome | None = None) -> Recording:
+            kept = min(int(state[ROW]), rows.shape[0])
+            return Recording(
+                time=times[::every][:kept].copy(),
+                values=np.array(rows[:kept]),
+                names=tuple(observed),
+                units={item: master.system.unit(item) for item in observed},
+                provenance={
+                    **master.provenance(),
+                    "isolated": True,
+                    "inputs": {item: signal.text for item, signal in signals.items()},
+                    "fmu_steps": (outcome.steps if outcome else last) * len(master.system.members),
+                },
+                bond_energy=dict(outcome.bond_energy or {}) if outcome else {},
+                error=error,
+            )
+
+        path = folder / "outcome"
+        outcome: Outcome | None = pickle.loads(path.read_bytes()) if path.exists() else None
+        if outcome is not None and outcome.kind == "ok":
+            return recording("", outcome)
+        when = float(times[last])
+        if outcome is not None and outcome.kind == "loop":
+            raise AlgebraicLoopError(outcome.text)
+        if outcome is not None and outcome.kind == "call":
+            raise FmuCallError(outcome.text, outcome.messages)
+        if outcome is not None:
+            text, messages = outcome.text, outcome.messages
+        else:
+            said = (folder / "errors").read_bytes()[-2000:].decode(errors="replace").strip()
+            messages = tuple(said.splitlines()[-5:])
+            text = f"run stopped at t = {when:.9g} s: {_blame(master, state)} "
+            text += (
+                f"did not return within {limit:g} s and was ended"
+                if hung
+                else f"crashed ({_reason(process.returncode)})"
+            )
+        raise StepError(text, messages, time=when, recording=recording(text))
+
+
+def _environment() -> dict[str, str]:
+    """That of this process, with this package in reach."""
+    home = str(Path(__file__).resolve().parents[2])
+    paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _wait(
+    process: subprocess.Popen[bytes],
+    state: NDArray[np.int64],
+    limit: float,
+    count: int,
+    progress: Callable[[float], None] | None,
+) -> bool:
+    """Wait for the end; whether nothing happened for too long."""
+    seen, since = -1, time.monotonic()
+    while True:
+        try:
+            process.wait(0.05)
+            return False
+        except subprocess.TimeoutExpired:
+            if progress is not None:
+                progress(int(state[INDEX]) / count)  # in a hang, too: it may end the run
+            calls = int(state[CALLS])
+            if calls != seen:
+                seen, since = calls, time.monotonic()
+            elif time.monotonic() - since > limit + (0 if calls else STARTING):
+                return True
+
+
+def _blame(master: Master, state: NDArray[np.int64]) -> str:
+    members = list(master.system.members.values())
+    member = members[min(max(int(state[INSTANCE]), 0), len(members) - 1)]
+    operation = int(state[OPERATION])
+    what = "being created" if operation == LOADING else WHAT.get(Op(operation), "a call")
+    return f"{member.name} ({member.reference}), in {what},"
+
+
+def _reason(code: int) -> str:
+    if code >= 0:
+        return f"its process ended with code {code}"
+    import signal
+
+    try:
+        return f"signal {signal.Signals(-code).name}"
+    except ValueError:
+        return f"signal {-code}"

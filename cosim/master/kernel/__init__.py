@@ -1,0 +1,443 @@
+"""The compiled executor of plans: finds its library and binds a run to it.
+
+The library is part of an installed wheel; in a checkout it is compiled into the cache when FMUs are
+built. Without one, runs use the executor in Python, which gives the same numbers, bit for bit.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import hashlib
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from enum import IntEnum
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...fmu.exchange import Block
+from ...fmu.instance import Instance
+from ..algebraic_loops import Newton
+from ..input_derivatives import Ramps
+from ..plan import Op, Plan
+
+SOURCE = Path(__file__).with_name("kernel.c")
+_P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
+_TYPES = (
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
+    "Boolean",
+)  # fmt: skip
+_TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Boolean2": 6}
+
+
+class _Call(ct.Structure):
+    _fields_ = (
+        ("component", _P), ("function", _P), ("references", _P), ("buffer", _P), ("slots", _P),
+        ("n_references", _I64), ("n_values", _I64), ("type", _I32), ("version", _I32),
+    )  # fmt: skip
+
+
+class _Member(ct.Structure):
+    _fields_ = (("component", _P), ("step", _P))
+
+
+class _Instruction(ct.Structure):
+    _fields_ = (("operation", _I64), ("first", _I64), ("last", _I64))
+
+
+class _Copy(ct.Structure):
+    _fields_ = (("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64))
+
+
+class _Term(ct.Structure):
+    _fields_ = (
+        ("sign", _D), ("previous", _D), ("held", _D), ("output", _I64),
+        ("input", _I64), ("bond", _I64), ("mean", _I64),
+    )  # fmt: skip
+
+
+class _Loop(ct.Structure):
+    _fields_ = (
+        ("sources", _P), ("inverse", _P), ("valid", _P), ("work", _P), ("n", _I64),
+        ("first", _I64), ("last", _I64),
+    )  # fmt: skip
+
+
+class _Mean(ct.Structure):
+    _fields_ = (
+        ("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64), ("order", _I64),
+        ("ahead", _I64), ("moving", _I64), ("bonded", _I64),
+    )  # fmt: skip
+
+
+class _Ramp(ct.Structure):
+    _fields_ = (
+        ("component", _P), ("function", _P), ("references", _P), ("orders", _P), ("values", _P),
+        ("n", _I64),
+    )  # fmt: skip
+
+
+class _Run(ct.Structure):
+    _fields_ = (
+        ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
+        ("n_instructions", _I64), ("times", _P), ("step", _D), ("external", _P),
+        ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
+        ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
+        ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
+        ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
+        ("past", _P), ("n_means", _I64),
+        ("average", _P), ("slope", _P), ("curve", _P), ("ramps", _P),
+        ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
+        ("failed_ramp", _I64),
+    )  # fmt: skip
+
+
+class _Code(IntEnum):
+    """Operations of the compiled executor."""
+
+    EXTERNAL = 0
+    RECORD = 1
+    COPY = 2
+    SCALE = 3
+    CALL2 = 4
+    CALL3 = 5
+    CONVERT_SET = 6
+    CONVERT_GET = 7
+    STEP2 = 8
+    STEP3 = 9
+    ENERGY = 10
+    SOLVE = 11
+    NOTE = 12
+    EXTRAPOLATE = 13
+    SUBSTEP = 14
+    HOLD = 15
+    RAMP = 16
+
+
+UNFIT = 7
+"""Status of a set call that was not made, because a number does not fit the variable's type."""
+UNSETTLED = 8
+"""Status of an algebraic loop that has no solution or does not settle."""
+TOO_LONG, TOO_LARGE = 9, 10
+"""Statuses of a run that took more than its limit, and of one that ran away."""
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Ramp)
+
+
+def library_name() -> str:
+    """File name of the library for this source and this machine."""
+    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    return f"kernel-{digest}-{machine}-{platform.system().lower()}{suffix}"
+
+
+def cache_folder() -> Path:
+    """Where a checkout keeps the library that it compiled."""
+    root = os.environ.get("COSIM_CACHE")
+    if root:
+        return Path(root) / "kernel"
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cosim"
+    except RuntimeError:  # no home directory
+        base = Path(tempfile.gettempdir()) / "cosim-cache"
+    return base / "kernel"
+
+
+@lru_cache(maxsize=1)
+def _load(path: str) -> Any:
+    library = ct.CDLL(path)
+    library.cosim_run.argtypes, library.cosim_run.restype = [_P, _I64], ct.c_int
+    library.cosim_run_within.argtypes = [_P, _I64, _D, _D]
+    library.cosim_run_within.restype = ct.c_int
+    library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], _I64
+    sizes = [library.cosim_size(what) for what in range(len(_STRUCTURES))]
+    expected = [ct.sizeof(kind) for kind in _STRUCTURES]
+    if sizes != expected:
+        raise OSError(f"{path}: its structures have sizes {sizes}, expected {expected}")
+    return library
+
+
+def find() -> Path | None:
+    """The library, None if this machine has none."""
+    for folder in (SOURCE.parent / "lib", cache_folder()):
+        path = folder / library_name()
+        if path.is_file():
+            return path
+    return None
+
+
+class Kernel:
+    """A run bound to the compiled executor.
+
+    Args:
+        plan: what to do in a communication step.
+        instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
+        values: the run's array of values, which the blocks view.
+        times, external: communication points and the external inputs there.
+        rows: where observed values go.
+        bond_energy: where the bonds' energy goes.
+        newtons: one per algebraic loop.
+        history, past: of extrapolated inputs, and how many values it has before the first step.
+        ramps: derivatives of the inputs that move within a step.
+        bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        instances: Sequence[Instance],
+        outputs: Sequence[Block],
+        inputs: Sequence[Block],
+        values: NDArray[np.float64],
+        times: NDArray[np.float64],
+        step: float,
+        external: NDArray[np.float64],
+        rows: NDArray[np.float64],
+        bond_energy: NDArray[np.float64],
+        every: int,
+        newtons: Sequence[Newton] = (),
+        history: NDArray[np.float64] | None = None,
+        past: NDArray[np.int64] | None = None,
+        ramps: Ramps | None = None,
+        bond_mean: Sequence[int] = (),
+    ) -> None:
+        path = find()
+        if path is None:
+            raise FileNotFoundError(library_name())
+        self._library = _load(str(path))
+        layout = plan.layout
+        self._keep: list[Any] = [instances, outputs, inputs]
+        self._parts: list[tuple[Op, Instance, Any]] = []
+        self._instances = instances
+        self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
+        calls: list[_Call] = []
+        spans: dict[tuple[Op, int], tuple[int, int]] = {}
+        for op, blocks, slots in (
+            (Op.SET, inputs, layout.inputs),
+            (Op.GET, outputs, layout.outputs),
+        ):
+            for index, (instance, block) in enumerate(zip(instances, blocks, strict=True)):
+                first = len(calls)
+                for part in block.parts:
+                    calls.append(self._call(op, instance, block, part, int(slots[index, 0])))
+                    self._parts.append((op, instance, part))
+                spans[op, index] = (first, len(calls))
+        self.run = _Run(
+            members=self._structures(_Member, (_member(instance) for instance in instances)),
+            calls=self._structures(_Call, calls),
+            values=self._array(values),
+            times=self._array(times),
+            step=step,
+            external=self._array(external),
+            external_slot=self._array(layout.external),
+            n_external=external.shape[1],
+            copies=self._structures(
+                _Copy,
+                zip(
+                    layout.copy_gain.tolist(), layout.copy_offset.tolist(),
+                    layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True,
+                ),
+            ),
+            records=self._structures(
+                _Copy,
+                zip(
+                    layout.record_gain.tolist(), layout.record_offset.tolist(),
+                    layout.record_source.tolist(), range(rows.shape[1]), strict=True,
+                ),
+            ),
+            n_record=rows.shape[1],
+            every=every,
+            rows=self._array(rows),
+            terms=self._structures(
+                _Term,
+                zip(
+                    layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
+                    layout.bond_output.tolist(), layout.bond_input.tolist(),
+                    layout.bond_index.tolist(),
+                    bond_mean or [-1] * len(layout.bond_sign), strict=True,
+                ),
+            ),
+            bond_energy=self._array(bond_energy),
+            n_terms=len(layout.bond_output),
+            carried=_carried(plan),
+        )  # fmt: skip
+        told = self._ramps(ramps) if ramps is not None else {}
+        instructions = _instructions(plan, plan.step, spans, calls, instances, told)
+        self.run.n_instructions = len(instructions)
+        loops = []
+        for loop, newton in zip(plan.loops, newtons, strict=True):
+            first = len(instructions)
+            instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
+            loops.append(
+                _Loop(
+                    self._array(loop.sources),
+                    self._array(newton.inverse),
+                    self._array(newton.valid),
+                    self._array(np.zeros(5 * newton.n + 2 * newton.n**2)),
+                    newton.n,
+                    first,
+                    len(instructions),
+                )
+            )
+        self.run.loops = self._structures(_Loop, loops)
+        self.run.instructions = self._structures(_Instruction, instructions)
+        self.run.means = self._structures(
+            _Mean,
+            (
+                (m.gain, m.offset, m.source, m.target, m.order, m.ahead, m.moving, m.bonded)
+                for m in plan.means
+            ),
+        )
+        self.run.n_means = len(plan.means)
+        if history is not None and past is not None:
+            self.run.history, self.run.past = self._array(history), self._array(past)
+
+    def _ramps(self, ramps: Ramps) -> dict[tuple[int, int], tuple[int, int]]:
+        """Bind the calls of derivatives; per RAMP operation the first and behind the last."""
+        self.run.average = self._array(ramps.average)
+        self.run.slope, self.run.curve = self._array(ramps.slope), self._array(ramps.curve)
+        self._keep.append(ramps)
+        rows: list[_Ramp] = []
+        told = {}
+        for key, told_calls in ramps.calls.items():
+            for call in told_calls:
+                instance = self._instances[call.instance]
+                rows.append(
+                    _Ramp(
+                        instance.address, instance.functions["fmi2SetRealInputDerivatives"],
+                        call.references.ctypes.data, call.orders.ctypes.data,
+                        call.values.ctypes.data, call.references.size,
+                    )
+                )  # fmt: skip
+                self._told.append((instance, call.references))
+            told[key] = (len(rows) - len(told_calls), len(rows))
+        self.run.ramps = self._structures(_Ramp, rows)
+        return told
+
+    def _array(self, array: NDArray[Any]) -> int:
+        """Address of an array of 8-byte numbers, which is kept alive."""
+        if not array.flags.c_contiguous or array.dtype not in (np.float64, np.int64):
+            raise TypeError("not a contiguous array of float64 or int64")
+        self._keep.append(array)
+        return int(array.ctypes.data)
+
+    def _structures(self, kind: type[ct.Structure], rows: Iterable[Any]) -> int:
+        """Address of C structures with these contents, which are kept alive."""
+        items = [row if isinstance(row, kind) else kind(*row) for row in rows]
+        array = (kind * max(len(items), 1))(*items)
+        self._keep.append(array)
+        return ct.addressof(array)
+
+    def _call(self, op: Op, instance: Instance, block: Block, part: Any, base: int) -> _Call:
+        slots = 0
+        if part.buffer is not block.values:
+            within = np.arange(block.values.size)[part.slots]
+            slots = self._array(np.ascontiguousarray(within + base, dtype=np.int64))
+        names = instance.binding.SET if op is Op.SET else instance.binding.GET
+        return _Call(
+            instance.address, instance.functions[names[part.type]], part.references.ctypes.data,
+            part.buffer.ctypes.data, slots, part.references.size, part.buffer.size,
+            _TYPE_CODES[part.type], instance.binding.version,
+        )  # fmt: skip
+
+    def advance(self, last: int) -> int:
+        """Communication steps up to `last`; 0, or the status that ended it."""
+        return int(self._library.cosim_run(ct.addressof(self.run), last))
+
+    def advance_within(self, last: int, limit: float, most: float) -> int:
+        """The same within some processor time [s], while no recorded value is larger than `most`.
+
+        It does not return in between: each time, a thread would wait for the interpreter lock.
+        """
+        return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
+
+    def restart(self) -> None:
+        """Begin again at the first communication point."""
+        self.run.index = self.run.row = self.run.next_record = 0
+
+    def failed(self) -> tuple[Op, Instance | None, Any]:
+        """What failed: operation, instance and what it was about.
+
+        That is the part of its block for get and set calls, and the value references of inputs
+        whose derivatives were refused.
+        A recorded value that is not finite belongs to no instance.
+        """
+        call, member = int(self.run.failed_call), int(self.run.failed_member)
+        ramp = int(self.run.failed_ramp)
+        if call >= 0:
+            return self._parts[call]
+        if ramp >= 0:
+            instance, references = self._told[ramp]
+            return Op.RAMP, instance, references
+        if member >= 0:
+            return Op.STEP, self._instances[member], None
+        return Op.RECORD, None, None
+
+
+def _member(instance: Instance) -> _Member:
+    return _Member(instance.address, instance.functions[f"fmi{instance.binding.version}DoStep"])
+
+
+def _instructions(
+    plan: Plan,
+    rows: NDArray[np.int64],
+    spans: dict[tuple[Op, int], tuple[int, int]],
+    calls: Sequence[_Call],
+    instances: Sequence[Instance],
+    told: Mapping[tuple[int, int], tuple[int, int]],
+) -> list[tuple[int, int, int]]:
+    """The operations of these rows, in order; neighbours of one kind become one."""
+    found: list[tuple[int, int, int]] = []
+
+    def add(code: _Code, first: int, last: int) -> None:
+        if found and found[-1][0] == code and found[-1][2] == first:
+            found[-1] = (code, found[-1][1], last)
+        else:
+            found.append((code, first, last))
+
+    layout = plan.layout
+    plain = (layout.copy_gain == 1.0) & (layout.copy_offset == 0.0)
+    for row in rows.tolist():
+        op, a, b = Op(row[0]), row[1], row[2]
+        if op is Op.COPY:
+            for index in range(a, b):
+                add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
+        elif op is Op.STEP:
+            add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+        elif op is Op.RAMP:
+            add(_Code.RAMP, *told[a, b])
+        elif op is Op.SUBSTEP:
+            found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
+        elif op in (Op.SET, Op.GET):
+            for index in range(*spans[op, a]):
+                code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3
+                if calls[index].slots:
+                    code = _Code.CONVERT_SET if op is Op.SET else _Code.CONVERT_GET
+                add(code, index, index + 1)
+        else:
+            found.append((_Code[op.name], a, b))
+    return found
+
+
+def _carried(plan: Plan) -> bool:
+    """Whether the outputs that a step ends with are those that the next one notes for its bonds.
+
+    So it is if energy is added after the last get call, and noted before the first one.
+    """
+    codes = plan.step[:, 0].tolist()
+    gets = [index for index, code in enumerate(codes) if code in (Op.GET, Op.SOLVE)]
+    notes = [index for index, code in enumerate(codes) if code == Op.RECORD]
+    sums = [index for index, code in enumerate(codes) if code == Op.ENERGY]
+    return (
+        len(notes) == len(sums) == 1
+        and notes[0] < min(gets, default=len(codes))
+        and sums[0] > max(gets, default=-1)
+    )

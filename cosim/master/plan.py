@@ -1,0 +1,283 @@
+"""A co-simulation algorithm as a flat list of operations on one array of values.
+
+Every exchanged variable has a slot in `values`: first, instance by instance, the outputs that are
+fetched, then the inputs that are given. An algorithm is the order of operations of one
+communication step; it is executed by `master` (Python) and can be executed by compiled code, since
+all there is are arrays of numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..system.system import Bond, System
+
+Integers = NDArray[np.int64]
+Vector = NDArray[np.float64]
+
+
+class Op(IntEnum):
+    """Operations; a and b are their two numbers."""
+
+    EXTERNAL = 0  # values of external inputs at the present time
+    RECORD = 1  # keep observed values if it is their turn; note outputs for the energy of bonds
+    COPY = 2  # copies a <= i < b: values[target] = values[source] * gain + offset
+    SET = 3  # give inputs to instance a
+    STEP = 4  # instance a goes one communication step
+    GET = 5  # fetch outputs of instance a
+    ENERGY = 6  # add the energy that went over each bond in this step; a = 1: with inputs of HOLD
+    SOLVE = 7  # solve algebraic loop a
+    NOTE = 8  # remember the outputs that are extrapolated
+    EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step (begin, if moving)
+    SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
+    HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
+    ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
+    RAMP = 13  # tell an instance how its inputs move: means a <= i < b, all of them its own
+
+
+PARTS = 1 << 16
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which variable is where.
+
+    Attributes:
+        instances: names.
+        names: full name of each slot.
+        outputs, inputs: per instance (first slot, behind last slot).
+        fetched, given: per instance the names of the variables behind these slots.
+        copy_source, copy_target, copy_gain, copy_offset: connections, sorted by target instance.
+        copies: per instance (first, behind last) of the copies into it.
+        external: slots of the external inputs.
+        record_source, record_gain, record_offset: where observed signals come from.
+        bonds: power bonds.
+        bond_index, bond_output, bond_input, bond_sign: their terms.
+    """
+
+    instances: tuple[str, ...]
+    names: tuple[str, ...]
+    outputs: Integers
+    inputs: Integers
+    fetched: tuple[tuple[str, ...], ...]
+    given: tuple[tuple[str, ...], ...]
+    copy_source: Integers
+    copy_target: Integers
+    copy_gain: Vector
+    copy_offset: Vector
+    copies: Integers
+    external: Integers
+    record_source: Integers
+    record_gain: Vector
+    record_offset: Vector
+    bonds: tuple[Bond, ...]
+    bond_index: Integers
+    bond_output: Integers
+    bond_input: Integers
+    bond_sign: Vector
+
+
+@dataclass(frozen=True)
+class Loop:
+    """An algebraic loop, cut at some outputs.
+
+    Attributes:
+        sources: slots of the outputs at which it is cut, the unknowns.
+        sweep: operations that pass on their values once around the loop and fetch them again.
+        text: the loop port by port.
+    """
+
+    sources: Integers
+    sweep: Integers
+    text: str
+
+
+@dataclass(frozen=True)
+class Mean:
+    """An input that follows a polynomial through its source's values.
+
+    Attributes:
+        source, target: slots.
+        gain, offset: target = gain * source + offset.
+        order: of the polynomial.
+        ahead: the source is at the end of the step already (interpolation).
+        instance: whose input it is.
+        moving: the instance takes value and derivatives at the begin of the step; else it takes the
+            mean over the step, held.
+        bonded: the input belongs to a power bond, whose energy needs the mean in any case.
+    """
+
+    source: int
+    target: int
+    gain: float
+    offset: float
+    order: int
+    ahead: bool
+    instance: int
+    moving: bool
+    bonded: bool
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Settings of the algorithms that repeat steps.
+
+    Attributes:
+        tolerance: relative change of exchanged values at which they count as settled; of step
+            control, the error of one step.
+        smooth: per copy, whether its values are continuous in time.
+        energy: step control: energy that the coupling may invent, relative to what it passes on.
+        longest: step control: longest step [s].
+        adaptive: whether steps are controlled.
+    """
+
+    tolerance: float
+    smooth: NDArray[np.bool_]
+    energy: float = np.inf
+    longest: float | None = None
+    adaptive: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Operations over a layout.
+
+    Attributes:
+        algorithm: name.
+        layout: where the values are.
+        initial: one sweep over the instances during initialization, repeated until nothing changes.
+        step: one communication step.
+        final: at the end of the run.
+        loops: what SOLVE solves.
+        solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
+            loops solved.
+        means: what EXTRAPOLATE and RAMP set.
+        iteration: what ITERATE and step control need.
+    """
+
+    algorithm: str
+    layout: Layout
+    initial: Integers
+    step: Integers
+    final: Integers
+    loops: tuple[Loop, ...] = ()
+    solving: Integers = field(default_factory=lambda: operations(()))
+    means: tuple[Mean, ...] = ()
+    iteration: Iteration | None = None
+
+
+def operations(items: Iterable[Sequence[int]]) -> Integers:
+    """Rows (operation, a, b)."""
+    rows = [(int(item[0]), *item[1:], 0, 0)[:3] for item in items]
+    return np.array(rows, dtype=np.int64).reshape(-1, 3)
+
+
+def _whole(system: System, name: str) -> str:
+    """The FMU's variable that holds a scalar element (`x` for an element of an FMI 3 array)."""
+    instance, _, variable = name.partition(".")
+    known = system.members[instance].description.variables
+    return variable if variable in known else variable.rpartition("[")[0]
+
+
+def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) -> Layout:
+    """Give every exchanged variable of a system its slot.
+
+    Args:
+        system: the graph.
+        external: full scalar names of the inputs that signals drive.
+        observed: full scalar names of the variables to record.
+    """
+    instances = tuple(system.members)
+    bonds = tuple(system.bonds())
+    fetched: dict[str, dict[str, None]] = {name: {} for name in instances}
+    given: dict[str, dict[str, None]] = {name: {} for name in instances}
+
+    def add(table: dict[str, dict[str, None]], full: str) -> None:
+        table[full.partition(".")[0]][_whole(system, full)] = None
+
+    for connection in system.connections:
+        add(fetched, connection.source)
+        add(given, connection.target)
+    for name in external:
+        add(given, name)
+    passed_in = {connection.target for connection in system.connections} | set(external)
+    for name in observed:
+        if name not in passed_in:
+            add(fetched, name)
+
+    names: list[str] = []
+    spans: dict[str, list[tuple[int, int]]] = {"out": [], "in": []}
+    for table, key in ((fetched, "out"), (given, "in")):
+        for instance in instances:
+            first = len(names)
+            variables = system.members[instance].description.variables
+            for variable in table[instance]:
+                names += [f"{instance}.{element}" for element in variables[variable].elements()]
+            spans[key].append((first, len(names)))
+    outputs = {name: slot for slot, name in enumerate(names[: spans["out"][-1][1]])}
+    inputs = {name: slot for slot, name in enumerate(names) if slot >= spans["out"][-1][1]}
+
+    position = {name: index for index, name in enumerate(instances)}
+    wires = sorted(system.connections, key=lambda c: position[c.target.partition(".")[0]])
+    into = [position[c.target.partition(".")[0]] for c in wires]
+    copies = [(into.index(i), into.index(i) + into.count(i)) if i in into else (0, 0)
+              for i in range(len(instances))]  # fmt: skip
+    by_target = {c.target: c for c in wires}
+    record = []
+    for name in observed:
+        wire = by_target.get(name)
+        if wire is not None:
+            record.append((outputs[wire.source], wire.gain, wire.offset))
+        else:
+            record.append((inputs[name] if name in external else outputs[name], 1.0, 0.0))
+    terms = [(index, outputs[given_], inputs[taken], sign)
+             for index, bond in enumerate(bonds) for given_, taken, sign in bond.terms]  # fmt: skip
+    return Layout(
+        instances=instances,
+        names=tuple(names),
+        outputs=np.array(spans["out"], dtype=np.int64),
+        inputs=np.array(spans["in"], dtype=np.int64),
+        fetched=tuple(tuple(fetched[name]) for name in instances),
+        given=tuple(tuple(given[name]) for name in instances),
+        copy_source=np.array([outputs[c.source] for c in wires], dtype=np.int64),
+        copy_target=np.array([inputs[c.target] for c in wires], dtype=np.int64),
+        copy_gain=np.array([c.gain for c in wires], dtype=np.float64),
+        copy_offset=np.array([c.offset for c in wires], dtype=np.float64),
+        copies=np.array(copies, dtype=np.int64),
+        external=np.array([inputs[name] for name in external], dtype=np.int64),
+        record_source=np.array([item[0] for item in record], dtype=np.int64),
+        record_gain=np.array([item[1] for item in record], dtype=np.float64),
+        record_offset=np.array([item[2] for item in record], dtype=np.float64),
+        bonds=bonds,
+        bond_index=np.array([term[0] for term in terms], dtype=np.int64),
+        bond_output=np.array([term[1] for term in terms], dtype=np.int64),
+        bond_input=np.array([term[2] for term in terms], dtype=np.int64),
+        bond_sign=np.array([term[3] for term in terms], dtype=np.float64),
+    )
+
+
+def initial_sweep(system: System, layout: Layout) -> Integers:
+    """Exchange connected values once, in the order of direct feedthrough."""
+    position = {name: index for index, name in enumerate(layout.instances)}
+    rows: list[tuple[int, ...]] = [(Op.EXTERNAL,)]
+    for name in system.order():
+        index = position[name]
+        rows += exchange(layout, index)
+        rows.append((Op.GET, index))
+    return operations(rows)
+
+
+def exchange(layout: Layout, index: int) -> list[tuple[int, ...]]:
+    """Operations that bring the newest connected values into one instance."""
+    first, last = (int(item) for item in layout.copies[index])
+    return [(Op.COPY, first, last), (Op.SET, index)]
+
+
+def final_operations(consistent: Sequence[tuple[int, ...]] = ()) -> Integers:
+    """Operations at the end of a run; `consistent` are those before recording."""
+    return operations([(Op.EXTERNAL,), *consistent, (Op.RECORD,)])

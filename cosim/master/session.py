@@ -1,0 +1,183 @@
+"""A prepared run that is repeated with other values: calibration runs thousands of them.
+
+    session = Session(master, 10.0, inputs={"motor.w_ref": table}, record=["load.w"])
+    times, rows = session.run({"load.J": 0.09})
+
+Instances, plan, arrays and the binding to the compiled executor are made once. A repetition is the
+same as a new run, bit for bit. Sessions do not share anything that changes, so each thread can run
+one of its own; the compiled executor releases the interpreter lock.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.recording import Recording
+from ..errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
+from ..fmu.exchange import Block, check_values
+from . import kernel
+from .execution import Execution
+from .master import Driver, Master
+from .startup import find_past
+
+Vector = NDArray[np.float64]
+LOOK, CHECK = 50, 100
+"""Communication steps after which a limited run looks at the clock, and at what it has recorded; as
+in the compiled executor."""
+RUNAWAY = 1e30
+"""Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
+and solvers crawl long before squares overflow."""
+
+
+class Session:
+    """A run of a master, ready to be repeated.
+
+    Args:
+        master: system, algorithm and communication step.
+        duration: [s], a whole number of steps.
+        inputs: as of `Master.run`.
+        record: signals to record.
+        every: record every n-th communication point.
+        start: time at which the run begins [s].
+        targets: full names of parameters and start values that `run` may be given as an array.
+    """
+
+    def __init__(
+        self,
+        master: Master,
+        duration: float,
+        *,
+        inputs: Mapping[str, Driver] | None = None,
+        record: Sequence[str],
+        every: int = 1,
+        start: float = 0.0,
+        targets: Sequence[str] = (),
+    ) -> None:
+        outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
+        self.master, self.names, self.count = master, tuple(outline.observed), outline.count
+        self.times = outline.times[::every].copy()
+        self.targets = tuple(targets)
+        self._stack = ExitStack()
+        try:
+            self._run = Execution(
+                master, outline.plan, outline.observed, outline.external, outline.times, every,
+                outline.signals, self._stack,
+            )  # fmt: skip
+            self._advance = self._run.executor()
+            self._blocks = {name: self._block(name) for name in self.targets}
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _block(self, name: str) -> tuple[Block, Any]:
+        member, variables = self.master.system.variables(name)
+        position = list(self.master.system.members).index(member.name)
+        return Block(self._run.instances[position], variables), variables
+
+    def run(
+        self, values: Mapping[str, float] | Vector | None = None, *, limit: float = math.inf
+    ) -> tuple[Vector, Vector]:
+        """Run with these values on top of the system's own.
+
+        Args:
+            values: by full name, or one per target.
+            limit: processor time that it may take [s].
+
+        Returns:
+            times, and one row per time with a column per name in `names` (a copy).
+
+        Raises:
+            ValueRangeError: outside the declared bounds.
+            StepError: an FMU failed, or the run took too long.
+        """
+        if values is None:
+            values = {}
+        if not isinstance(values, Mapping):
+            if len(values) != len(self.targets):
+                raise ValueRangeError(f"{len(values)} values for {len(self.targets)} targets")
+            values = dict(zip(self.targets, np.asarray(values).tolist(), strict=True))
+        run = self._run
+        run.restart()
+        for name, value in values.items():
+            if name not in self._blocks:
+                self._blocks[name] = self._block(name)
+            block, variables = self._blocks[name]
+            block.set(check_values(name, variables, value))
+        run.initialize()
+        try:
+            find_past(run)
+            self._advance_within(limit)
+            run.finish()
+        except (FmuCallError, AlgebraicLoopError) as error:
+            at = float(run.times[min(run.index, self.count)])
+            text = f"run stopped at t = {at:.9g} s: {error}"
+            messages = error.messages if isinstance(error, FmuCallError) else ()
+            raise StepError(text, messages, time=at) from error
+        return self.times, run.rows[: run.row].copy()
+
+    def _advance_within(self, limit: float) -> None:
+        if math.isinf(limit):
+            self._advance(self.count)
+        elif self._run.bound is not None:
+            status = self._run.advance_within(self.count, limit, RUNAWAY)
+            self._stopped(limit, status == kernel.TOO_LONG, status == kernel.TOO_LARGE)
+        else:
+            begun = time.thread_time()
+            for last in [*range(LOOK, self.count, LOOK), self.count]:
+                self._advance(last)
+                late = time.thread_time() - begun > limit
+                self._stopped(limit, late, last % CHECK == 0 and self._largest()[1] > RUNAWAY)
+
+    def _largest(self) -> tuple[str, float]:
+        """Name and size of the largest value recorded last."""
+        newest = np.abs(self._run.rows[max(self._run.row - 1, 0)])
+        place = int(np.argmax(newest)) if newest.size else -1
+        return (self.names[place], float(newest[place])) if newest.size else ("", 0.0)
+
+    def _stopped(self, limit: float, late: bool, large: bool) -> None:
+        """Raise if a run took too long or ran away."""
+        if late:
+            raise FmuCallError(
+                f"it took more than {limit:.3g} s of processor time: with these values a solver "
+                "takes very small steps"
+            )
+        if large:
+            raise FmuCallError(
+                f"{self._largest()[0]} passed {RUNAWAY:g}: with these values the system is unstable"
+            )
+
+    def record(self, progress: Callable[[float], None] | None = None) -> Recording:
+        """Run with the values that the system has now: change them by `master.system.set`.
+
+        Args:
+            progress: told now and then which fraction is done; what it raises ends the run.
+
+        Raises:
+            AlgebraicLoopError: initial values do not settle.
+            StepError: an FMU failed; carries the recording up to then.
+        """
+        self._run.restart()
+        return self._run.execute(self.count, progress)
+
+    def close(self) -> None:
+        """Free the instances."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,1 @@
+"""Experiments as data: a system, inputs, an end, and what to compare and check."""

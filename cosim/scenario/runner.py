@@ -1,0 +1,455 @@
+"""Runs scenarios: builds the system, runs it, compares, checks, writes files."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.comparison import Comparison, compare, convert_reference
+from ..data.recording import Recording
+from ..errors import StepError, UnknownNameError, ValueRangeError
+from ..files import write_text
+from ..installation import builder
+from ..master.master import Master, Outline
+from ..master.session import Session
+from ..ssp import read_scenario
+from ..system.provider import Provider
+from ..system.system import System
+from ..system.variants import apply
+from . import scenario as scenarios
+from .checks import CheckResult, evaluate
+from .comparison_table import Quantity, overview
+from .plots import plot_overview, plot_run
+from .scenario import Scenario
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run of a scenario.
+
+    Attributes:
+        scenario: what was run.
+        variants: instance -> variant that was used.
+        recording: what was recorded.
+        comparisons: by name.
+        checks: outcomes.
+        wall_s: time that it took, without building FMUs [s].
+        fmu_steps: steps of all FMUs together.
+        notes: what a changed variant made the run leave out.
+    """
+
+    scenario: Scenario
+    variants: Mapping[str, str]
+    recording: Recording
+    comparisons: Mapping[str, Comparison]
+    checks: tuple[CheckResult, ...]
+    wall_s: float
+    fmu_steps: int
+    notes: tuple[str, ...] = ()
+
+    def plot(self, path: Path | str | None = None) -> Any:
+        """Plot what the scenario describes or names, else what is compared, else everything."""
+        if self.scenario.plots:
+            item = self.scenario
+            return plot_run(
+                self.recording, item.plots, item.references, self.comparisons, item.name, path
+            )
+        references = {
+            name: (reference.times, values, reference.text)
+            for reference in self.scenario.references.values()
+            for name, values in zip(
+                reference.signals, convert_reference(self.recording, reference).T, strict=True
+            )
+        }
+        signals = self.scenario.plot or tuple(references) or None
+        return self.recording.plot(signals, path, references)
+
+
+@dataclass(frozen=True)
+class Result:
+    """All runs of a scenario.
+
+    Attributes:
+        name: of the scenario.
+        runs: by run name; one unnamed run ("") for most scenarios.
+        files: what was written.
+    """
+
+    name: str
+    runs: Mapping[str, RunResult]
+    files: tuple[Path, ...] = field(default=())
+
+    @property
+    def recording(self) -> Recording:
+        """The recording of a scenario with one run.
+
+        Raises:
+            ValueRangeError: there are several; take `runs[name].recording`.
+        """
+        if len(self.runs) != 1:
+            raise ValueRangeError(
+                f"{self.name} has {len(self.runs)} runs; take runs[name].recording, name one of "
+                f"{', '.join(self.runs)}"
+            )
+        return next(iter(self.runs.values())).recording
+
+    @property
+    def checks(self) -> dict[str, CheckResult]:
+        """Outcomes of all checks by name (`run: name` where there are several runs)."""
+        return {
+            _prefixed(run, check.name): check
+            for run, result in self.runs.items()
+            for check in result.checks
+        }
+
+    @property
+    def overview(self) -> list[Quantity]:
+        """What the runs say of the same quantities, side by side."""
+        return overview(
+            {
+                run: tuple(zip(result.scenario.checks, result.checks, strict=True))
+                for run, result in self.runs.items()
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `cosim run --json` prints it."""
+        first = next(iter(self.runs.values()))
+        return {
+            "scenario": self.name,
+            "variants": dict(first.variants),
+            "algorithm": first.scenario.algorithm,
+            "step": first.scenario.step,
+            "simulated_s": sum(run.scenario.duration for run in self.runs.values()),
+            "wall_s": sum(run.wall_s for run in self.runs.values()),
+            "fmu_steps": sum(run.fmu_steps for run in self.runs.values()),
+            "energy_residual_J": sum(run.recording.energy_residual for run in self.runs.values()),
+            "comparison": {
+                _prefixed(name, key): {
+                    "unit": item.unit,
+                    "rms": item.rms,
+                    "max": item.max,
+                    "reference": item.reference,
+                }
+                for name, run in self.runs.items()
+                for key, item in run.comparisons.items()
+            },
+            "checks": [{**check.to_dict(), "name": name} for name, check in self.checks.items()],
+            "files": [str(path) for path in self.files],
+        }
+
+
+def _prefixed(run: str, name: str) -> str:
+    return f"{run}: {name}" if run else name
+
+
+def _every(scenario: Scenario) -> int:
+    if scenario.period is None or not 0.0 < scenario.step < scenario.period:
+        return 1  # a step that is not positive is refused by the master
+    every = round(scenario.period / scenario.step)
+    if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
+        raise ValueRangeError(
+            f"{scenario.name}: record period {scenario.period:g} s is not a whole number of steps "
+            f"of {scenario.step:g} s"
+        )
+    return every
+
+
+def _system(
+    scenario: Scenario,
+    provider: Provider | None,
+    instances: Mapping[str, str],
+    changed: set[str],
+    parameters: Mapping[str, Any],
+) -> tuple[System, list[str]]:
+    """The system with its values, and notes on what a changed variant does not have."""
+    notes = []
+    system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
+    for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
+        instance = name.partition(".")[0]
+        try:
+            system.set(name, value)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            notes.append(f"{name} of the scenario is left out: {instances[instance]} has none")
+    for name, value in parameters.items():
+        system.set(name, value)
+    return system, notes
+
+
+def _recorded(
+    scenario: Scenario, system: System, changed: set[str]
+) -> tuple[tuple[str, ...], list[str]]:
+    """Signals to record, and notes on what a changed variant does not have."""
+    needed = [name for item in scenario.references.values() for name in item.signals]
+    needed += [name for check in scenario.checks for name in check.needs]
+    shown = [name for axes in scenario.plots for name in axes.needs]
+    if scenario.record is None:
+        return tuple(dict.fromkeys([*system.signals(), *needed])), []
+    kept, notes = [], []
+    for name in (*scenario.record, *shown):
+        instance = name.partition(".")[0]
+        try:
+            system.variables(name)
+            kept.append(name)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            reference = system.members[instance].reference
+            notes.append(f"{name} is not recorded: {reference} has none")
+    return tuple(dict.fromkeys([*kept, *needed])), notes
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scenario whose FMUs are chosen and whose values are set, ready to run.
+
+    Attributes:
+        scenario: what is run.
+        variants: instance -> variant that is used.
+        master: system, algorithm and step.
+        record: signals to record.
+        every: record every n-th communication point.
+        notes: what a changed variant made the run leave out.
+    """
+
+    scenario: Scenario
+    variants: Mapping[str, str]
+    master: Master
+    record: tuple[str, ...]
+    every: int
+    notes: tuple[str, ...]
+
+    @property
+    def _arguments(self) -> dict[str, Any]:
+        return {
+            "inputs": self.scenario.inputs,
+            "record": self.record,
+            "every": self.every,
+            "start": self.scenario.start,
+        }
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Recording:
+        """Run it once."""
+        return self.master.run(self.scenario.duration, **self._arguments, progress=progress)
+
+    def session(self) -> Session:
+        """Instances for many runs, one after the other."""
+        return Session(self.master, self.scenario.duration, **self._arguments)
+
+    def outline(self) -> Outline:
+        """Everything checked, inputs tabulated, no FMU created."""
+        return self.master.outline(self.scenario.duration, **self._arguments)
+
+    def conclude(self, recording: Recording, wall_s: float) -> RunResult:
+        """Compare and check what was recorded in `wall_s`."""
+        comparisons = {
+            name: compare(recording, reference)
+            for name, reference in self.scenario.references.items()
+        }
+        return RunResult(
+            scenario=self.scenario,
+            variants=self.variants,
+            recording=recording,
+            comparisons=comparisons,
+            checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
+            wall_s=wall_s,
+            fmu_steps=int(recording.provenance["fmu_steps"]),
+            notes=self.notes,
+        )
+
+
+def prepare(
+    scenario: Scenario,
+    provider: Provider | None,
+    *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    base: Path | None = None,
+    isolate: float | None = None,
+) -> Prepared:
+    """Choose the FMUs of a scenario and set its values; arguments as of `run_scenario`.
+
+    Raises:
+        InputError: wrong names, variants or values (see the subclasses).
+    """
+    usual = apply(scenario.system.instances, scenario.variants, provider, scenario.folder)
+    instances = apply(usual, variants or {}, provider, base)
+    changed = {name for name in instances if instances[name] != usual[name]}
+    system, notes = _system(scenario, provider, instances, changed, parameters or {})
+    record, others = _recorded(scenario, system, changed)
+    master = Master(
+        system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
+        isolate=isolate, options=scenario.options,
+    )  # fmt: skip
+    return Prepared(scenario, instances, master, record, _every(scenario), (*notes, *others))
+
+
+def run_scenario(
+    scenario: Scenario,
+    provider: Provider | None,
+    *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    progress: Callable[[float], None] | None = None,
+    base: Path | None = None,
+    isolate: float | None = None,
+) -> RunResult:
+    """Run one scenario.
+
+    Args:
+        scenario: what to run.
+        provider: where variants come from.
+        variants: changes on top of the scenario's. Parameters and recorded signals of the scenario
+            that a changed variant does not have are left out, with a note.
+        parameters: values on top of the scenario's.
+        progress: told now and then which fraction is done.
+        base: folder against which .fmu paths among the variants are taken.
+        isolate: as of `Master`.
+
+    Raises:
+        CosimError: see `errors`; a `StepError` carries the recording up to the failure.
+    """
+    prepared = prepare(
+        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate
+    )
+    started = time.perf_counter()
+    recording = prepared.run(progress)
+    return prepared.conclude(recording, time.perf_counter() - started)
+
+
+def find_runs(
+    name: str, folder: Path | None, duration: float | None, step: float | None
+) -> tuple[str, str, str, dict[str, Scenario]]:
+    """Name and description of the whole, the run that was asked for ("" for all), the runs."""
+    if name.endswith((".ssp", ".ssd")):
+        item = read_scenario(name, duration=duration, step=step)
+        return Path(name).stem, "", "", {"": item}
+    file, wanted = scenarios.find(name, folder)
+    chosen = [wanted] if wanted else list(file.runs)
+    return file.name, file.text, wanted, {run: file.scenario(run) for run in chosen}
+
+
+def run(
+    name: str,
+    *,
+    variants: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    algorithm: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+    provider: Provider | None = None,
+    out: Path | str | None = None,
+    folder: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    isolate: float | None = None,
+) -> Result:
+    """Run a scenario, all its runs or the one that the name ends with.
+
+    Args:
+        name: `motor_bench`, `crawler_paper/SET1_1`, a folder or a scenario.toml; an .ssp archive
+            or .ssd file.
+        variants: instance (or component, or slot) -> variant, fidelity, or `+effect`.
+        parameters: `instance.name` -> value.
+        options: of the algorithm; those of the scenario if that is its algorithm, too.
+        algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
+            does not reach.
+        provider: where variants come from; by default they are built from the sources, or taken
+            from the installed FMUs where those are missing.
+        out: folder for recording, plot and result; nothing is written without it.
+        folder: where scenarios are looked for; the library's by default.
+        progress: told run and fraction now and then.
+        isolate: as of `Master`.
+
+    Raises:
+        CosimError: see `errors`.
+    """
+    if provider is None:
+        provider = builder.default_provider()
+    whole, text, wanted, items = find_runs(name, folder, duration, step)
+    chosen = list(items)
+    results: dict[str, RunResult] = {}
+    files: list[Path] = []
+    for run_name, item in items.items():
+        item = adjusted(item, algorithm, options, step, duration)
+        place = None if out is None else Path(out) / run_name
+        told = None if progress is None else _told(progress, item.name)
+        try:
+            result = run_scenario(
+                item, provider, variants=variants, parameters=parameters, progress=told,
+                base=Path.cwd(), isolate=isolate,
+            )  # fmt: skip
+        except StepError as error:
+            if place is not None and error.recording is not None:
+                path = error.recording.write_parquet(place / "recording.parquet")
+                error.add_note(f"the recording up to then is in {path}")
+            raise
+        results[run_name] = result
+        if place is not None:
+            files += [
+                result.recording.write_parquet(place / "recording.parquet"),
+                result.recording.write_csv(place / "recording.csv"),
+            ]
+            result.plot(place / "plot.png")
+            files.append(place / "plot.png")
+    single = wanted or (chosen[0] if len(chosen) == 1 else "")
+    runs = {"": next(iter(results.values()))} if len(chosen) == 1 else results
+    final = Result(whole + (f"/{single}" if single else ""), runs, tuple(files))
+    if out is not None:
+        quantities = final.overview
+        if quantities and len(runs) > 1:
+            path = Path(out) / "overview.png"
+            plot_overview(quantities, text or whole, path)
+            files.append(path)
+        path = Path(out) / "result.json"
+        final = replace(final, files=(*files, path))
+        write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
+    return final
+
+
+def adjusted(
+    item: Scenario,
+    algorithm: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+) -> Scenario:
+    """A scenario with another algorithm, step or duration where these are given.
+
+    Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
+    does not reach.
+    """
+    if duration is not None and duration < item.duration:
+        item = _shortened(item, duration)
+    return replace(
+        item,
+        algorithm=algorithm or item.algorithm,
+        options={
+            **(item.options if algorithm in (None, item.algorithm) else {}),
+            **(options or {}),
+        },
+        step=step if step is not None else item.step,
+        duration=duration if duration is not None else item.duration,
+    )
+
+
+def _shortened(scenario: Scenario, duration: float) -> Scenario:
+    """A shorter run keeps the checks whose time window it reaches; others need the whole run."""
+    end = scenario.start + duration
+    kept = tuple(check for check in scenario.checks if check.before <= end)
+    return replace(scenario, duration=duration, checks=kept)
+
+
+def _told(progress: Callable[[str, float], None], name: str) -> Callable[[float], None]:
+    return lambda fraction: progress(name, fraction)

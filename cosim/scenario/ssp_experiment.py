@@ -1,0 +1,146 @@
+"""Packages as scenarios, and scenarios as packages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.signals import Signal, as_signal
+from ..errors import ScenarioError, UnknownNameError, listing
+from ..ssp.read import Experiment, Package, read_package
+from ..ssp.write import write
+from ..system.provider import Provider
+from ..system.variants import apply
+from .scenario import Scenario
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A signal on its way to a variable inside: factor * signal + offset."""
+
+    signal: Signal
+    factor: float
+    offset: float
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """Where it comes from."""
+        return self.signal.text
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times."""
+        values = np.asarray(self.signal.at(times), dtype=np.float64)
+        return self.factor * values + self.offset
+
+
+def read_scenario(
+    path: Path | str,
+    *,
+    ssd: str = "SystemStructure.ssd",
+    duration: float | None = None,
+    step: float | None = None,
+    inputs: Mapping[str, Signal | float] | None = None,
+) -> Scenario:
+    """A scenario from an SSP package, as `cosim run` takes it.
+
+    Args:
+        path: an .ssp archive, a folder with its content, or an .ssd file.
+        ssd: which structure, where a package holds several.
+        duration: replaces what the default experiment says [s].
+        step: the same; standard SSP has no step, so packages of most tools need one [s].
+        inputs: connector of the root system, or full name of an open input -> signal or number.
+
+    Raises:
+        ScenarioError: it cannot be read, or neither it nor the arguments give duration and step.
+        UnknownNameError: no such input.
+    """
+    path = Path(path)
+    package = read_package(path, ssd=ssd)
+    experiment = package.experiment
+    start = experiment.start or 0.0
+    if duration is None and experiment.stop is not None:
+        duration = experiment.stop - start
+    step = step if step is not None else experiment.step
+    for name, value in (("duration", duration), ("step", step)):
+        if value is None:
+            raise ScenarioError(f"{path}: says nothing about the {name}; give one (--{name})")
+    assert duration is not None and step is not None
+    return Scenario(
+        name=package.system.name,
+        folder=package.system.path.parent,
+        text=package.system.text,
+        question="",
+        expected="",
+        source=path.name,
+        system=package.system,
+        duration=duration,
+        start=start,
+        step=step,
+        algorithm=experiment.algorithm or "jacobi",
+        tolerance=None,
+        variants={},
+        parameters={},
+        inputs={**package.signals, **drive(package, inputs or {})},
+        record=None,
+        period=None,
+        references={},
+        checks=(),
+        plot=None,
+    )
+
+
+def drive(package: Package, inputs: Mapping[str, Signal | float]) -> dict[str, Signal]:
+    """Signals of open inputs, from signals of connectors of the root system (or of inputs)."""
+    found: dict[str, Signal] = {}
+    for name, driver in inputs.items():
+        signal = as_signal(driver)
+        if name in package.inputs:
+            for terminal in package.inputs[name]:
+                plain = (terminal.factor, terminal.offset) == (1.0, 0.0)
+                found[terminal.name] = (
+                    signal if plain else _Scaled(signal, terminal.factor, terminal.offset)
+                )
+        elif "." in name:
+            found[name] = signal
+        else:
+            raise UnknownNameError(
+                f"{package.system.name}: the root system has no input {name!r}; "
+                f"{listing(package.inputs, name)}"
+            )
+    return found
+
+
+def export(
+    scenario: Scenario,
+    path: Path | str,
+    provider: Provider | None,
+    *,
+    version: str = "1.0",
+    base: Path | None = None,
+) -> Path:
+    """Write the system of a scenario as an SSP archive, with its inputs, duration and step.
+
+    Args:
+        scenario: what to write.
+        path: the .ssp file.
+        provider: where variants come from.
+        version: of SSP.
+        base: folder against which .fmu paths among the variants are taken.
+
+    Raises:
+        GraphError: something that this version of SSP cannot express.
+    """
+    instances = apply(scenario.system.instances, scenario.variants, provider, base)
+    file = replace(scenario.system, instances=instances)
+    system = file.build(provider, scenario.parameters)
+    experiment = Experiment(
+        scenario.start, scenario.start + scenario.duration, scenario.step, scenario.algorithm
+    )
+    return write(system, path, version=version, experiment=experiment, inputs=scenario.inputs)

@@ -1,0 +1,1 @@
+"""Instances and connections: the graph that a master runs, from Python or TOML."""

@@ -1,0 +1,109 @@
+"""Systems as TOML files, before their FMUs are opened."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..errors import ScenarioError
+from ..files import flatten, read_toml
+from .provider import Provider
+from .system import System
+
+
+class Wire(NamedTuple):
+    """A connection as `System.connect` takes it."""
+
+    source: str
+    target: str
+    factor: float = 1.0
+    offset: float = 0.0
+    convert: bool = True
+
+
+@dataclass(frozen=True)
+class SystemFile:
+    """A system as written in TOML or SSP, before its FMUs are opened.
+
+    Attributes:
+        path: the file, for error texts and relative .fmu paths.
+        name, text: of the system.
+        instances: name -> variant or path of an .fmu.
+        parameters: full name -> value.
+        connections: between instances.
+    """
+
+    path: Path
+    name: str
+    text: str
+    instances: dict[str, str]
+    parameters: dict[str, Any]
+    connections: tuple[Wire, ...]
+
+    def build(
+        self, provider: Provider | None, parameters: Mapping[str, Any] | None = None
+    ) -> System:
+        """Open the FMUs and connect them.
+
+        Args:
+            provider: where variants come from.
+            parameters: full name -> value; replace those of the file.
+        """
+        system = System(self.name, provider, self.text)
+        for name, reference in self.instances.items():
+            system.add(name, reference, base=self.path.parent)
+        for wire in self.connections:
+            system.connect(
+                wire.source,
+                wire.target,
+                factor=wire.factor,
+                offset=wire.offset,
+                convert=wire.convert,
+            )
+        for name, value in {**self.parameters, **(parameters or {})}.items():
+            system.set(name, value)
+        return system
+
+
+def read_system(path: Path | str) -> SystemFile:
+    """Read a system from TOML (docs/scenarios.md has the schema).
+
+    Raises:
+        ScenarioError: not TOML, or a wrong key or value.
+    """
+    path = Path(path)
+    table = read_toml(path)
+    unknown = set(table) - {"name", "description", "instances", "connections", "parameters"}
+    if unknown:
+        raise ScenarioError(
+            f"{path}: unknown key {', '.join(sorted(unknown))}; a system has name, description, "
+            "instances, connections and parameters"
+        )
+    instances = table.get("instances", {})
+    if not isinstance(instances, dict) or not instances:
+        raise ScenarioError(f'{path}: [instances] with name = "variant" is missing')
+    for name, reference in instances.items():
+        if not isinstance(reference, str):
+            raise ScenarioError(
+                f"{path}: instance {name!r} must be a variant or the path of an .fmu, "
+                f"not {reference!r}"
+            )
+    return SystemFile(
+        path,
+        table.get("name", path.stem),
+        table.get("description", ""),
+        dict(instances),
+        flatten(table.get("parameters", {})),
+        tuple(_arrow(path, line) for line in table.get("connections", [])),
+    )
+
+
+def _arrow(path: Path, line: Any) -> Wire:
+    parts = [part.strip() for part in line.split("->")] if isinstance(line, str) else []
+    if len(parts) != 2 or not all(parts):
+        raise ScenarioError(
+            f'{path}: {line!r} is not a connection; write "instance.output -> instance.input"'
+        )
+    return Wire(parts[0], parts[1])
