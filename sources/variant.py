@@ -1,15 +1,9 @@
-"""Names of variants: `component[.device]/fidelity[slot=fidelity,…][+effect[@balance]…]`.
-
-Examples: `gearbox/elastic+backlash`, `ur5_arm.ur5e/rigid`, `dc_motor/sampled+coulomb@shaft`,
-`mobile_base/six_dof[wheel_contact=brush]`.
-"""
+"""From the name of a variant to its model: components, fidelities, effects and devices by name."""
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import pkgutil
-import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,58 +12,20 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from cosim.errors import VariantError
+from cosim.spec import variant as spec
+from cosim.spec.variant import Name
+
 from .component import Component, Solver
 from .effect import Effect, Law
 from .model import Attachment, Model
 from .units import parse
 
 _ROOT = Path(__file__).parent
-LONGEST = 160
-"""Characters of a file name: file systems take 255, Windows that many for the whole path."""
-_GRAMMAR = re.compile(
-    r"(?P<component>\w+)(?:\.(?P<device>\w+))?/(?P<fidelity>\w+)"
-    r"(?:\[(?P<slots>[\w=,]+)\])?(?P<effects>(?:\+\w+(?:@[\w.]+)?)*)"
-)
 
 
 class UnknownVariantError(ValueError):
     """The name of a variant that does not exist; the text lists what does."""
-
-
-@dataclass(frozen=True)
-class Name:
-    """A parsed variant name; `str()` gives its canonical spelling."""
-
-    component: str
-    fidelity: str
-    device: str = ""
-    slots: tuple[tuple[str, str], ...] = ()
-    effects: tuple[tuple[str, str], ...] = ()
-
-    def __str__(self) -> str:
-        device = f".{self.device}" if self.device else ""
-        slots = ",".join(f"{slot}={fidelity}" for slot, fidelity in self.slots)
-        effects = "".join(f"+{name}" + (f"@{at}" if at else "") for name, at in self.effects)
-        return (
-            f"{self.component}{device}/{self.fidelity}" + (f"[{slots}]" if slots else "") + effects
-        )
-
-    @property
-    def identifier(self) -> str:
-        """The name as a C identifier, FMI's `modelIdentifier`."""
-        return _short(re.sub(r"\W+", "_", str(self)).strip("_"))
-
-    @property
-    def filename(self) -> str:
-        """The name as a file name without suffix."""
-        return _short(str(self).replace("/", "-"))
-
-
-def _short(name: str) -> str:
-    """A name that file systems take: the end of a long one is replaced by its hash."""
-    if len(name) <= LONGEST:
-        return name
-    return f"{name[: LONGEST - 13]}_{hashlib.sha256(name.encode()).hexdigest()[:12]}"
 
 
 def parse_name(text: str) -> Name:
@@ -78,27 +34,10 @@ def parse_name(text: str) -> Name:
     Raises:
         UnknownVariantError: when the text does not follow the grammar.
     """
-    match = _GRAMMAR.fullmatch(text)
-    if match is None:
-        raise UnknownVariantError(
-            f"{text!r} is not a variant name; write component/fidelity, then +effect or "
-            f"+effect@balance as often as wanted, e.g. gearbox/elastic+backlash"
-        )
-    slots = tuple(
-        tuple(item.split("=", 1)) for item in (match["slots"] or "").split(",") if "=" in item
-    )
-    effects = tuple(
-        (item.partition("@")[0], item.partition("@")[2])
-        for item in match["effects"].split("+")
-        if item
-    )
-    return Name(
-        match["component"],
-        match["fidelity"],
-        match["device"] or "",
-        slots,
-        effects,
-    )
+    try:
+        return spec.parse_name(text)
+    except VariantError as error:
+        raise UnknownVariantError(str(error)) from error
 
 
 @lru_cache(maxsize=None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import shutil
 import struct
@@ -17,23 +16,8 @@ from pathlib import Path
 from typing import Literal
 
 from ..errors import FmuFileError, PlatformError
+from ..spec.cache import cache_folder
 from .description import Description, read_description
-
-
-def cache_folder() -> Path:
-    """Where FMUs are unpacked: `COSIM_CACHE`, else the platform's cache folder."""
-    wanted = os.environ.get("COSIM_CACHE")
-    if wanted:
-        return Path(wanted)
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return Path(tempfile.gettempdir()) / "cosim"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "cosim" / "Cache"
-    if sys.platform == "darwin":
-        return home / "Library" / "Caches" / "cosim"
-    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "cosim"
 
 
 def platform_folders(fmi: Literal[2, 3]) -> tuple[str, ...]:
@@ -130,6 +114,11 @@ def _elf_size(path: Path) -> int:
     return needed
 
 
+def unpacked_folder(kind: str, content: bytes) -> Path:
+    """Where an archive of this content is unpacked; `kind` is a folder of the cache."""
+    return cache_folder() / kind / hashlib.sha256(content).hexdigest()[:32]
+
+
 def unpack(path: Path, folder: Path) -> None:
     """Unpack an archive into a new folder, whole or not at all."""
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -159,8 +148,7 @@ def open_fmu(path: Path | str) -> Fmu:
         raise FmuFileError(f"{path}: there is no such file") from None
     except OSError as error:
         raise FmuFileError(f"{path}: cannot be read ({error.strerror})") from error
-    digest = hashlib.sha256(content).hexdigest()
-    folder = cache_folder() / "unpacked" / digest[:32]
+    folder = unpacked_folder("unpacked", content)
     if not folder.is_dir():
         try:
             unpack(path, folder)
@@ -174,7 +162,7 @@ def open_fmu(path: Path | str) -> Fmu:
                 f"{path}: cannot be unpacked into {folder.parent} ({error}); "
                 "set COSIM_CACHE to a folder that can be written"
             ) from error
-    return Fmu(path, digest, folder, _described(folder, str(path)))
+    return Fmu(path, hashlib.sha256(content).hexdigest(), folder, _described(folder, str(path)))
 
 
 @lru_cache(maxsize=256)

@@ -14,8 +14,8 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, VariantError
-from ..fmu.archive import cache_folder
 from ..master import kernel
+from ..spec.cache import cache_folder
 from ..system.provider import FolderProvider, Provider
 from . import places
 

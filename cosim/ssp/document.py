@@ -6,7 +6,6 @@ their namespaces. Geometry and annotations of other tools are not read.
 
 from __future__ import annotations
 
-import hashlib
 import urllib.parse
 import xml.etree.ElementTree as ET
 import zipfile
@@ -143,7 +142,7 @@ def _unpacked(path: Path) -> Path:
         raise ScenarioError(f"{path}: there is no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    folder = archive.cache_folder() / "ssp" / hashlib.sha256(content).hexdigest()[:32]
+    folder = archive.unpacked_folder("ssp", content)
     if not folder.is_dir():
         try:
             archive.unpack(path, folder)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ..errors import FmuFileError, VariantError, listing
+from ..spec.variant import file_stem
 
 
 class Provider(Protocol):
@@ -31,7 +32,7 @@ class FolderProvider:
 
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU."""
-        name = variant.replace("/", "-") + ".fmu"
+        name = file_stem(variant) + ".fmu"
         for place in ("", "fmi2", "fmi3", "python"):
             path = self.folder / place / name
             if path.is_file():

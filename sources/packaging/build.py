@@ -18,9 +18,11 @@ from typing import Literal
 
 import casadi as ca
 
+from cosim.spec.variant import Name
+
 from ..function import Functions, build_functions
 from ..model import Model, ModelError
-from ..variant import Name, build_model, fidelities, parse_name
+from ..variant import build_model, fidelities, parse_name
 from . import description, native, python
 from .archive import pack
 from .cache import cache_folder, write_atomically

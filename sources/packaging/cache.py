@@ -6,18 +6,12 @@ import os
 import tempfile
 from pathlib import Path
 
+from cosim.spec import cache
+
 
 def cache_folder(name: str) -> Path:
-    """A folder of the cache: `$COSIM_CACHE`, else the user's cache, else a temporary one."""
-    root = os.environ.get("COSIM_CACHE")
-    if root:
-        base = Path(root)
-    else:
-        try:
-            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cosim"
-        except RuntimeError:  # no home directory
-            base = Path(tempfile.gettempdir()) / "cosim-cache"
-    folder = base / name
+    """A folder of the cache, made if it is not there."""
+    folder = cache.cache_folder() / name
     folder.mkdir(parents=True, exist_ok=True)
     return folder.resolve()
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from cosim.spec.variant import Name
+
 from ..function import Functions
 from ..model import Model
-from ..variant import Name
 from . import runtime
 from .elimination import eliminate
 from .layout import Entry, owners

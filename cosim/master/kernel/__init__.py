@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import ctypes as ct
 import hashlib
-import os
 import platform
 import sys
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from functools import lru_cache
@@ -23,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...spec import cache
 from ..algebraic_loops import Newton
 from ..input_derivatives import Ramps
 from ..plan import Op, Plan
@@ -141,14 +140,7 @@ def library_name() -> str:
 
 def cache_folder() -> Path:
     """Where a checkout keeps the library that it compiled."""
-    root = os.environ.get("COSIM_CACHE")
-    if root:
-        return Path(root) / "kernel"
-    try:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cosim"
-    except RuntimeError:  # no home directory
-        base = Path(tempfile.gettempdir()) / "cosim-cache"
-    return base / "kernel"
+    return cache.cache_folder() / "kernel"
 
 
 @lru_cache(maxsize=1)
