@@ -24,6 +24,7 @@ fmus: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m sources.tables
+	$(BIN)/python -m benchmarks.tables
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.fmu_step
