@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test check fmus docs bench wheel clean
+.PHONY: demo test quick check fmus docs bench wheel clean
 
 demo: $(STAMP)
 	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
@@ -13,6 +13,9 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+
+quick: $(STAMP)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not slow"
 
 check: $(STAMP)
 	$(BIN)/ruff check .

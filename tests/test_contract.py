@@ -14,6 +14,8 @@ from sources.packaging.check import check
 from sources.variant import build_model
 from tests.fmus import Slave, catalogue, fmu
 
+pytestmark = pytest.mark.slow
+
 NAMES = catalogue()
 PLAIN = [name for name in NAMES if "+" not in name]
 WITH_EFFECT = [name for name in NAMES if "+" in name]

@@ -45,6 +45,7 @@ def test_only_the_builder_and_the_algorithms_import_by_name() -> None:
     assert users == {"cosim/master/algorithms/__init__.py", "cosim/installation/builder.py"}
 
 
+@pytest.mark.slow
 def test_a_run_from_a_folder_of_fmus_needs_no_sources(tmp_path: Path) -> None:
     from tests.fmus import fmu
 

@@ -12,6 +12,8 @@ from sources.function import Oracle
 from sources.variant import build_model
 from tests.arm.chains import DEVICES, Reference, laws, named, symmetric, vector
 
+pytestmark = pytest.mark.slow
+
 COUNT = 1000 // len(DEVICES) + 1
 RELATIVE = 1e-9  # two codes in double precision; 1e-12 is what they reach
 

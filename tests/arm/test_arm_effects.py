@@ -18,6 +18,8 @@ from sources.quantity import Quantity
 from sources.variant import build_model, device_values, fidelity
 from tests.arm.chains import Reference, named, vector
 
+pytestmark = pytest.mark.slow
+
 Q = np.array([0.3, -1.1, 1.4, -0.8, 0.6, -0.4])
 QD = np.array([0.5, -0.4, 0.3, 0.2, -0.6, 0.7])
 ROTOR = np.array([1.02, 1.02, 1.02, 0.2, 0.2, 0.2])

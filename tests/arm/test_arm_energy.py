@@ -13,6 +13,8 @@ from sources.model import ModelError
 from sources.variant import build_model, effects
 from tests.arm.chains import vector
 
+pytestmark = pytest.mark.slow
+
 # Ways into the arm and the drive for the kinds of effects; the contract tests of the FMUs cover the
 # highest fidelities.
 PLAIN = [

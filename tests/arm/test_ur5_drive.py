@@ -16,6 +16,8 @@ from sources.variant import build_model, device_values
 from tests.arm.chains import Reference, laws, named, vector
 from tests.support import Stepper
 
+pytestmark = pytest.mark.slow
+
 STRETCHED = np.array([pi / 2, -0.1, 0.2, -0.1 - pi / 2, -pi / 2, 0])
 SIZES = {"size 3": 0, "size 1": 3}  # first joint of each
 

@@ -9,6 +9,8 @@ from sources.function import Oracle
 from sources.variant import build_model
 from tests.base.stiff import Stiff
 
+pytestmark = pytest.mark.slow
+
 PLANAR, SIX_DOF, SPRUNG = "mobile_base/planar", "mobile_base/six_dof", "mobile_base/sprung"
 DYNAMIC = (PLANAR, SIX_DOF, SPRUNG)
 G = 9.81

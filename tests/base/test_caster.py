@@ -9,6 +9,8 @@ from sources.function import Oracle
 from sources.variant import build_model
 from tests.base.stiff import Stiff
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("fidelity", ["swivel", "creep"])
 @pytest.mark.parametrize("start", [2.9, -1.5, 0.4])

@@ -82,6 +82,7 @@ def test_creep_may_fall_at_standstill() -> None:
     assert still / fast == pytest.approx(10.0, rel=1e-5)  # (0.02/10)^2 is left
 
 
+@pytest.mark.slow
 def test_brush_sticks_at_rest_and_slips_sideways_when_it_rolls() -> None:
     """Held below its limit it only deflects; rolling, the slip is about kappa v F/k_t."""
     force, mass = 50.0, 20.0

@@ -9,6 +9,8 @@ from sources.function import Oracle
 from sources.model import Variable
 from sources.variant import build_model
 
+pytestmark = pytest.mark.slow
+
 FIDELITIES = [
     *(f"wheel_contact/{name}" for name in ("rolling", "creep", "stick_slip", "spatial", "brush")),
     *(f"caster/{name}" for name in ("point", "swivel", "creep")),

@@ -13,6 +13,7 @@ from cosim.calibrate.validate import check_machines
 from cosim.errors import FmuCallError
 
 
+@pytest.mark.slow
 def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
     covered, errors = [], []
     for seed in range(6):
@@ -32,6 +33,7 @@ def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.5
 
 
+@pytest.mark.slow
 def test_inseparable_parameters_are_named(noisy) -> None:
     problem = noisy(10)
     estimate = fit(problem, polish=False)
@@ -58,6 +60,7 @@ def test_residuals_of_the_truth_are_noise(noisy, truth) -> None:
     assert all(abs(value - 1.0) < 0.06 for value in rms.values())
 
 
+@pytest.mark.slow
 def test_gaps_are_left_out(noisy, truth) -> None:
     problem = noisy(2)
     data = {run.name: run.data.copy() for run in problem.runs}
@@ -132,6 +135,7 @@ def test_held_parameters_leave(short, truth) -> None:
     assert np.array_equal(held.simulate(rest, "sines"), short.simulate(truth, "sines"))
 
 
+@pytest.mark.slow
 def test_sensitivity(noisy, truth) -> None:
     problem = noisy(3).only(["sines"])
     correlation = correlation_index(problem, truth, 60, width=0.3)
@@ -144,6 +148,7 @@ def test_sensitivity(noisy, truth) -> None:
     assert values["Kp_v"] > values["b"] > 0.0
 
 
+@pytest.mark.slow
 def test_two_machines_in_one_set(noisy, truth, short) -> None:
     problem = noisy(4)
     other = truth.copy()

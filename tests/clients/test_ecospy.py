@@ -11,6 +11,8 @@ import pytest
 from tests.clients.chains import CHAINS, assert_agree, jacobi, run_foreign
 from tests.outside import require
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", CHAINS)

@@ -17,6 +17,8 @@ from fmu_manipulation_toolbox.operations import FMU
 
 from tests.fmus import catalogue, fmu
 
+pytestmark = pytest.mark.slow
+
 SCHEMAS = Path(checker.__file__).parent / "resources" / "fmi-3.0"
 
 

@@ -9,6 +9,8 @@ import pytest
 from tests.clients.chains import CHAINS, assert_agree, jacobi, run_foreign
 from tests.outside import require
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_chain_agrees_with_our_loop(name: str) -> None:

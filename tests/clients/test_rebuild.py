@@ -13,6 +13,8 @@ from fmpy.build import build_platform_binary
 
 from tests.fmus import fmu
 
+pytestmark = pytest.mark.slow
+
 COMPILERS = ("cc", "gcc", "clang", "cl")
 
 

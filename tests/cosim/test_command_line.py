@@ -51,6 +51,7 @@ def test_help_of_every_command_has_an_example(command: Command) -> None:
         assert "Example" in done.out
 
 
+@pytest.mark.slow
 def test_fmus_list_json(command: Command) -> None:
     done = command("fmus", "list", "gearbox", "--json")
     entries = json.loads(done.out)
@@ -246,6 +247,7 @@ def test_messages_of_the_progress_bar_stay_off_stdout(command: Command) -> None:
     json.loads(done.out)  # one JSON value and nothing else
 
 
+@pytest.mark.slow
 def test_an_exported_scenario_runs_from_its_archive(command: Command, tmp_path: Path) -> None:
     archive, drawing = tmp_path / "bench.ssp", tmp_path / "bench.svg"
     assert command("export", "motor_bench/ST1", "--ssp", archive).code == 0

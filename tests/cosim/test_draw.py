@@ -144,6 +144,7 @@ def test_lines_of_different_nets_are_apart(system: System) -> None:
                 assert way == other or abs(y - y1) >= 4.0 or beside < 12.0
 
 
+@pytest.mark.slow
 def test_texts_fit_their_boxes(system: System) -> None:
     """Measured in DejaVu Sans, which is wider than what the style asks for first."""
     drawing = _Drawing(system)

@@ -13,6 +13,8 @@ import pytest
 
 from tests.fmus import fmu
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 RUN = ["run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.05", "--json"]
 

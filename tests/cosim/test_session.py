@@ -24,6 +24,7 @@ def parts():
     return Master(system, "gauss_seidel", 1e-4), {"motor.w_ref": 20.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", ["c", "python"])
 def test_repetition_is_a_new_run(parts, executor) -> None:
     master, inputs = parts

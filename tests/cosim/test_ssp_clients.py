@@ -42,6 +42,7 @@ def test_motor_bench(tmp_path: Path, client: str, fmi: int, names: list[str]) ->
     assert difference(path, client, names) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("client", "fmi"), [("libcosim", 2), ("ecos", 2), ("ecos", 3)])
 def test_mobile_manipulator(tmp_path: Path, client: str, fmi: int) -> None:
     """Sixteen FMUs: base and arm that feel each other, drives, sensors."""

@@ -49,6 +49,7 @@ def reference() -> np.ndarray:
     return Monolith(drive(Built()), INPUTS).solve(times, SIGNALS, rtol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("algorithm", "options", "order"),
     [
@@ -80,6 +81,7 @@ def test_extrapolation_is_the_same_bits_in_both_executors(provider, algorithm, o
     assert runs[0].bond_energy == runs[1].bond_energy
 
 
+@pytest.mark.slow
 def test_substeps_are_the_same_bits_in_both_executors_and_help(provider, reference) -> None:
     options = {"substeps": {"motor": 4, "gearbox": 4, "load": 4}}
     runs = [run(provider, "jacobi", 1e-3, executor, **options) for executor in ("python", "c")]
@@ -151,6 +153,7 @@ def test_wrong_options_are_refused(provider) -> None:
         run(provider, "iterated", 1e-3, "c")
 
 
+@pytest.mark.slow
 def test_step_control_follows_the_tolerance(provider) -> None:
     exact = Master(drive(provider), "iterated", 2.5e-4).run(0.2, inputs=INPUTS, record=SIGNALS)
     errors, taken = [], []

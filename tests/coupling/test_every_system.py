@@ -16,6 +16,7 @@ STEP, COUNT = 5e-4, 100
 ALGORITHMS = [("jacobi", {}), ("gauss_seidel", {}), ("gauss_seidel", {"extrapolation": 2})]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", SYSTEMS, ids=lambda path: path.stem)
 def test_bit_for_bit(path: Path, provider: Provider) -> None:
     system = read_system(path).build(provider)

@@ -90,6 +90,7 @@ def children() -> set[str]:
     return {line for line in listed.splitlines() if "cosim.master.isolation_worker" in line}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "text"),
     [

@@ -136,6 +136,7 @@ def test_without_python_control_the_extra_is_named(monkeypatch) -> None:
         require_control()
 
 
+@pytest.mark.slow
 def test_the_command_prints_poles_and_loops(provider, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("cosim.installation.builder.default_provider", lambda: provider)
     arguments = ["linearize", "mir250", "--at", "0.1", "--cut", "motor_left.w", "--json",

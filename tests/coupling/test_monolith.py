@@ -18,6 +18,7 @@ def exact() -> np.ndarray:
     return Monolith(drive(Built()), INPUTS).solve(times, SIGNALS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("algorithm", "options", "limit"),
     [

@@ -135,6 +135,7 @@ def test_parabolas_give_way_to_lines_where_values_ring() -> None:
     assert bend(7.0, 3.0, 1.0, 0.5) == pytest.approx(1.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "duration"), [("mir250/CN1", 3.0), ("mobile_manipulator/IY", 2.5)]
 )

@@ -6,6 +6,8 @@ import pytest
 
 from tests.attachments import attachable, check_absence, check_energy, check_presence, check_rest
 
+pytestmark = pytest.mark.slow
+
 PLAIN = [
     "crawler/two_wheeled",
     "crawler/slip_law",

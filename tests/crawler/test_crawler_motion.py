@@ -14,6 +14,8 @@ from sources.model import Model
 from sources.tools.crawler_identification import quasi_static_shift
 from sources.variant import build_model, device_values
 
+pytestmark = pytest.mark.slow
+
 FIDELITIES = ("two_wheeled", "slip_law", "skid", "track_contact")
 RPM = np.pi / 30
 # V, w_z, R, R_S, then after 5 s: beta, O1, S; inputs from Table 2

@@ -48,6 +48,7 @@ def test_figures_of_the_page() -> None:
     assert len(CANDIDATES) == 196
 
 
+@pytest.mark.slow
 def test_choosing_a_law_is_worth_no_more_than_a_constant() -> None:
     score, chosen = nested(PART, E2[MOVING], E3[MOVING], PAPER)
     constant = left_out(Candidate(("1",)), PART, E2[MOVING], E3[MOVING], PAPER)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.bursts import bursts, times
@@ -26,6 +27,7 @@ def test_windows_with_a_burst_and_their_neighbours_are_found() -> None:
     assert (where[0], where[-1], where.size) == (80, 139, 60)
 
 
+@pytest.mark.slow
 def test_a_burst_pulls_no_parameter(clean_bench: Problem) -> None:
     run = clean_bench.chosen("identification")[0]
     data = run.data.copy()

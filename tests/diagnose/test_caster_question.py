@@ -14,6 +14,8 @@ from cosim.calibrate.nuisance import settled
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 
+pytestmark = pytest.mark.slow
+
 
 def left(problem: Problem, truth: dict[str, float]) -> dict[str, float]:
     """Residual RMS over the noise by channel, at the true parameters and fitted start poses."""

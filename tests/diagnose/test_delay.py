@@ -13,6 +13,8 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.search import Search
 
+pytestmark = pytest.mark.slow
+
 LABELS = ("delay at motor.command", "gain at motor.command", "asymmetric_viscous at load.flange")
 
 

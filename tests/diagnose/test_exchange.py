@@ -17,6 +17,8 @@ from cosim.diagnose.exchange import challenged, reconsidered
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Round, Search
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 RIGHT, WRONG = "coulomb at load.flange", "bearing_drag at load.flange"

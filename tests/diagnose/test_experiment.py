@@ -14,6 +14,8 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.experiment import propose, scaled
 from cosim.diagnose.search import Round, Search
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 
 

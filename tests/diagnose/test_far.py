@@ -11,6 +11,8 @@ from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.search import OFF, Round, Search
 
+pytestmark = pytest.mark.slow
+
 
 def test_typical_windows_are_those_in_the_middle() -> None:
     rows = np.ones((100, 2))

@@ -15,6 +15,8 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.search import Search
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 LABEL = "coulomb at load.flange"
 STRENGTH = "load.flange.coulomb.tau_c"

@@ -13,6 +13,8 @@ from cosim.diagnose.candidates import candidates
 from cosim.diagnose.localise import localise, regressed
 from cosim.diagnose.search import Search
 
+pytestmark = pytest.mark.slow
+
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 SIZE = 0.15
 KNOTS = np.linspace(-1.0, 1.0, 9)

@@ -21,6 +21,8 @@ from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.search import Round, Search
 from cosim.report.page import _interval, _starts, page
 
+pytestmark = pytest.mark.slow
+
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 SIZE = 0.15
 CHOICE = {"battery_sag", "brush_drop", "winding_heating", "current_gain", "viscous", "unbalance"}

@@ -13,6 +13,8 @@ from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.search import Round, Search
 
+pytestmark = pytest.mark.slow
+
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 CHOICE = {"backlash at gearbox", "elastic at gearbox", "coulomb at gearbox.flange_b"}
 GAP, COMPLIANCE = 3e-3, 1e-3

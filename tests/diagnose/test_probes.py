@@ -15,6 +15,8 @@ from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches
 from cosim.diagnose.secant import Bench, _shared, model_values
 from cosim.errors import CosimError
 
+pytestmark = pytest.mark.slow
+
 
 def places(*ports: str) -> list[Candidate]:
     """One effect at several places of an arm."""

@@ -70,6 +70,7 @@ def test_another_law_at_the_same_place_is_not() -> None:
     assert _alike(SEARCH, None, stage([winner, other]), set()) == []  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("uncorrected", [True, False])
 def test_a_fit_without_corrections_gets_them_before_its_other_parameters_are_tried(
     clean_bench: Problem, monkeypatch: pytest.MonkeyPatch, uncorrected: bool

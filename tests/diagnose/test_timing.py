@@ -11,6 +11,8 @@ from benchmarks.own_plant import catalogue, example, made
 from cosim.diagnose.search import Search
 from cosim.diagnose.secant import Trials
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 LABELS = tuple(f"{law} at encoder.speed" for law in ("sample_hold", "delay", "rate_limit"))
 

@@ -20,6 +20,8 @@ from cosim.diagnose.unstable import ended, ends
 from cosim.errors import FmuCallError
 from cosim.report.page import _ended
 
+pytestmark = pytest.mark.slow
+
 SIGMA, SIZE, ANGLE = 1e-3, 2.0, 0.01
 STEEP = 300.0
 

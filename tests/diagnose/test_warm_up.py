@@ -16,6 +16,8 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.search import Search
 from cosim.diagnose.signature import worthy
 
+pytestmark = pytest.mark.slow
+
 SHEET = Path(__file__).parents[2] / "scenarios/ur5_bench/data/ur5_bench.toml"
 RIGHT = "warm_up at drive.friction_2"
 LABELS = (

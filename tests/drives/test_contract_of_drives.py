@@ -13,6 +13,8 @@ from sources.function import Oracle
 from sources.model import Model, ModelError
 from sources.variant import build_model, components, device_values, devices, effects, fidelities
 
+pytestmark = pytest.mark.slow
+
 COMPONENTS = ("dc_motor", "gearbox", "inertia")
 PLAIN = [f"{c}/{f}" for c in COMPONENTS for f in fidelities(c)]
 

@@ -14,6 +14,8 @@ from sources.model import ModelError, Role
 from sources.variant import build_model
 from tests.drives.closed_drive import ClosedDrive
 
+pytestmark = pytest.mark.slow
+
 Point = Mapping[str, float]
 
 

@@ -50,6 +50,7 @@ def test_poles_and_gain_of_motor_and_vehicle() -> None:
     assert abs(gain - 7.67) < 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("derivative", [(0.0, 0.0), (0.02, 2e-5)], ids=["PI", "PID"])
 def test_step_is_that_of_the_linear_loop(derivative: tuple[float, float]) -> None:
     kd_v, kd_i = derivative
@@ -100,6 +101,7 @@ def wheel_drive(**values: float) -> ClosedDrive:
     return ClosedDrive("dc_motor/electrical", "inertia.mir250/disc", "gearbox/ratio", named)
 
 
+@pytest.mark.slow
 def test_margins_with_the_delay_of_the_amplifier() -> None:
     omega = np.logspace(-1, 5, 6001)
     current_loop, speed_loop, closed = loops(wheel_drive(), omega)
@@ -229,6 +231,7 @@ def test_sampled_derivative_is_that_of_the_filtered_error() -> None:
     assert values["set_current"] == pytest.approx(kd * slope, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fidelity", ["ideal", "electrical", "sampled"])
 def test_every_fidelity_reaches_the_set_speed(fidelity: str) -> None:
     drive = ClosedDrive(

@@ -64,6 +64,7 @@ def test_open_bridge_gives_no_torque() -> None:
 AXIS = {"lead": 0.005, "M": 40.0, "F_v": 150.0, "F_c": 12.0, "F_0": -3.0, "v_0": 1e-3}
 
 
+@pytest.mark.slow
 def test_rigid_axis_moves_as_a_mass_with_friction() -> None:
     """In metres, by another solver, where the component counts in radians of the screw."""
     times = np.linspace(0.0, 0.4, 9)
@@ -83,6 +84,7 @@ def test_rigid_axis_moves_as_a_mass_with_friction() -> None:
     np.testing.assert_allclose(found["x"], expected.y[0], rtol=0, atol=1e-7 * size)
 
 
+@pytest.mark.slow
 def test_a_stiff_screw_is_a_rigid_one() -> None:
     times = np.linspace(0.0, 0.2, 5)
     stiff = {"k": 1e4, "d": 1.0, "share": 0.4}

@@ -124,6 +124,7 @@ def test_inertia_and_velocity_forces_are_those_of_lagrange() -> None:
         np.testing.assert_array_equal(h[6:], 0.0)
 
 
+@pytest.mark.slow
 def test_mass_matrix_is_positive_definite_and_well_conditioned() -> None:
     eigenvalues = np.array([np.linalg.eigvalsh(reduced_at(*s)[0]) for s in random_states(1500, 2)])
     assert eigenvalues.min() > 20.0
@@ -222,6 +223,7 @@ def test_axle_friction_at_the_test_point() -> None:
     np.testing.assert_allclose(mass @ change, [523.57426914, -284.19863059, 40.8392651], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_free_run_keeps_its_energy_and_ends_where_it_should() -> None:
     run = oracle("dynamic").simulate([0.0, 5.0, 10.0], {**point(THETA, BETA, RATES), **FREE})
     energy = run["E_stored"]
@@ -238,6 +240,7 @@ def test_free_run_keeps_its_energy_and_ends_where_it_should() -> None:
     np.testing.assert_allclose(got, [0.47437219, -0.17743936, 0.6348308], atol=2e-8)
 
 
+@pytest.mark.slow
 def test_work_of_the_motors_is_the_gain_of_energy() -> None:
     motor = {**vector("tau_beta", np.array([0.5, -0.3, 0.2]))}
     motor |= vector("tau_phi", np.array([-2.0, -1.5, -1.0]))
@@ -279,6 +282,7 @@ def test_kinematic_inertia_is_the_mean_over_the_steering_angles() -> None:
     np.testing.assert_allclose(np.mean(diagonals, axis=0), [mass, mass, yaw], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_slipping_wheels_approach_rolling_ones() -> None:
     motor = {**vector("tau_beta", np.array([0.5, -0.3, 0.2]))}
     motor |= vector("tau_phi", np.array([-2.0, -1.5, -1.0]))

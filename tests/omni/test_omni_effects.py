@@ -15,6 +15,8 @@ from tests.attachments import (
     oracle,
 )
 
+pytestmark = pytest.mark.slow
+
 PLAIN = ["omni_base/kinematic", "omni_base/dynamic", "omni_base/slip"]
 CASES = [name for plain in PLAIN for name in attachable(plain)]
 

@@ -14,6 +14,8 @@ from sources.packaging.build import Variant, collect
 from sources.packaging.description import describe_fmi2, describe_fmi3, terminals
 from tests.fmus import catalogue, fmu
 
+pytestmark = pytest.mark.slow
+
 NAMES = catalogue()
 Exponents = dict[str, int]
 

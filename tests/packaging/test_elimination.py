@@ -32,6 +32,7 @@ def random_pattern(rng: np.random.Generator, n: int, density: float) -> list[tup
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 5, 12, 30])
 @pytest.mark.parametrize("density", [0.0, 0.1, 0.4, 1.0])
 def test_solution_is_that_of_numpy(n: int, density: float) -> None:

@@ -23,6 +23,8 @@ from sources.packaging.description import (
 from tests.fmus import catalogue
 from tests.packaging.formal import ALLOWED, INITIAL, problems, variables
 
+pytestmark = pytest.mark.slow
+
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 TWIN = "dc_motor/sampled"  # inputs, outputs, states, clocks, parameters of both kinds, a solver
 

@@ -36,6 +36,7 @@ def exact() -> tuple[list[str], np.ndarray, np.ndarray]:
     return oracle.state_names, states[:, -1], np.abs(states).max(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("rodas3", 3), ("rosw3_adaptive", 3)])
 def test_solvers_keep_their_order(exact, method: str, order: int) -> None:
     names, expected, scale = exact
@@ -54,6 +55,7 @@ def test_solvers_keep_their_order(exact, method: str, order: int) -> None:
     assert slope == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dopri5", "rodas3_adaptive", "rosw3_adaptive"])
 def test_error_controlled_solvers_follow(exact, method: str) -> None:
     names, expected, scale = exact

@@ -17,6 +17,8 @@ from sources.packaging.layout import METHODS
 from sources.variant import build_model
 from tests.fmus import Slave, fmu
 
+pytestmark = pytest.mark.slow
+
 # smooth runs, away from limits: values, end [s], and numbers of steps in the asymptotic range
 CASES: dict[str, tuple[dict[str, float], float, tuple[int, ...], tuple[int, ...]]] = {
     "dc_motor/electrical": ({"w_ref": 1.0, "w": 0.5}, 0.004, (32, 64, 128, 256), (64, 128, 256)),

@@ -13,6 +13,8 @@ from sources.packaging import native
 from sources.packaging.build import build, build_many
 from sources.packaging.cache import cache_folder
 
+pytestmark = pytest.mark.slow
+
 VARIANT = "inertia/disc"  # small: compiled in a third of a second
 
 

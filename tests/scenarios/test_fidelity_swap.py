@@ -11,6 +11,8 @@ from cosim.system.variants import component
 from sources.variant import fidelities
 from tests.scenarios.running import PROVIDER
 
+pytestmark = pytest.mark.slow
+
 RUNS = [
     "crawler/SET2_1",
     "crawler_paper/SET1_1",

@@ -14,6 +14,8 @@ from cosim.scenario.runner import run
 from cosim.scenario.scenario import find, scenario_files
 from tests.scenarios.running import PROVIDER, whole
 
+pytestmark = pytest.mark.slow
+
 FILES = {file.name: file for file in scenario_files()}
 
 

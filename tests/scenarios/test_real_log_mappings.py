@@ -59,6 +59,7 @@ def test_mapping_fits_its_system(name: str, tmp_path: Path) -> None:
     problem.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["emps", "bam_servo", "kmutt_dcmotor", "ur10e"])
 def test_models_of_the_benchmark_can_be_simulated(name: str, tmp_path: Path) -> None:
     folder = places.scenarios() / name

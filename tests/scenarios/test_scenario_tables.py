@@ -128,6 +128,7 @@ def test_expressions_are_arithmetic_and_nothing_else(folder: Path, text: str, me
         find("points", folder)
 
 
+@pytest.mark.slow
 def test_overview_and_files(folder: Path, tmp_path: Path) -> None:
     edit(folder, 'rest = "others(radius, group)"\n', "")
     result = run("points", provider=PROVIDER, folder=folder, out=tmp_path / "out")

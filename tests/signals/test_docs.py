@@ -53,6 +53,7 @@ def test_effects_page_has_every_effect_and_kind() -> None:
         assert f"| `{kind}` |" in page
 
 
+@pytest.mark.slow
 def test_names_have_the_units_of_the_conventions() -> None:
     text = (tables.DOCS / "conventions.md").read_text(encoding="utf-8")
     section = text.split("## Names")[1].split("| suffix")[0]

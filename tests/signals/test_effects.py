@@ -13,6 +13,8 @@ from sources.model import ModelError
 from sources.variant import build_model, effects
 from tests.support import Stepper
 
+pytestmark = pytest.mark.slow
+
 KINDS = {"signal", "bundle", "pose", "point"}
 SIGNAL_EFFECTS: dict[str, Effect] = {
     name: module.EFFECT

@@ -19,6 +19,7 @@ def base_motion(outputs: dict[str, float]) -> tuple[float, float]:
     return 0.5 * (left + right), (right - left) / TRACK
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fidelity", ["body", "world"])
 def test_base_turns_by_the_commanded_angle(fidelity: str) -> None:
     speed, radius = 0.4, 2.0

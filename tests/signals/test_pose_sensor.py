@@ -87,6 +87,7 @@ def test_held_samples_follow_the_rate() -> None:
     assert read == [0.0] * 4 + [4.0] * 4 + [8.0] * 4
 
 
+@pytest.mark.slow
 def test_lost_samples_repeat_the_last_good_one() -> None:
     lose, find = 0.05, 0.2
     values = {**QUIET, "p_lose": lose, "p_find": find}
@@ -106,6 +107,7 @@ def test_lost_samples_repeat_the_last_good_one() -> None:
     assert lost / gaps == pytest.approx(1 / find, rel=4 / math.sqrt(gaps))
 
 
+@pytest.mark.slow
 def test_noise_has_the_declared_standard_deviations() -> None:
     stepper = Stepper("pose_sensor.mobile_manipulator/motion_capture")
     run = stepper.run(0.01, 3000)

@@ -53,6 +53,7 @@ def test_encoder_resolutions_are_those_of_the_rig_sheets() -> None:
         assert seen.pop() == pytest.approx(step, abs=5e-5)  # four decimals are printed
 
 
+@pytest.mark.slow
 def test_encoder_mean_speed_is_unbiased_and_the_window_moves() -> None:
     stepper = Stepper("encoder.crawler/counts")
     speed, resolution = 0.987, 2 * math.pi / 25600 / 0.02

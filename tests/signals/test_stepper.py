@@ -29,6 +29,7 @@ def sampler(period: float = 0.01) -> Model:
     return m.finish()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.01, 0.001, 0.1 / 3])
 def test_a_tick_sees_the_inputs_of_the_step_that_it_begins(period: float) -> None:
     stepper = Stepper(sampler(period))
@@ -52,6 +53,7 @@ def test_state_between_ticks_is_integrated() -> None:
     assert stepper.values["x"] == pytest.approx(1 - math.exp(-0.5), abs=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", ["encoder/counts", "command_link/held+rate_limit@speed"])
 @pytest.mark.parametrize("dt", [0.001, 0.0035, 0.01])
 def test_stepper_and_fmu_agree(variant: str, dt: float) -> None:

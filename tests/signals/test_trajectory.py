@@ -27,6 +27,7 @@ def integral(time: np.ndarray, y: np.ndarray) -> float:
     return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(time)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fidelity", ["body", "world"])
 @pytest.mark.parametrize("device", sorted(devices("trajectory")))
 def test_one_segment_covers_speed_times_duration(device: str, fidelity: str) -> None:
@@ -42,6 +43,7 @@ def test_one_segment_covers_speed_times_duration(device: str, fidelity: str) -> 
     assert before.sum() > 10 and not run["v_d"][before].any()
 
 
+@pytest.mark.slow
 def test_smooth_ramps_keep_the_distance_and_raise_the_acceleration_by_half() -> None:
     # Mean of the parabola 1.5 a over DT beside its peak; the ramp lasts 0.6 s.
     beside = 0.75 * (1 - 4 / 3 * (DT / 0.6) ** 2)
@@ -113,6 +115,7 @@ def test_straight_then_arc_turns_by_the_curvature_of_what_is_driven() -> None:
     assert run["phi_d"][-1] == pytest.approx(expected, abs=ROUNDING)
 
 
+@pytest.mark.slow
 def test_world_and_body_agree_and_crab_loses_the_sideways_part() -> None:
     values = {"heading": 0.7}
     body, world = (record(f"trajectory.cn2/{f}", 1100, values) for f in ("body", "world"))

@@ -22,6 +22,8 @@ from tests.outside import hear_interrupts
 from tests.study.conftest import BASE
 from tests.study.test_results import failing, figures
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 SWAP = """
 scenario = "motor_bench/ST1"

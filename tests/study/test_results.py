@@ -211,6 +211,7 @@ def test_all_runs_failing_is_a_table_too(run: Any, faulty: Path) -> None:
     assert len(result.failures) == 2 and (result.folder / "study.png").is_file()
 
 
+@pytest.mark.slow
 def test_isolated_crashes_and_hangs_are_failures(run: Any, faulty: Path) -> None:
     crash = failing(faulty, "crash", param={"bad.mode": 5, "bad.fail_at": [0.35, 1e9]})
     result = run(crash, isolate=20.0, workers=2)
@@ -291,6 +292,7 @@ def test_building_meanwhile_does_not_change_the_study(
     assert figures(plain.table.rows) == figures(other.table.rows)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's statm")
 def test_memory_does_not_grow_with_the_number_of_runs(run: Any, tmp_path: Path) -> None:
     pages: list[int] = []

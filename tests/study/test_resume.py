@@ -18,6 +18,8 @@ import pytest
 from cosim.study import read_study, run_study, study_from
 from tests.outside import hear_interrupts
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 LOADS = {"param": {"load.J": [0.07, 0.08, 0.09]}}
 LONG = """

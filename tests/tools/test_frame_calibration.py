@@ -41,6 +41,7 @@ def test_planar_least_squares() -> None:
     np.testing.assert_allclose(kabsch(points, moved(transform, points)), transform, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_least_squares_beats_three_points_under_noise() -> None:
     rng = np.random.default_rng(2)
     triangle = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 2.0, 0.0]])

@@ -1,0 +1,44 @@
+"""`make quick` is `pytest -m "not slow"`.
+
+Modules that are slow as a whole are not even imported then, and it says so when it takes too long.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+
+import pytest
+
+QUICK = "not slow"
+LONGEST = 60.0
+"""[s] What one waits for without doing something else."""
+SLOW_MODULE = re.compile(r"^pytestmark = pytest\.mark\.slow$", flags=re.M)
+BEGIN = pytest.StashKey[float]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[BEGIN] = time.perf_counter()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    # their parameters alone, models of the whole catalogue, take 15 s to build
+    if config.option.markexpr == QUICK and collection_path.match("test_*.py"):
+        return SLOW_MODULE.search(collection_path.read_text(encoding="utf-8")) is not None or None
+    return None
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    taken = time.perf_counter() - config.stash[BEGIN]
+    if config.option.markexpr != QUICK or taken <= LONGEST:
+        return
+    calls = [r for r in terminalreporter.stats.get("passed", []) if r.when == "call"]
+    terminalreporter.write_line(
+        f"{taken:.0f} s are more than the {LONGEST:.0f} s of a quick run. If the machine was idle"
+        " and the FMUs were built, mark these as slow:"
+    )
+    for report in sorted(calls, key=lambda report: -report.duration)[:5]:
+        terminalreporter.write_line(f"{report.duration:6.1f} s  {report.nodeid}")
