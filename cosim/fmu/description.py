@@ -7,15 +7,18 @@ validates.
 
 from __future__ import annotations
 
-import json
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from .. import markup
 from ..errors import FmuFileError, UnknownNameError, listing
+from ..limits import TEXT, VALUES
 from ..spec.units import BASE, Unit
+from .metadata import read_metadata
 
 Causality = Literal[
     "parameter", "calculatedParameter", "structuralParameter", "input", "output", "local",
@@ -179,12 +182,11 @@ def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str,
         base = element.find(f"{namespace}BaseUnit")
         name = element.get("name", "")
         if base is not None:
-            units[name] = Unit(
-                name,
-                tuple(int(base.get(key, "0")) for key in BASE),
-                float(base.get("factor", "1")),
-                float(base.get("offset", "0")),
-            )
+            factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+            if not (math.isfinite(factor) and factor and math.isfinite(offset)):
+                raise ValueError(f"unit {name!r} has factor {factor} and offset {offset}")
+            exponents = tuple(int(base.get(key, "0")) for key in BASE)
+            units[name] = Unit(name, exponents, factor, offset)
     return units
 
 
@@ -197,6 +199,10 @@ def _start(text: str | None, type_: str) -> tuple[Start, ...]:
     if type_.startswith("Boolean"):
         return tuple(item in ("true", "1") for item in items)
     return tuple(float(item) for item in items)
+
+
+class _Unsound(Exception):
+    """A description that cannot be used; the text says why and the way out."""
 
 
 class _Types:
@@ -261,6 +267,10 @@ def _size(element: ET.Element, starts: Mapping[int, Start]) -> int:
             size *= int(dimension.attrib["start"])
         else:
             size *= int(starts.get(int(dimension.attrib["valueReference"])) or 1)
+    if size < 1:
+        raise _Unsound(f"variable {element.get('name')!r} has {size} elements; give it some")
+    if excess := VALUES.excess(size):
+        raise _Unsound(f"variable {element.get('name')!r}: {excess}")
     return size
 
 
@@ -272,10 +282,14 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
         for e in elements
         if e.tag == "UInt64"
     }
-    found = []
+    found: list[Variable] = []
+    total = 0
     for element in elements:
         type_ = "Int64" if element.tag == "Enumeration" else element.tag
         size = _size(element, structural)
+        total += size
+        if excess := VALUES.excess(total):
+            raise _Unsound(f"its variables together: {excess}")
         inner = element.find("Start")
         text = inner.get("value") if inner is not None else element.get("start")
         start = _start(text, type_)
@@ -320,6 +334,25 @@ def _dependencies(
     return found, frozenset(assumed)
 
 
+def _check(variables: Iterable[Variable], identifier: str) -> None:
+    """Refuse what would be silently wrong, or lead out of the FMU's folder."""
+    names: set[str] = set()
+    for variable in variables:
+        if variable.name in names:
+            raise _Unsound(
+                f"has two variables named {variable.name!r}, so a value would go to either; names "
+                "must be unique"
+            )
+        names.add(variable.name)
+        if not 0 <= variable.reference < 2**32:
+            raise _Unsound(
+                f"variable {variable.name!r} has the value reference {variable.reference}, which "
+                "is not a whole number of 32 bits (0 to 4294967295); export it again"
+            )
+    if not identifier or set(identifier) & set("/\\:"):
+        raise _Unsound(f"modelIdentifier {identifier!r} is not the name of a file")
+
+
 def _ports(extra: Mapping[str, Any]) -> tuple[PowerPort, ...]:
     return tuple(
         PowerPort(
@@ -345,8 +378,8 @@ def parse_description(xml: bytes, extra: Mapping[str, Any], where: str) -> Descr
         FmuFileError: not XML, not FMI 2 or 3, or without co-simulation.
     """
     try:
-        root = ET.fromstring(xml)
-    except ET.ParseError as error:
+        root = markup.parse(xml).root
+    except markup.MarkupError as error:
         raise FmuFileError(
             f"{where}: modelDescription.xml cannot be read ({error}); build or fetch the file again"
         ) from error
@@ -360,7 +393,9 @@ def parse_description(xml: bytes, extra: Mapping[str, Any], where: str) -> Descr
         raise FmuFileError(f"{where}: has no co-simulation interface; export it for co-simulation")
     try:
         return _assemble(root, interface, extra, 2 if version.startswith("2.") else 3)
-    except (KeyError, ValueError, StopIteration, IndexError) as error:
+    except _Unsound as error:
+        raise FmuFileError(f"{where}: modelDescription.xml: {error}") from None
+    except (KeyError, ValueError, StopIteration, IndexError, OverflowError) as error:
         raise FmuFileError(
             f"{where}: modelDescription.xml is not valid ({type(error).__name__}: {error}); "
             "'cosim fmus check' lists its problems"
@@ -372,6 +407,7 @@ def _assemble(
 ) -> Description:
     units = read_units(root.iterfind("UnitDefinitions/Unit"))
     variables = _variables2(root, units) if fmi == 2 else _variables3(root, units)
+    _check(variables, interface.get("modelIdentifier", ""))
     inputs = tuple(v.name for v in variables if v.causality == "input")
     if fmi == 2:
         indexed = {index + 1: v for index, v in enumerate(variables)}
@@ -421,12 +457,15 @@ def read_description(folder: Path, where: str) -> Description:
     """
     path = folder / "modelDescription.xml"
     if not path.is_file():
-        raise FmuFileError(f"{where}: has no modelDescription.xml, so it is not an FMU")
-    metadata = folder / "extra" / "cosim" / "component.json"
-    extra: Mapping[str, Any] = {}
-    if metadata.is_file():
-        try:
-            extra = json.loads(metadata.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise FmuFileError(f"{where}: extra/cosim/component.json: {error}") from error
+        inside = sorted(item.parent.name for item in folder.glob("*/modelDescription.xml"))
+        way_out = (
+            f"; the folder {inside[0]!r} inside it has one: pack the content of that folder, not "
+            "the folder"
+            if inside
+            else ", so it is not an FMU"
+        )
+        raise FmuFileError(f"{where}: has no modelDescription.xml{way_out}")
+    extra = read_metadata(folder / "extra" / "cosim" / "component.json", where)
+    if excess := TEXT.excess(path.stat().st_size):
+        raise FmuFileError(f"{where}: modelDescription.xml: {excess}")
     return parse_description(path.read_bytes(), extra, where)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import markup
 from ..data.signals import Signal
 from ..fmu.archive import Fmu
 from ..system.system import System
@@ -303,7 +304,7 @@ def _element(node: flatten.Node) -> str:
 
 def _items(fmu: Fmu, name: str) -> dict[str, int]:
     """Items of the enumeration that a variable of an FMU has as its type."""
-    root = ET.parse(fmu.folder / "modelDescription.xml").getroot()
+    root = markup.read(fmu.folder / "modelDescription.xml").root
     declared = ""
     for element in root.iterfind("ModelVariables/*"):
         if element.get("name") == name:
