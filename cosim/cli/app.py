@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import json
 import sys
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +22,7 @@ from rich.table import Table
 
 from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError
 from ..fmu.archive import open_fmu
+from ..fmu.check import check
 from ..installation import places
 from ..installation.builder import default_provider, naming_errors, sources
 from ..master import algorithms
@@ -185,7 +187,10 @@ def fmus_check(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Validate FMUs, ours or anybody's.
+    """Check FMUs, ours or anybody's, without running anything of them.
+
+    Errors break the standard of FMI, or keep masters from running the FMU; warnings are allowed,
+    but others may stumble over them.
 
     Example: `cosim fmus check gearbox.fmu`
     """
@@ -196,32 +201,21 @@ def fmus_check(
     if not paths:
         raise InputError(f"{places.fmus()}: has no .fmu; build some with 'cosim fmus build'")
     results = {}
+    bad = 0
     for path in paths:
-        problems = results[str(path)] = _check(path)
+        findings = check(path)
+        results[str(path)] = [finding.to_dict() for finding in findings]
+        bad += any(finding.severity == "error" for finding in findings)
         if not as_json:
-            typer.echo(f"{path}: {'ok' if not problems else f'{len(problems)} problem(s)'}")
-            for problem in problems:
-                typer.echo(f"  {problem}")
-    bad = sum(1 for problems in results.values() if problems)
+            counts = Counter(finding.severity for finding in findings)
+            shown = ", ".join(f"{number} {kind}(s)" for kind, number in counts.items())
+            typer.echo(f"{path}: {shown or 'ok'}")
+            for finding in findings:
+                typer.echo(f"  {finding}")
     if as_json:
         _print_json({"checked": len(results), "with_problems": bad, "problems": results})
     if bad:
         raise CheckError(f"{bad} of {len(results)} FMUs have problems")
-
-
-def _check(path: Path) -> list[str]:
-    problems: list[str] = []
-    try:
-        open_fmu(path)
-    except FmuFileError as error:
-        return [str(error)]
-    try:
-        problems += sources("packaging.check").check(path)
-    except VariantError:
-        from fmpy.validation import validate_fmu
-
-        problems += validate_fmu(str(path))
-    return problems
 
 
 # -- scenarios -------------------------------------------------------------------------------------
