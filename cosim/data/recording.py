@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
+from .parquet import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,29 +182,54 @@ def read_recording(path: Path | str) -> Recording:
     Raises:
         ScenarioError: missing, or not such a file.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = Path(path)
-    if not path.is_file():
-        raise ScenarioError(f"{path}: there is no such file")
-    try:
-        table = pq.read_table(path)
-    except pa.ArrowInvalid as error:
-        raise ScenarioError(f"{path}: is not a Parquet file ({error})") from error
+    table = read_table(path)
     metadata = table.schema.metadata or {}
     if _META not in metadata or "time" not in table.column_names:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
-    meta = json.loads(metadata[_META])
+    meta = _read_meta(path, metadata[_META])
     names = tuple(name for name in table.column_names if name != "time")
-    columns = [table[name].to_numpy() for name in names]
-    time = table["time"].to_numpy()
+    columns = []
+    for name in ("time", *names):
+        column = table[name]
+        if str(column.type) != "double" or column.null_count:
+            raise ScenarioError(
+                f"{path}: column {name!r} is of type {column.type} with {column.null_count} gaps; "
+                "a recording has floating-point numbers only: record it again"
+            )
+        columns.append(column.to_numpy())
     return Recording(
-        time=time,
-        values=np.column_stack(columns) if columns else np.zeros((len(time), 0)),
+        time=columns[0],
+        values=np.column_stack(columns[1:]) if names else np.zeros((len(columns[0]), 0)),
         names=names,
         units={name: unit for name, unit in meta["units"].items() if name != "time"},
         provenance=meta["provenance"],
         bond_energy=meta["bond_energy_J"],
         error=meta["error"],
     )
+
+
+def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
+    """What `Recording._meta` wrote.
+
+    Raises:
+        ScenarioError: something else.
+    """
+    meta: dict[str, Any]
+    try:
+        meta = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(
+            f"{path}: what it says about itself is not JSON ({error}); record it again"
+        ) from error
+    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str}
+    for key, kind in kinds.items():
+        if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
+            raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
+    if not all(isinstance(unit, str) for unit in meta["units"].values()) or not all(
+        isinstance(energy, (int, float)) for energy in meta["bond_energy_J"].values()
+    ):
+        raise ScenarioError(
+            f"{path}: its units are no texts, or its energies no numbers; record it again"
+        )
+    return meta
