@@ -12,6 +12,7 @@ from typing import Any
 
 from .errors import InputError, ScenarioError
 from .limits import TEXT
+from .schema import DEPTH, depth_of
 
 
 @contextlib.contextmanager
@@ -78,14 +79,20 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         if excess := TEXT.excess(path.stat().st_size):
             raise ScenarioError(f"{path}: {excess}")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ScenarioError(f"{path}: there is no such file") from None
     except RecursionError:
-        raise ScenarioError(f"{path}: is not read, its lists lie too deep within each other") from (
-            None
-        )
+        raise ScenarioError(
+            f"{path}: its lists and tables lie too deep within each other"
+        ) from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:  # TOML and UTF-8, numbers of thousands of digits, impossible paths
+    except (
+        ValueError,
+        OverflowError,
+    ) as error:  # TOML and UTF-8, numbers of thousands of digits, impossible paths
         raise ScenarioError(f"{path}: is not TOML ({error})") from error
+    if depth_of(content) > DEPTH:
+        raise ScenarioError(f"{path}: its lists and tables lie more than {DEPTH} deep")
+    return content
