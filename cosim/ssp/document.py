@@ -15,6 +15,7 @@ from typing import Literal
 
 from .. import markup
 from ..errors import ScenarioError
+from ..files import is_file
 from ..fmu import archive
 from ..fmu.description import read_units
 from ..spec.units import Unit
@@ -69,7 +70,10 @@ class File:
         Raises:
             ScenarioError: another kind of URI, outside the package, or not there.
         """
-        parts = urllib.parse.urlsplit(source)
+        try:
+            parts = urllib.parse.urlsplit(source)
+        except ValueError as error:  # brackets of an address of the network
+            raise self.error(f"{what} refers to {source!r}, which is no URI ({error})") from None
         if parts.scheme or parts.netloc:
             raise self.error(
                 f"{what} refers to {source!r}; only files inside the package can be read, so put "
@@ -85,7 +89,7 @@ class File:
             elif part != ".":
                 places.append(part)
         found = File(folder or self.folder, "/".join(places), f"{self.shown}: {source}")
-        if not found.path.is_file():
+        if not is_file(found.path):
             raise self.error(f"{what} refers to {source!r}, which the package does not hold")
         return found
 
