@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import FmuCallError, FmuFileError, ValueRangeError
+from ..schema import shown
 from .description import Variable
 
 if TYPE_CHECKING:
@@ -139,8 +140,8 @@ def check_values(where: str, variables: Sequence[Variable], value: Any) -> Vecto
     name = variables[0].name if len(variables) == 1 else variables[0].name.rpartition("[")[0]
     try:
         numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueRangeError(f"{where}: {name} = {value!r} is not a number") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueRangeError(f"{where}: {name} = {shown(value)} is not a number") from None
     if numbers.ndim == 0:
         numbers = np.full(count, float(numbers))
     if numbers.shape != (count,):

@@ -7,13 +7,12 @@ from typing import Any
 from ..schema import (
     Check,
     anything,
-    bound,
     either,
     flag,
+    floating,
     keyed,
     list_of,
     number,
-    numbers,
     path,
     said,
     table,
@@ -29,10 +28,11 @@ OUTSIDE: dict[str, Check] = {
     "table": table, "runs": table_of(table),
 }  # fmt: skip
 """Before rows of a table are filled in, which may stand for texts and numbers."""
-_ONE = either("a number or a list of numbers", number, numbers)
+_MANY = list_of(floating)
+_ONE = either("a number or a list of numbers", floating, _MANY)
 _SOURCE: dict[str, Check] = {
     "file": path, "data": path, "run": said, "column": said, "columns": list_of(said),
-    "time": said, "unit": said, "constant": _ONE, "times": numbers, "values": numbers,
+    "time": said, "unit": said, "constant": _ONE, "times": _MANY, "values": _MANY,
     "interpolation": text,
 }  # fmt: skip
 _POINT = list_of(number, 2)
@@ -44,19 +44,19 @@ _COMPARED: dict[str, Check] = {
 _CHECK: dict[str, Check] = {
     "name": said, "source": said, "of": text, "signal": text, "signals": texts,
     "comparison": text, "minus": text, "quantity": said, "case": said, "reference": said,
-    "after": bound, "before": bound, "expected": number, "per": number, "relative": flag,
-    "limit": either("a number, or two", bound, list_of(bound, 2)),
+    "after": floating, "before": floating, "expected": number, "per": number, "relative": flag,
+    "limit": either("a number, or two", floating, list_of(floating, 2)),
 }  # fmt: skip
 _AXES: dict[str, Check] = {
     "label": said, "signals": texts, "paths": list_of(list_of(text, 2)), "comparisons": texts,
-    "names": list_of(said), "unit": said, "minus": text, "after": bound, "before": bound,
+    "names": list_of(said), "unit": said, "minus": text, "after": floating, "before": floating,
 }  # fmt: skip
 INSIDE: dict[str, Check] = {
     "description": said, "question": said, "expected": said, "source": said, "system": path,
     "duration": number, "start": number, "step": number, "tolerance": number, "algorithm": text,
     "variants": table_of(text), "parameters": table, "options": table,
     "inputs": table_of(
-        either("a number, a list of numbers or a table", number, numbers, table)
+        either("a number, a list of numbers or a table", floating, _MANY, table)
     ),
     "compare": table_of(table), "record": keyed({"signals": texts, "period": number}),
     "checks": list_of(keyed(_CHECK)), "plots": list_of(keyed(_AXES)), "plot": texts,

@@ -137,6 +137,7 @@ class _Flat:
             },
             parameters=self.parameters(),
             connections=tuple(wires),
+            shown=self.file.shown,
         )
         return Package(
             system, experiment, inputs, outputs, signals, tuple(self.ignored),
