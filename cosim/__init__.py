@@ -11,7 +11,7 @@ from .data.signals import Constant, Function, Table
 from .errors import CosimError
 from .fmu.instance import Instance
 from .master.master import Master
-from .scenario.runner import Result, RunResult, run
+from .running.runner import Result, RunResult, run
 from .system.provider import FolderProvider
 from .system.system import System
 from .system.toml import read_system

@@ -24,10 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .data.recording import Recording
+from typing import Any
 
 
 class CosimError(Exception):
@@ -95,7 +92,7 @@ class StepError(FmuCallError):
 
     Attributes:
         time: the communication point from which the failing step started [s].
-        recording: what was recorded until then, None if nothing was.
+        recording: what was recorded until then, a `data.recording.Recording`; None if nothing was.
     """
 
     def __init__(
@@ -104,7 +101,7 @@ class StepError(FmuCallError):
         messages: Iterable[str] = (),
         *,
         time: float,
-        recording: Recording | None = None,
+        recording: Any = None,
     ) -> None:
         super().__init__(text, messages)
         self.time = time

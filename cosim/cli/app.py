@@ -24,8 +24,8 @@ from ..fmu.archive import open_fmu
 from ..installation import places
 from ..installation.builder import default_provider, naming_errors, sources
 from ..master import algorithms
+from ..running.runner import Result, run
 from ..scenario import scenario
-from ..scenario.runner import Result, run
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command

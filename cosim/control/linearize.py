@@ -27,8 +27,9 @@ from ..errors import AlgebraicLoopError, InputError, UnknownNameError, listing
 from ..fmu.exchange import DTYPES
 from ..fmu.instance import Instance
 from ..master.execution import Execution
+from ..master.initialization import initialize
 from ..master.master import Driver, Master
-from ..master.plan import Op
+from ..master.plan import Op, decoded
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -195,24 +196,22 @@ def operating_point(
     master: Master, at: float, inputs: Mapping[str, Driver] | None
 ) -> tuple[list[Linear], list[str]]:
     """The instances at time `at` of a run."""
-    signals = master._signals(inputs or {})
-    plan = master.compile(list(signals), [])
-    count = max(master._count(at, 1), 1) if at > 0.0 else 0
-    times = master.step * np.arange(max(count, 1) + 1, dtype=np.float64)
-    external = master._external(signals, times)
+    outline = master.outline(at if at > 0.0 else master.step, inputs=inputs, record=[])
+    count = outline.count if at > 0.0 else 0
     parts, notes = [], []
     with ExitStack() as stack:
-        run = Execution(master, plan, [], external, times, 1, signals, stack)
-        run.initialize()
+        execution = Execution(outline, stack)
+        run = execution.run
+        initialize(run)
         if count:
-            run.executor()(count)
+            execution.prepare().advance(count)
         run.do(Op.EXTERNAL, 0, 0)
-        for op, a, b in run.plan.solving.tolist():
-            run.do(Op(op), a, b)
+        for op, a, b in decoded(run.plan.solving):
+            run.do(op, a, b)
         for index, instance in enumerate(run.instances):
             run.do(Op.COPY, *run.layout.copies[index].tolist())
             run.do(Op.SET, index, 0)
-            instance.time = float(times[count])
+            instance.time = float(outline.times[count])
             part, said = linearize_instance(instance)
             parts.append(part)
             notes += said

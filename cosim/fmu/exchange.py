@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import FmuCallError, FmuFileError, ValueRangeError
 from .description import Variable
-
-if TYPE_CHECKING:
-    from .instance import Instance
 
 Vector = NDArray[np.float64]
 
@@ -45,6 +42,27 @@ class Part:
     arguments: tuple[Any, ...]
 
 
+class Caller(Protocol):
+    """What makes the calls of a block: an instance."""
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+
+    @property
+    def binding(self) -> Any:
+        """`fmi2` or `fmi3`."""
+
+    def get_part(self, part: Part) -> None:
+        """Fetch values."""
+
+    def set_part(self, part: Part) -> None:
+        """Give values."""
+
+    def refusal(self, what: str) -> FmuCallError:
+        """The error for what was not even tried."""
+
+
 class Block:
     """Values of chosen variables in one preallocated array, and the calls that exchange them.
 
@@ -55,7 +73,7 @@ class Block:
     """
 
     def __init__(
-        self, instance: Instance, variables: Sequence[Variable], values: Vector | None = None
+        self, instance: Caller, variables: Sequence[Variable], values: Vector | None = None
     ) -> None:
         for variable in variables:
             if variable.type not in DTYPES:

@@ -7,11 +7,9 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,31 +24,11 @@ from ..system.system import System
 from .algorithms import compile_plan
 from .execution import Execution
 from .isolation import run_isolated
+from .outline import Outline
 from .plan import Plan
 
 Vector = NDArray[np.float64]
 Driver = Signal | float | Callable[[Vector], ArrayLike]
-
-
-@dataclass(frozen=True)
-class Outline:
-    """A run, checked and outline out.
-
-    Attributes:
-        count: communication steps.
-        observed: full scalar names of what is recorded.
-        signals: scalar input -> what drives it.
-        plan: of the algorithm.
-        times: communication points [s].
-        external: values of the driven inputs, one row per communication point.
-    """
-
-    count: int
-    observed: list[str]
-    signals: dict[str, Signal]
-    plan: Plan
-    times: Vector
-    external: Vector
 
 
 @dataclass(frozen=True)
@@ -108,16 +86,9 @@ class Master:
         if self.isolate is not None:
             if not self.isolate > 0.0:
                 raise ValueRangeError(f"time limit {self.isolate} s is not positive")
-            return run_isolated(
-                self, self.isolate, outline.signals, outline.external, outline.observed,
-                outline.times, every, progress,
-            )  # fmt: skip
+            return run_isolated(outline, self.isolate, progress)
         with ExitStack() as stack:
-            run = Execution(
-                self, outline.plan, outline.observed, outline.external, outline.times, every,
-                outline.signals, stack,
-            )  # fmt: skip
-            return run.execute(outline.count, progress)
+            return Execution(outline, stack).execute(progress)
 
     def outline(
         self,
@@ -135,11 +106,23 @@ class Master:
         """
         count = self._count(duration, every)
         wanted = self.system.signals() if record is None else record
-        observed = list(dict.fromkeys(n for name in wanted for n in self._observable(name)))
+        observed = tuple(dict.fromkeys(n for name in wanted for n in self._observable(name)))
         signals = self._signals(inputs or {})
-        plan = self.compile(list(signals), observed)
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
-        return Outline(count, observed, signals, plan, times, self._external(signals, times))
+        return Outline(
+            system=self.system,
+            scenario=self.scenario,
+            options=self.options,
+            step=self.step,
+            tolerance=self.tolerance,
+            executor=self.executor,
+            plan=self.compile(list(signals), observed),
+            times=times,
+            observed=observed,
+            every=every,
+            signals=signals,
+            external=self._external(signals, times),
+        )
 
     def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
         """The plan of the algorithm with its options."""
@@ -212,39 +195,3 @@ class Master:
         instance, _, variable = name.partition(".")
         found = self.system.members[instance].description.variables
         return found[variable if variable in found else variable.rpartition("[")[0]].unit
-
-    def provenance(self) -> dict[str, Any]:
-        """Where results of this master come from."""
-        return {
-            "system": self.system.name,
-            "scenario": self.scenario,
-            "algorithm": self.algorithm,
-            "options": {key: _plain(value) for key, value in self.options.items()},
-            "step_s": self.step,
-            "instances": {
-                member.name: {
-                    "reference": member.reference,
-                    "model": member.description.name,
-                    "fmi": member.description.fmi,
-                    "file": member.fmu.path.name,
-                    "sha256": member.fmu.digest,
-                    "tool": member.description.tool,
-                    "parameters": dict(member.parameters),
-                }
-                for member in self.system.members.values()
-            },
-            "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
-            "versions": {name: _version(name) for name in ("cosim", "numpy")},
-        }
-
-
-def _plain(value: Any) -> Any:
-    return dict(value) if isinstance(value, Mapping) else value
-
-
-@lru_cache
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"

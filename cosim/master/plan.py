@@ -2,15 +2,16 @@
 
 Every exchanged variable has a slot in `values`: first, instance by instance, the outputs that are
 fetched, then the inputs that are given. An algorithm is the order of operations of one
-communication step; it is executed by `master` (Python) and can be executed by compiled code, since
-all there is are arrays of numbers.
+communication step; it is executed by `interpreter` and can be executed by compiled code, since all
+there is are arrays of numbers. Algorithms whose steps are more than such a list bring a `Stepper`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +37,7 @@ class Op(IntEnum):
     EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step (begin, if moving)
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
     HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
-    ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
-    RAMP = 13  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    RAMP = 12  # tell an instance how its inputs move: means a <= i < b, all of them its own
 
 
 PARTS = 1 << 16
@@ -123,24 +123,20 @@ class Mean:
     bonded: bool
 
 
-@dataclass(frozen=True)
-class Iteration:
-    """Settings of the algorithms that repeat steps.
+class Stepper(Protocol):
+    """What makes the communication steps of a run."""
 
-    Attributes:
-        tolerance: relative change of exchanged values at which they count as settled; of step
-            control, the error of one step.
-        smooth: per copy, whether its values are continuous in time.
-        energy: step control: energy that the coupling may invent, relative to what it passes on.
-        longest: step control: longest step [s].
-        adaptive: whether steps are controlled.
-    """
+    def advance(self, last: int) -> None:
+        """Go on up to a communication point."""
 
-    tolerance: float
-    smooth: NDArray[np.bool_]
-    energy: float = np.inf
-    longest: float | None = None
-    adaptive: bool = False
+    def restart(self) -> None:
+        """Begin anew, at the first communication point."""
+
+    def steps(self) -> int:
+        """Steps of the whole system that were made, repeated ones too."""
+
+    def report(self) -> Mapping[str, Any]:
+        """What the provenance of the recording says of it."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +153,8 @@ class Plan:
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
         means: what EXTRAPOLATE and RAMP set.
-        iteration: what ITERATE and step control need.
+        stepper: for algorithms that repeat steps, what makes a stepper of an
+            `interpreter.Interpreter`; None if the operations of `step` are all there is.
     """
 
     algorithm: str
@@ -168,13 +165,18 @@ class Plan:
     loops: tuple[Loop, ...] = ()
     solving: Integers = field(default_factory=lambda: operations(()))
     means: tuple[Mean, ...] = ()
-    iteration: Iteration | None = None
+    stepper: Callable[[Any], Stepper] | None = None
 
 
 def operations(items: Iterable[Sequence[int]]) -> Integers:
     """Rows (operation, a, b)."""
     rows = [(int(item[0]), *item[1:], 0, 0)[:3] for item in items]
     return np.array(rows, dtype=np.int64).reshape(-1, 3)
+
+
+def decoded(rows: Integers) -> list[tuple[Op, int, int]]:
+    """The operations in these rows, as the interpreter takes them."""
+    return [(Op(op), a, b) for op, a, b in rows.tolist()]
 
 
 def _whole(system: System, name: str) -> str:

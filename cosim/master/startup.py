@@ -14,19 +14,15 @@ that cannot return to a saved state, start with held inputs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from .iteration import restore, saved
-from .plan import Op
-
-if TYPE_CHECKING:
-    from .execution import Execution
+from .interpreter import Interpreter
+from .plan import Op, decoded
+from .rollback import restore, saved
 
 TRIALS = 2
 """The first trial begins with held inputs, which the second corrects; a third changes nothing."""
 
 
-def find_past(run: Execution) -> None:
+def find_past(run: Interpreter) -> None:
     """Fill the history of the extrapolated inputs before the first step.
 
     Raises:
@@ -36,7 +32,7 @@ def find_past(run: Execution) -> None:
     able = all(item.description.can("canGetAndSetFMUState") for item in run.instances)
     if not means or not able or run.times.size < 3:
         return
-    step = [(Op(int(op)), int(a), int(b)) for op, a, b in run.plan.step]
+    step = decoded(run.plan.step)
     sources = [mean.source for mean in means]
     values = run.values.copy()
     with saved(run) as states:

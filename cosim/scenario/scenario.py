@@ -21,8 +21,8 @@ from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import places
 from ..system.toml import SystemFile, read_system
+from .axes import Axes, read_axes
 from .checks import CHECK_KEYS, Check, read_check
-from .plots import Axes, read_axes
 from .run_table import fill, table_runs
 
 KEYS = {

@@ -13,7 +13,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..errors import CosimError, StepError
 from ..master.session import Session
-from ..scenario.runner import RunResult
+from ..running.runner import RunResult
 from ..system.provider import Provider
 from .planning import Group, Task
 

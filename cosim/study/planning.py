@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
-from ..scenario.runner import Prepared, adjusted, find_runs, prepare
+from ..running.runner import Prepared, adjusted, find_runs, prepare
 from ..scenario.scenario import Scenario
 from ..system.provider import Provider
 from .definition import Study

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..drawing import svg as drawing
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
 from ..fmu.description import Description, PowerPort, Variable
@@ -385,15 +386,11 @@ class System:
 
     def svg(self) -> str:
         """The system as a drawing (SVG)."""
-        from ..drawing.svg import svg
-
-        return svg(self)
+        return drawing.svg(self)
 
     def to_svg(self, path: Path | str) -> Path:
         """Write the drawing to a file."""
-        from ..drawing.svg import to_svg
-
-        return to_svg(self, path)
+        return drawing.to_svg(self, path)
 
     def __str__(self) -> str:
         lines = [f"System {self.name!r}" + (f": {self.text}" if self.text else "")]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cosim.errors import InputError, ScenarioError, UnknownNameError, VariantError
+from cosim.running.runner import run
 from cosim.scenario import scenario
 from cosim.scenario.checks import circle_radius
-from cosim.scenario.runner import run
 from cosim.system.variants import apply, change
 
 SYSTEM = """

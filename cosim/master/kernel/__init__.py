@@ -1,4 +1,4 @@
-"""The compiled executor of plans: finds its library and binds a run to it.
+"""The compiled executor of plans: finds its library and binds a run to it; `stepper` uses it.
 
 The library is part of an installed wheel; in a checkout it is compiled into the cache when FMUs are
 built. Without one, runs use the executor in Python, which gives the same numbers, bit for bit.
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
 from ...spec import cache
-from ..algebraic_loops import Newton
 from ..input_derivatives import Ramps
+from ..interpreter import Interpreter
 from ..plan import Op, Plan
 
 SOURCE = Path(__file__).with_name("kernel.c")
@@ -170,51 +170,26 @@ class Kernel:
     """A run bound to the compiled executor.
 
     Args:
-        plan: what to do in a communication step.
-        instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
-        values: the run's array of values, which the blocks view.
-        times, external: communication points and the external inputs there.
-        rows: where observed values go.
-        bond_energy: where the bonds' energy goes.
-        newtons: one per algebraic loop.
-        history, past: of extrapolated inputs, and how many values it has before the first step.
-        ramps: derivatives of the inputs that move within a step.
-        bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
+        bound: the run, whose arrays it works on.
+        plan: what to do in a communication step, if not the run's own plan.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        instances: Sequence[Instance],
-        outputs: Sequence[Block],
-        inputs: Sequence[Block],
-        values: NDArray[np.float64],
-        times: NDArray[np.float64],
-        step: float,
-        external: NDArray[np.float64],
-        rows: NDArray[np.float64],
-        bond_energy: NDArray[np.float64],
-        every: int,
-        newtons: Sequence[Newton] = (),
-        history: NDArray[np.float64] | None = None,
-        past: NDArray[np.int64] | None = None,
-        ramps: Ramps | None = None,
-        bond_mean: Sequence[int] = (),
-    ) -> None:
+    def __init__(self, bound: Interpreter, plan: Plan | None = None) -> None:
         path = find()
         if path is None:
             raise FileNotFoundError(library_name())
         self._library = _load(str(path))
-        layout = plan.layout
-        self._keep: list[Any] = [instances, outputs, inputs]
+        plan = plan or bound.plan
+        layout, instances = plan.layout, bound.instances
+        self._keep: list[Any] = [bound]
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
         self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
         calls: list[_Call] = []
         spans: dict[tuple[Op, int], tuple[int, int]] = {}
         for op, blocks, slots in (
-            (Op.SET, inputs, layout.inputs),
-            (Op.GET, outputs, layout.outputs),
+            (Op.SET, bound.inputs, layout.inputs),
+            (Op.GET, bound.outputs, layout.outputs),
         ):
             for index, (instance, block) in enumerate(zip(instances, blocks, strict=True)):
                 first = len(calls)
@@ -225,12 +200,12 @@ class Kernel:
         self.run = _Run(
             members=self._structures(_Member, (_member(instance) for instance in instances)),
             calls=self._structures(_Call, calls),
-            values=self._array(values),
-            times=self._array(times),
-            step=step,
-            external=self._array(external),
+            values=self._array(bound.values),
+            times=self._array(bound.times),
+            step=bound.step,
+            external=self._array(bound.external),
             external_slot=self._array(layout.external),
-            n_external=external.shape[1],
+            n_external=bound.external.shape[1],
             copies=self._structures(
                 _Copy,
                 zip(
@@ -242,30 +217,30 @@ class Kernel:
                 _Copy,
                 zip(
                     layout.record_gain.tolist(), layout.record_offset.tolist(),
-                    layout.record_source.tolist(), range(rows.shape[1]), strict=True,
+                    layout.record_source.tolist(), range(bound.rows.shape[1]), strict=True,
                 ),
             ),
-            n_record=rows.shape[1],
-            every=every,
-            rows=self._array(rows),
+            n_record=bound.rows.shape[1],
+            every=bound.every,
+            rows=self._array(bound.rows),
             terms=self._structures(
                 _Term,
                 zip(
                     layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
                     layout.bond_output.tolist(), layout.bond_input.tolist(),
                     layout.bond_index.tolist(),
-                    bond_mean or [-1] * len(layout.bond_sign), strict=True,
+                    bound.bond_mean, strict=True,
                 ),
             ),
-            bond_energy=self._array(bond_energy),
+            bond_energy=self._array(bound.bond_energy),
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
-        told = self._ramps(ramps) if ramps is not None else {}
+        told = self._ramps(bound.ramps)
         instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
         loops = []
-        for loop, newton in zip(plan.loops, newtons, strict=True):
+        for loop, newton in zip(plan.loops, bound.newtons, strict=True):
             first = len(instructions)
             instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
             loops.append(
@@ -289,14 +264,12 @@ class Kernel:
             ),
         )
         self.run.n_means = len(plan.means)
-        if history is not None and past is not None:
-            self.run.history, self.run.past = self._array(history), self._array(past)
+        self.run.history, self.run.past = self._array(bound.history), self._array(bound.past)
 
     def _ramps(self, ramps: Ramps) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls of derivatives; per RAMP operation the first and behind the last."""
         self.run.average = self._array(ramps.average)
         self.run.slope, self.run.curve = self._array(ramps.slope), self._array(ramps.curve)
-        self._keep.append(ramps)
         rows: list[_Ramp] = []
         told = {}
         for key, told_calls in ramps.calls.items():

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..data.signals import Signal, as_signal
 from ..errors import ScenarioError, UnknownNameError, listing
-from ..ssp.read import Experiment, Package, read_package
-from ..ssp.write import write
+from ..scenario.scenario import Scenario
 from ..system.provider import Provider
 from ..system.variants import apply
-from .scenario import Scenario
+from .read import Experiment, Package, read_package
+from .write import write
 
 Vector = NDArray[np.float64]
 
