@@ -17,7 +17,7 @@ from typing import Any
 
 import casadi as ca
 
-from .component import Component, Solver
+from .component import Component, Fidelity
 from .effect import KINDS, Effect
 from .model import Balance, Model, Variable, misfit
 from .packaging.catalog import names
@@ -137,10 +137,10 @@ def _ports(component: Component) -> str:
 
 def _fidelity(component: str, fidelity: str, module: Any) -> str:
     model = _model(component, fidelity)
-    solver: Solver = model.solver
+    own: Fidelity = module.FIDELITY
     parts = [f"### `{component}/{fidelity}`\n", _docstring(module)]
     if model.of_role("state"):
-        parts.append(f"Solver: {solver.method}, step {_number(solver.step)} s.\n")
+        parts.append(f"Solver: {own.solver.method}, step {_number(own.solver.step)} s.\n")
     if model.clocks:
         parameters = model.of_role("parameter")
         symbols = ca.vertcat(*[v.symbol for v in parameters])
@@ -151,8 +151,7 @@ def _fidelity(component: str, fidelity: str, module: Any) -> str:
             for clock, period in zip(model.clocks, found.tolist(), strict=True)
         )
         parts.append(f"Sample clocks: {listed}.\n")
-    slots: dict[str, str] = getattr(module, "SLOTS", {})
-    for slot, default in slots.items():
+    for slot, default in own.slots.items():
         parts.append(f"Slot `{slot}`: `{default}` unless the variant names another.\n")
     parts.append(_table(_SYMBOL_HEAD, _symbols(model.variables.values())))
     rows = [

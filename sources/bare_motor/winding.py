@@ -9,15 +9,14 @@ Source: Leonhard, Control of Electrical Drives, 2001, ch. 5.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..dc_motor import CURRENT, W
 from ..dc_motor.machine import machine
 from ..model import Model
 from . import U_SET
 
-LEVEL = 0
 # L-stable: the winding's time constant may be below the step.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -12,15 +12,14 @@ Source: digital twin paper, block CasterWheel; Johnson, Contact Mechanics, 1985,
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import contact
 from ..laws.floor import MU, REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .fork import fork
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 C_H = Quantity(
     "c_h",
     "m/(N.s)",

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from . import (
     F_N,
@@ -37,7 +38,7 @@ from . import (
     W,
 )
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
 from . import commands, deliver
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2)
 SAMPLES = 64
 T_D = Quantity("t_d", "s", "delay", 0.03, minimum=0.0, maximum=100.0, variability="fixed")
 PERIOD = Quantity(

@@ -20,14 +20,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from . import B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, virtual_wheels
 
-LEVEL = 0
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 2e-3))
 
 I_RIGHT = Quantity(
     "i_right",

@@ -26,14 +26,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import X_V, B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, two_wheel_motion
 
-LEVEL = 1
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 2e-3))
 
 SLIP_A = Quantity(
     "slip_a", "m", "shift of the outer virtual wheel at equal speeds", start=0.0280, nominal=0.01

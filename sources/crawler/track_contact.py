@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import planar_body
 from ..laws.planar_frame import rotated
 from ..model import SX, Model
@@ -45,8 +45,7 @@ from .pose import (
     virtual_wheels,
 )
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 0.02, 1e-6)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 0.02, 1e-6))
 """Friction at rest decays within 0.2 ms; only the error-controlled solver steps over it cheaply."""
 
 A = Quantity(

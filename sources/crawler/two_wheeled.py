@@ -15,14 +15,13 @@ Source: crawler paper, Eq 18, 19 and 29 (sign corrected, see README).
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import X_V, B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, two_wheel_motion
 
-LEVEL = 0
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 2e-3))
 
 E_RIGHT = Quantity(
     "e_right",

@@ -13,16 +13,16 @@ Source: rig sheet mobile_manipulator: bandwidth 2 kHz, mean over the last 10 ms.
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
 from . import I_MEAS, SOLVER, I, low_pass
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2, solver=SOLVER)
 SAMPLES = 10  # of the charge per window
 WINDOW = Quantity("window", "s", "duration T of the mean", 0.01, minimum=1e-6, variability="fixed")
 Q = Quantity("Q", "C", "charge: integral of the filtered current")
-__all__ = ["SOLVER", "equations"]
 
 
 def equations(m: Model) -> None:

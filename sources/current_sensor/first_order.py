@@ -11,11 +11,11 @@ Source: digital twin paper, current sensor block.
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from . import I_MEAS, SOLVER, I, low_pass
 
-LEVEL = 1
-__all__ = ["SOLVER", "equations"]
+FIDELITY = Fidelity(level=1, solver=SOLVER)
 
 
 def equations(m: Model) -> None:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from . import (
     ACC_MAX,
@@ -47,10 +47,9 @@ from . import (
 )
 from .machine import machine, sensors
 
-LEVEL = 1
 # Current loops of some 1000 rad/s; effects on the winding (brushes) can be much faster than that.
 # The limits make kinks; a fixed step would miss them, or be short all the time.
-SOLVER = Solver("rodas3_adaptive", 1e-3, 3e-5)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3_adaptive", 1e-3, 3e-5))
 BAND = 0.02
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import (
@@ -39,8 +39,7 @@ from . import (
     W,
 )
 
-LEVEL = 0
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 K_W = Quantity("k_w", "N.m.s/rad", "stiffness of the servo", start=1.0, minimum=1e-9)
 
 

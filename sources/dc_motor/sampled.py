@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Clock, Model
 from ..quantity import Quantity
 from . import (
@@ -48,9 +48,8 @@ from . import (
 )
 from .machine import machine, sensors
 
-LEVEL = 2
 # One step per tick of the current loop; L-stable, because effects on the winding can be stiff.
-SOLVER = Solver("rodas3", 5e-5)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3", 5e-5))
 T_SPEED = Quantity(
     "T_speed", "s", "period of the speed loop", start=5e-4, minimum=1e-6, variability="fixed"
 )

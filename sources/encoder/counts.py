@@ -22,15 +22,14 @@ from typing import Any
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
 from . import PHI, PHI_MEAS, W_MEAS, W
 
 SX = Any
-LEVEL = 1
-SOLVER = Solver("rk4", step=1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", step=1e-3))
 SAMPLES = 10  # of the angle per window
 
 N = Quantity("n", "1", "counts per revolution of the shaft", 4096.0, minimum=1.0)

@@ -9,10 +9,11 @@ Source: digital twin paper, encoder block (gain 1).
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from . import PHI, PHI_MEAS, W_MEAS, W
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

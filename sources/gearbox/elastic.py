@@ -21,13 +21,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ETA, FLANGE_A, FLANGE_B, J_A, J_B, P_0, RATIO, TAU_A, TAU_B, W_A, W_B, B
 
-LEVEL = 2
-SOLVER = Solver("rodas3", 1e-4)
 K = Quantity(
     "k", "N.m/rad", "torsional stiffness, seen at flange b", start=6000.0, minimum=1e-6, nominal=1e3
 )
@@ -45,9 +43,12 @@ TWIST = Quantity(
 )
 ROTOR_SPEED = Quantity("rotor_speed", "rad/s", "state: speed of the rotor", nominal=100.0)
 SMALLEST_ROTOR = 1e-9
-STIFF = K
-LIMITS = {"ratio": {"signed": 0.0, "P_0": P_0.start}, "lossy": {"signed": 1.0}}
-"""Fidelities that an infinite stiffness gives, and what has to be set for that."""
+FIDELITY = Fidelity(
+    level=2,
+    solver=Solver("rodas3", 1e-4),
+    stiff=K,
+    limits={"ratio": {"signed": 0.0, "P_0": P_0.starts()[0]}, "lossy": {"signed": 1.0}},
+)
 
 
 def equations(m: Model) -> None:

@@ -14,14 +14,13 @@ Source: digital twin paper (gearbox block of the UR5: ratio times efficiency).
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from . import ETA
 from .rigid import rigid
 
-LEVEL = 0
 # No states of its own; bristles and angles of effects are stiff.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from .load import rotation
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 MASS = Quantity("m", "kg", "eccentric mass", start=1.0, minimum=0.0)
 DISTANCE = Quantity("l", "m", "distance of its centre from the axis", start=0.1, minimum=0.0)
 GRAVITY = Quantity("g", "m/s2", "gravity across the axis", start=9.81, minimum=0.0)

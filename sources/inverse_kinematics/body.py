@@ -9,10 +9,11 @@ Source: digital twin paper, Eq 1 in body form.
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from . import PHI_D, V_D, W_D, XD_D, YD_D, motor_speeds
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from . import PHI_D, V_D, W_D, XD_D, YD_D, motor_speeds
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 
 
 def equations(m: Model) -> None:

@@ -17,12 +17,13 @@ import math
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
 from . import Q_HOLD, RAMP, T_START
 from .path import output_path, window
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2)
 LINES = 5
 AMPLITUDE = Quantity(
     "amplitude", "rad", "sums of the amplitudes of a joint's sines", start=0.5, size=6

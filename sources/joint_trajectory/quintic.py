@@ -9,12 +9,13 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control, 2009, ch. 4
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
 from . import Q_HOLD, T_START
 from .path import output_path, smooth
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 Q_START = Quantity("q_start", "rad", "angles before the move", start=Q_HOLD.start, size=6)
 Q_END = Quantity(
     "q_end",

@@ -15,12 +15,13 @@ import math
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
 from . import Q_HOLD, RAMP, T_START
 from .path import output_path, window
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 AMPLITUDE = Quantity(
     "amplitude",
     "rad",

@@ -13,12 +13,13 @@ Source: rig sheet crawler; crawler paper (resolution 0.02 mm).
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..laws.noise import RANDOM, Random, seed_quantity
 from ..model import Model
 from ..quantity import Quantity
 from . import MARKERS, X_M, Y_M, markers
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 T = Quantity("T", "s", "sample period", 0.02, minimum=1e-6, variability="fixed")
 SIGMA = Quantity("sigma", "m", "standard deviation of each coordinate", 1e-4, minimum=0.0)
 DRAWN = Quantity("drawn", "1", "noise of the present sample", size=2 * MARKERS)

@@ -9,10 +9,11 @@ Source: rigid-body geometry; crawler paper (markers M1 to M5).
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from . import X_M, Y_M, markers
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
 from ..model import Model
@@ -45,8 +45,7 @@ from . import (
     Y,
 )
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 FRONT = ca.DM([1, 1, -1, -1])
 LEFT = ca.DM([1, -1, 1, -1])
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from ..wheel_contact import R
@@ -46,8 +46,7 @@ from . import (
 from .mount import read_mount, write_planar_motion
 from .wheels import wheel_parameter
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-3))
 J_EQ = Quantity(
     "J_eq",
     "kg.m2",

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..declarations import ModelError
 from ..laws import planar_body
 from ..laws.symmetric import solve
@@ -59,9 +59,11 @@ from .body import (
 from .mount import Mount, read_mount, write_planar_motion
 from .wheels import Drive, Places, add_wheels, read_caster_mass, read_places, write_wheels
 
-LEVEL = 1
-SOLVER = Solver("rosw3_adaptive", 1e-3, 1e-5)
-SLOTS = {"wheel_contact": "stick_slip", "caster": "swivel"}
+FIDELITY = Fidelity(
+    level=1,
+    solver=Solver("rosw3_adaptive", 1e-3, 1e-5),
+    slots={"wheel_contact": "stick_slip", "caster": "swivel"},
+)
 PRELOAD = Quantity(
     "preload", "N", "load of a drive wheel that does not depend on the weight", minimum=0.0
 )

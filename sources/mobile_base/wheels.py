@@ -205,7 +205,7 @@ def add_wheels(
     lift, torques, speeds, angles, psi = [], [], [], [], []
 
     slot = m.slots["wheel_contact"]
-    component, equations, _ = fidelity("wheel_contact", slot)
+    component, equations = fidelity("wheel_contact", slot)
     values = part_values(m, "wheel_contact")
     for name, side, tau, added, drive in (
         ("left", 1, TAU_L, J_L, drives[0]),
@@ -242,7 +242,7 @@ def add_wheels(
         angles.append(out["phi"])
 
     slot = m.slots["caster"]
-    component, equations, _ = fidelity("caster", slot)
+    component, equations = fidelity("caster", slot)
     values = part_values(m, "caster")
     relief = ca.SX.zeros(3, 3)
     for (name, _, _), (p_x, p_y), load, torque in zip(

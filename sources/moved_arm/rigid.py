@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.rigid_chain import Chain, Posture, standard_dh
 from ..model import SX, Model
 from . import (
@@ -47,9 +47,8 @@ from . import (
     Q,
 )
 
-LEVEL = 0
 # No states of its own; bristles that stick within 0.1 mrad need short steps.
-SOLVER = Solver("rodas3", 1e-4)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-4))
 
 
 def chain(m: Model) -> Chain:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.contact import stick_slip
 from ..laws.planar_frame import rotated
@@ -33,8 +33,7 @@ from .rigid_body import (
     velocity_forces,
 )
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 5e-3, 1e-6)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 5e-3, 1e-6))
 
 MU_S = Quantity("mu_s", "1", "static friction coefficient on the floor", start=0.35, minimum=1e-3)
 MU_D = Quantity("mu_d", "1", "sliding friction coefficient on the floor", start=0.35, minimum=0.0)

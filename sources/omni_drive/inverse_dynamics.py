@@ -15,14 +15,13 @@ simulator).
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..omni_base import STEERING_ANGLE
 from ..omni_base.rigid_body import joint_map, rotation
 from .torques import least_torques, output_torques, read_base, read_signals
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from .torques import least_torques, output_torques, read_base, read_signals
 
-LEVEL = 1
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-3))
 KP = Quantity(
     "Kp", "1/s2", "proportional gains for x, y and heading", 75.0, minimum=0.0, nominal=50.0, size=3
 )

@@ -21,14 +21,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
 from ..model import Model
 from . import ALPHA, ARM, LOAD, PHI, POSE_PHI, POSE_X, POSE_Y, V_X, V_Y, W_Z, R, W, X, Y
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
 
 def equations(m: Model) -> None:

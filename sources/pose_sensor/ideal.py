@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from . import PHI_MEAS, VALID, X_MEAS, Y_MEAS, Z_MEAS, body_pose
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

@@ -19,13 +19,14 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..laws.noise import RANDOM, Random, seed_quantity
 from ..laws.planar_frame import rotated
 from ..model import Model
 from ..quantity import Quantity
 from . import PHI_MEAS, VALID, X_MEAS, Y_MEAS, Z_MEAS, body_pose
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 
 T = Quantity("T", "s", "sample period", 0.01, minimum=1e-6, variability="fixed")
 SIGMA_XY = Quantity("sigma_xy", "m", "standard deviation of x and y", minimum=0.0)

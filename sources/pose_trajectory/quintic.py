@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..joint_trajectory.path import smooth
 from ..model import Model
 from ..quantity import Quantity
 from . import T_START, output_motion, start_pose
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 DX = Quantity("dx", "m", "move along the world's x axis", start=1.5)
 DY = Quantity("dy", "m", "move along the world's y axis", start=0.5)
 DTHETA = Quantity("dtheta", "rad", "turn, positive to the left", start=1.0)

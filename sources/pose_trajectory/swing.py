@@ -16,12 +16,13 @@ import math
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..joint_trajectory.path import window
 from ..model import Model
 from ..quantity import Quantity
 from . import T_START, output_motion, start_pose
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 A_X = Quantity("A_x", "m", "amplitude along the world's x axis", start=1.0)
 A_Y = Quantity("A_y", "m", "amplitude along the world's y axis", start=0.5)
 A_THETA = Quantity("A_theta", "rad", "amplitude of the heading", start=0.5)

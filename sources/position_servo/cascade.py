@@ -19,14 +19,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import PHI, Q_REF, SHAFT, T_LOOP, TAU, U_HELD, U, W
 
-LEVEL = 0
 # No states of its own; those of effects (lags) may be stiff.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 U_ADD = Quantity("u_add", "V", "set value added behind the loops")
 K_P = Quantity("K_p", "1/s", "gain of the position loop", start=100.0, minimum=0.0)
 K_V = Quantity("K_v", "V.s/rad", "gain of the speed loop", start=0.1, minimum=0.0)

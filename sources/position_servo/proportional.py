@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import PHI, Q_REF, SHAFT, T_LOOP, TAU, U_HELD, U, W
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 U_SUPPLY = Quantity("u_supply", "V", "voltage of the supply", start=7.4, nominal=10.0)
 ENABLE = Quantity("enable", "1", "above 0.5: the bridge is on", start=1.0)
 K_D = Quantity("k_d", "1/rad", "duty per position error", start=1.0, minimum=0.0)

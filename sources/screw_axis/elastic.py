@@ -19,13 +19,12 @@ import math
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ANGLE, F_0, F_C, F_V, FLANGE, LEAD, MASS, PHI, SPEED, TAU, V_0, X_0, W, X
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 2.5e-4)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 2.5e-4))
 SHARE = Quantity(
     "share", "1", "part of the moving mass that turns with the rotor", start=0.3, minimum=1e-3,
     maximum=0.999,

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D
 
-LEVEL = 2
-__all__ = ["SOLVER", "equations"]
+FIDELITY = Fidelity(level=2, solver=SOLVER)
 
 
 def equations(m: Model) -> None:

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
 from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D, profile
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1, solver=SOLVER)
 CRAB = Quantity("crab", "rad", "angle from the set heading to the course, positive to the left")
-__all__ = ["SOLVER", "equations"]
 
 
 def equations(m: Model) -> None:

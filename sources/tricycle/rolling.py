@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from . import PHI, POSE_PHI, POSE_X, POSE_Y, RATIO, STEER, W_Z, L, R, V, W, X, Y
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
 
 def equations(m: Model) -> None:

@@ -17,15 +17,14 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 5
 # The last link on its gear swings at 1 kHz, sqrt(K/J) = 6e3 1/s; RK4 is stable up to 2.8e4 1/s.
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=5, solver=Solver("rk4", 1e-4))
 K = Quantity(
     "K",
     "N.m/rad",

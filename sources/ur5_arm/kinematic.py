@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..laws.rigid_chain import Posture
 from ..model import Model
 from ..quantity import Quantity
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, chain, joint_efforts, output_motion, output_wrench, read_mount
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 J_LINK = Quantity(
     "J_link",
     "kg.m2",

@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 1
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -19,13 +19,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import joint_efforts, links, move_mount, output_motion, output_wrench, read_mount
 
-LEVEL = 4
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=4, solver=Solver("rk4", 1e-3))
 
 
 def equations(m: Model) -> None:

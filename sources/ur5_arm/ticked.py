@@ -20,14 +20,13 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 2
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=2, solver=Solver("rk4", 1e-3))
 T = Quantity("T", "s", "period of the ticks", start=5e-4, minimum=1e-6, variability="fixed")
 HELD_SPEED = Quantity("held_speed", "rad/s", "joint speeds from one tick to the next", size=6)
 HELD_ACCELERATION = Quantity(

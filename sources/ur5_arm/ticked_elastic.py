@@ -25,15 +25,13 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 from .ticked import HELD_ACCELERATION, HELD_SPEED, T
 
-LEVEL = 3
-SOLVER = Solver("rk4", 1e-3)
 COMPLIANCES = tuple(3e-5 * 1.5**k for k in range(12))
 """Compliances of gears, 3e-5 to 2.6e-3 rad/(N.m), close enough together that the oscillation of a
 damped joint at one of them resembles that in between."""
@@ -65,9 +63,14 @@ HELD_RATE = Quantity("held_rate", "rad/s", "rates of the twist from one tick to 
 HELD_TWISTING = Quantity(
     "held_twisting", "rad/s2", "accelerations of the twist at the last tick", size=6
 )
-NAME, SOFT, PLACES = "elastic", (C, T_D), tuple(f"joint_{i + 1}" for i in range(6))
-LIMITS: dict[str, dict[str, float]] = {"ticked": {}, "ticked_elastic": {}}
-"""Fidelities that no compliance at an element gives, and what has to be set for that."""
+FIDELITY = Fidelity(
+    level=3,
+    solver=Solver("rk4", 1e-3),
+    limits={"ticked": {}, "ticked_elastic": {}},
+    soft=(C, T_D),
+    called="elastic",
+    places=tuple(f"joint_{i + 1}" for i in range(6)),
+)
 J_LEAST = (0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4)
 """Least inertia [kg.m2] that a joint has to move, all others free, in any pose of the UR5."""
 NO_SPRING = 0.01

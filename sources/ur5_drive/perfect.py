@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import ETA, J_B, J_M, JOINT, K_T, R_A, TAU, I, N, U
 from .gearmotor import effort, output_current, read
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-4))
 K = Quantity(
     "k",
     "N.m/rad",

@@ -18,15 +18,14 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from . import INTEGRAL, KD, KI, KP, U_MAX
 from .gearmotor import gear, read, winding
 
-LEVEL = 3
 # The 2 kHz sensor is the fastest: 1.26 time constants per step, where RK4 is stable up to 2.8.
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=3, solver=Solver("rk4", 1e-4))
 T = Quantity("T", "s", "period of the servo", start=5e-4, minimum=1e-6, variability="fixed")
 VOLTAGE = Quantity("voltage", "V", "terminal voltages, held by the servo", size=6, nominal=10.0)
 MEAN_CURRENT = Quantity("mean_current", "A", "mean currents of the present period", size=6)

@@ -18,14 +18,13 @@ import math
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from . import INTEGRAL, KD, KI, KP, U_MAX
 from .gearmotor import Servo, gear, read, winding
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 T_F = Quantity(
     "T_f", "s", "filter time of the derivative", start=1 / (2 * math.pi * 400), minimum=1e-6
 )

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.bristle import STICK
 from ..laws.contact import SMALL
 from ..laws.floor import MU_D, MU_S
@@ -28,8 +28,7 @@ from ..model import SX, Model
 from ..quantity import Quantity
 from .wheel import Contact, wheel
 
-LEVEL = 4
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=4, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 V_S = Quantity(
     "v_s", "m/s", "slip velocity over which static friction falls", start=0.02, minimum=1e-6
 )

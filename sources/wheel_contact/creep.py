@@ -14,15 +14,14 @@ Source: Johnson, Contact Mechanics, 1985, ch. 8 (creep of rolling bodies); the l
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import contact
 from ..laws.floor import MU
 from ..model import SX, Model
 from .rolling import creep_coefficients
 from .wheel import Contact, wheel
 
-LEVEL = 1
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 
 
 def equations(m: Model) -> None:

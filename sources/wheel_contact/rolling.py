@@ -12,15 +12,14 @@ Source: digital twin paper (pure rolling); Johnson, Contact Mechanics, 1985, ch.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.contact import creep_coefficient
 from ..laws.floor import REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .wheel import Contact, wheel
 
-LEVEL = 0
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 C_X = Quantity(
     "c_x",
     "m/(N.s)",

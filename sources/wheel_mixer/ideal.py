@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from . import TRACK, V_SET, W_L, W_R, W_SET, R
 
-LEVEL = 0
-SOLVER = Solver("rodas3_adaptive", 0.05, 1e-6)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3_adaptive", 0.05, 1e-6))
 """Implicit, so that a short lag needs no short steps."""
 
 
