@@ -19,7 +19,7 @@ import casadi as ca
 
 from .component import Component, Fidelity
 from .effect import KINDS, Effect
-from .model import Balance, Model, Variable, misfit
+from .model import Balance, Declared, Model, misfit
 from .packaging.catalog import names
 from .quantity import Quantity
 from .variant import build_model, components, device_values, devices, effects, fidelities
@@ -75,9 +75,9 @@ def _docstring(module: Any) -> str:
     return inspect.cleandoc(module.__doc__ or "") + "\n"
 
 
-def _symbols(variables: Iterable[Variable]) -> list[tuple[str, ...]]:
+def _symbols(variables: Iterable[Declared]) -> list[tuple[str, ...]]:
     """Rows of a symbol table; the elements of a vector share one row."""
-    groups: dict[str, list[Variable]] = {}
+    groups: dict[str, list[Declared]] = {}
     for variable in variables:
         groups.setdefault(re.sub(r"\[\d+\]$", "", variable.name), []).append(variable)
     rows = []

@@ -19,7 +19,7 @@ from cosim.spec.variant import Name
 from .component import Component, Fidelity
 from .effect import Effect, Law
 from .model import Attachment, Model, ModelError
-from .units import parse
+from .units import coherent
 
 _ROOT = Path(__file__).parent
 _OTHER_FOLDERS = ("effects", "laws", "packaging", "tools")
@@ -175,7 +175,7 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
             raise ValueError(
                 f"{available[device].name}: {name!r} lacks {', '.join(sorted(missing))}"
             )
-        parse(entry["unit"])
+        coherent(entry["unit"])
         values[name] = Origin(
             tuple(entry["value"]) if isinstance(entry["value"], list) else entry["value"],
             entry["unit"],
@@ -238,7 +238,8 @@ def build_model(name: Name | str) -> Model:
         declared = next(
             (v.quantity for n, v in model.variables.items() if n.partition("[")[0] == key), None
         )
-        if declared is not None and parse(declared.unit).exponents != parse(origin.unit).exponents:
+        unit = coherent(origin.unit)
+        if declared is not None and coherent(declared.unit).exponents != unit.exponents:
             raise ValueError(
                 f"device file {name.device or component.device}.toml gives {key!r} in "
                 f"{origin.unit}, but it is declared in {declared.unit}"
