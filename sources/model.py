@@ -163,6 +163,10 @@ class Model:
         """Declare states, in this order; `x = m.states(TWIST)` gives `x.twist`."""
         return Symbols({item.name: self.state(item) for item in quantities})
 
+    def discretes(self, *quantities: Quantity) -> Symbols:
+        """Declare sampled values, in this order; `z = m.discretes(HELD)` gives `z.held`."""
+        return Symbols({item.name: self.discrete(item) for item in quantities})
+
     def input_rate(self, symbol: SX, rate: SX) -> None:
         """Say how an input moves that others of the inputs determine, e.g. an angle by its speed.
 

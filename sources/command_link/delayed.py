@@ -35,7 +35,7 @@ PERIOD = Quantity(
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    t_d = m.parameter(T_D)
-    grid = ca.fmax(m.parameter(PERIOD), t_d / (SAMPLES - 2))
+    p = m.parameters(T_D, PERIOD)
+    grid = ca.fmax(p.period, p.t_d / (SAMPLES - 2))
     past = History(m, "command", commands(m), unit="1", period=grid, slots=SAMPLES)
-    deliver(m, past.at(t_d))
+    deliver(m, past.at(p.t_d))

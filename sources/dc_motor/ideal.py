@@ -18,26 +18,10 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import dc_motor as qs
 from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import (
-    ACC_MAX,
-    B_M,
-    I_MAX,
-    I_MEASURED,
-    I_SET,
-    K_T,
-    R_A,
-    SET_SPEED,
-    SHAFT,
-    T_REF,
-    TAU,
-    W_REF,
-    I,
-    U,
-    W,
-)
 
 FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 K_W = Quantity("k_w", "N.m.s/rad", "stiffness of the servo", start=1.0, minimum=1e-9)
@@ -45,30 +29,28 @@ K_W = Quantity("k_w", "N.m.s/rad", "stiffness of the servo", start=1.0, minimum=
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, speed = m.input(W_REF), m.input(W)
-    stiffness, constant, friction = m.parameter(K_W), m.parameter(K_T), m.parameter(B_M)
-    resistance, i_max = m.parameter(R_A), m.parameter(I_MAX)
-    acc_max, settle = m.parameter(ACC_MAX), m.parameter(T_REF)
+    u = m.inputs(qs.W_REF, qs.W)
+    p = m.parameters(K_W, qs.K_T, qs.B_M, qs.R_A, qs.I_MAX, qs.ACC_MAX, qs.T_REF)
+    x = m.states(qs.SET_SPEED)
 
-    set_speed = m.state(SET_SPEED)
-    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=speed)
-    link = m.balance("command", "signal", unit="rad/s", value=command)
+    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=u.w)
+    link = m.balance("command", "signal", unit="rad/s", value=u.w_ref)
     m.derivative(
-        set_speed,
-        ca.fmax(-acc_max, ca.fmin((command + link.effort - set_speed) / settle, acc_max)),
+        x.set_speed,
+        ca.fmax(-p.acc_max, ca.fmin((u.w_ref + link.effort - x.set_speed) / p.T_ref, p.acc_max)),
     )
-    limit = constant * i_max
-    servo = ca.fmax(-limit, ca.fmin(stiffness * (set_speed - speed - sensor.effort), limit))
-    shaft = m.balance("shaft", "rotation", velocity=speed, load=servo)
-    torque = servo - friction * speed + shaft.effort
-    current = servo / constant
-    voltage = resistance * current + constant * speed
-    m.output(TAU, torque)
-    m.output(I, current)
-    m.output(U, voltage)
-    m.output(I_SET, current)
-    m.output(I_MEASURED, current)
-    m.port(SHAFT, torque, speed)
+    limit = p.K_t * p.i_max
+    servo = ca.fmax(-limit, ca.fmin(p.k_w * (x.set_speed - u.w - sensor.effort), limit))
+    shaft = m.balance("shaft", "rotation", velocity=u.w, load=servo)
+    torque = servo - p.b_m * u.w + shaft.effort
+    current = servo / p.K_t
+    voltage = p.R_a * current + p.K_t * u.w
+    m.output(qs.TAU, torque)
+    m.output(qs.I, current)
+    m.output(qs.U, voltage)
+    m.output(qs.I_SET, current)
+    m.output(qs.I_MEASURED, current)
+    m.port(qs.SHAFT, torque, u.w)
     m.supply(voltage * current)
-    m.loss("winding", resistance * current**2)
-    m.loss("bearings", friction * speed**2)
+    m.loss("winding", p.R_a * current**2)
+    m.loss("bearings", p.b_m * u.w**2)

@@ -27,10 +27,10 @@ HANGING = Quantity("phi_0", "rad", "angle at which the mass hangs: the zero of t
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    moment = m.parameter(MASS) * m.parameter(GRAVITY) * m.parameter(DISTANCE)
-    hanging = m.parameter(HANGING)
+    p = m.parameters(MASS, GRAVITY, DISTANCE, HANGING)
+    moment = p.m * p.g * p.l
 
     def gravity(angle: SX) -> tuple[SX, SX]:
-        return -moment * ca.sin(angle - hanging), moment * (1 - ca.cos(angle - hanging))
+        return -moment * ca.sin(angle - p.phi_0), moment * (1 - ca.cos(angle - p.phi_0))
 
     rotation(m, gravity)

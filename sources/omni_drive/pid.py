@@ -41,16 +41,16 @@ CORRECTION = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     signals, base = read_signals(m), read_base(m)
-    correction = m.state(CORRECTION)
+    p = m.parameters(KI, KD, KP, TAU_MAX)
+    x = m.states(CORRECTION)
     error = signals.pose_set - signals.pose
-    m.derivative(correction, m.parameter(KI) * error)
+    m.derivative(x.correction, p.Ki * error)
     acceleration = (
         signals.acceleration_set
-        + m.parameter(KD) * (signals.rate_set - signals.rate)
-        + m.parameter(KP) * error
-        + correction
+        + p.Kd * (signals.rate_set - signals.rate)
+        + p.Kp * error
+        + x.correction
     )
-    limit = m.parameter(TAU_MAX)
     wanted = least_torques(base, signals.pose[2], signals.beta, signals.rate_set, acceleration)
-    tau_beta, tau_phi = (ca.fmax(-limit, ca.fmin(torque, limit)) for torque in wanted)
+    tau_beta, tau_phi = (ca.fmax(-p.tau_max, ca.fmin(torque, p.tau_max)) for torque in wanted)
     output_torques(m, signals, signals.beta, (tau_beta, tau_phi))

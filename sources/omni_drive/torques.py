@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import omni_drive as qs
 from ..model import SX, Model
 from ..omni_base import (
     BETA,
@@ -42,7 +43,6 @@ from ..omni_base.rigid_body import Geometry, Masses
 from ..pose_trajectory import SET_MOTION
 from ..quantity import Quantity
 from ..variant import device_values, devices
-from . import BETA_SET, ROLLING, STEERING
 
 
 class Signals(NamedTuple):
@@ -69,17 +69,18 @@ class BaseModel(NamedTuple):
 def read_signals(m: Model) -> Signals:
     """Declare the inputs."""
     motion = [ca.vertcat(*(m.input(quantity) for quantity in row)) for row in SET_MOTION]
-    pose = ca.vertcat(m.input(X), m.input(Y), m.input(THETA))
-    rate = ca.vertcat(m.input(X_RATE), m.input(Y_RATE), m.input(THETA_RATE))
+    u = m.inputs(X, Y, THETA, X_RATE, Y_RATE, THETA_RATE, BETA, BETA_RATE, PHI_RATE)
+    pose = ca.vertcat(u.x, u.y, u.theta)
+    rate = ca.vertcat(u.xd, u.yd, u.thetad)
     return Signals(
         motion[0],
         motion[1],
         motion[2],
         pose,
         rate,
-        m.input(BETA),
-        m.input(BETA_RATE),
-        m.input(PHI_RATE),
+        u.beta,
+        u.betad,
+        u.phid,
     )
 
 
@@ -123,10 +124,10 @@ def least_torques(
 
 def output_torques(m: Model, signals: Signals, beta_set: SX, torques: tuple[SX, SX]) -> None:
     """Open the balances of the axles, output the torques and bind the ports."""
-    m.output(BETA_SET, beta_set)
+    m.output(qs.BETA_SET, beta_set)
     for name, quantity, port, speed, torque in (
-        ("steering", TAU_BETA, STEERING, signals.beta_rate, torques[0]),
-        ("rolling", TAU_PHI, ROLLING, signals.phi_rate, torques[1]),
+        ("steering", TAU_BETA, qs.STEERING, signals.beta_rate, torques[0]),
+        ("rolling", TAU_PHI, qs.ROLLING, signals.phi_rate, torques[1]),
     ):
         axle = m.balance(name, "rotation", velocity=speed, load=torque)
         m.port(port, m.output(quantity, torque + axle.effort), speed)

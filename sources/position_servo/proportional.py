@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import position_servo as qs
 from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import PHI, Q_REF, SHAFT, T_LOOP, TAU, U_HELD, U, W
 
 FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 U_SUPPLY = Quantity("u_supply", "V", "voltage of the supply", start=7.4, nominal=10.0)
@@ -36,49 +36,49 @@ I = Quantity("i", "A", "winding current, positive drives forward")  # noqa: E741
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, angle, speed = m.input(Q_REF), m.input(PHI), m.input(W)
-    m.input_rate(angle, speed)
-    supply, enable = m.input(U_SUPPLY), m.input(ENABLE)
-    command = command + m.balance("command", "signal", unit="rad", value=command).effort
-    sensed = angle + m.balance("angle_sensor", "signal", unit="rad", value=angle).effort
-    tick = m.clock("loops", m.parameter(T_LOOP))
-    held = m.discrete(U_HELD)
-    duty = ca.fmax(-1, ca.fmin(m.parameter(K_D) * (command - sensed), 1))
-    m.update(tick, held, duty * supply)
+    u = m.inputs(qs.Q_REF, qs.PHI, qs.W, U_SUPPLY, ENABLE)
+    p = m.parameters(qs.T_LOOP, K_D, R_A, K_T)
+    z = m.discretes(qs.U_HELD)
+    m.input_rate(u.phi, u.w)
+    command = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
+    sensed = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
+    tick = m.clock("loops", p.T_loop)
+    held = z.u_held
+    duty = ca.fmax(-1, ca.fmin(p.k_d * (command - sensed), 1))
+    m.update(tick, held, duty * u.u_supply)
 
-    resistance, constant = m.parameter(R_A), m.parameter(K_T)
-    on = ca.if_else(enable > 0.5, 1.0, 0.0)
-    nominal = on * (held - constant * speed) / resistance
+    on = ca.if_else(u.enable > 0.5, 1.0, 0.0)
+    nominal = on * (held - p.K_t * u.w) / p.R_a
     # One constant for torque and back-EMF, whatever an effect does to it: their powers cancel.
     constant = (
-        constant
+        p.K_t
         + m.balance(
             "torque_constant",
             "coefficient",
             unit="N.m/A",
-            value=constant,
+            value=p.K_t,
             current=nominal,
-            speed=speed,
+            speed=u.w,
         ).effort
     )
-    plain = on * (held - constant * speed) / resistance
+    plain = on * (held - constant * u.w) / p.R_a
     winding = m.balance(
         "winding",
         "winding",
         current=plain,
-        speed=speed,
+        speed=u.w,
         voltage=held,
-        resistance=resistance,
+        resistance=p.R_a,
         emf_constant=constant,
     )
-    current = plain + on * winding.effort / resistance
-    shaft = m.balance("shaft", "rotation", velocity=speed, angle=angle, load=constant * current)
+    current = plain + on * winding.effort / p.R_a
+    shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi, load=constant * current)
     torque = constant * current + shaft.effort
-    m.output(TAU, torque)
-    m.output(U, held)
+    m.output(qs.TAU, torque)
+    m.output(qs.U, held)
     m.output(I, current)
-    m.port(SHAFT, torque, speed)
+    m.port(qs.SHAFT, torque, u.w)
     m.supply(on * held * current)
     # effects book their power at the current that flows without them: with no inductance there is
     # no other before they act; what they change of it is the winding's
-    m.loss("winding", resistance * current**2 - on * winding.effort * (current - plain))
+    m.loss("winding", p.R_a * current**2 - on * winding.effort * (current - plain))

@@ -19,10 +19,10 @@ import math
 
 import casadi as ca
 
+from .. import screw_axis as qs
 from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, F_0, F_C, F_V, FLANGE, LEAD, MASS, PHI, SPEED, TAU, V_0, X_0, W, X
 
 FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 2.5e-4))
 SHARE = Quantity(
@@ -37,37 +37,31 @@ CARRIAGE = Quantity("w_c", "rad/s", "state: speed of the carriage over r", nomin
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    torque = m.input(TAU)
-    radius = m.parameter(LEAD) / (2 * math.pi)
-    whole = m.parameter(MASS) * radius**2
-    rotor = m.parameter(SHARE) * whole
-    stiffness, damping = m.parameter(K), m.parameter(D)
-    angle, twist = m.state(ANGLE), m.state(TWIST)
-    speed, carriage = m.state(SPEED), m.state(CARRIAGE)
-    v, rate = radius * carriage, speed - carriage
-    viscous = m.parameter(F_V) * v
-    dry = m.parameter(F_C) * ca.tanh(v / m.parameter(V_0))
-    offset = m.parameter(F_0)
+    u = m.inputs(qs.TAU)
+    p = m.parameters(qs.LEAD, qs.MASS, SHARE, K, D, qs.F_V, qs.F_C, qs.V_0, qs.F_0, qs.X_0)
+    x = m.states(qs.ANGLE, TWIST, qs.SPEED, CARRIAGE)
+    radius = p.lead / (2 * math.pi)
+    whole = p.M * radius**2
+    rotor = p.share * whole
+    v, rate = radius * x.w_c, x.speed - x.w_c
+    viscous = p.F_v * v
+    dry = p.F_c * ca.tanh(v / p.v_0)
     spring = m.balance(
-        "spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+        "spring", "compliance", deflection=x.twist, rate=rate, stiffness=p.k, damping=p.d
     )
-    tau_s = stiffness * twist + damping * rate - spring.effort
-    turned = angle + m.parameter(X_0) / radius
-    shaft = m.balance("screw", "rotation", velocity=carriage, angle=turned - twist, load=tau_s)
-    motor = m.balance("rotor", "rotation", velocity=speed, angle=turned, load=torque)
-    m.derivative(angle, speed)
-    m.derivative(twist, rate)
-    m.derivative(speed, (torque - tau_s + motor.effort) / rotor)
-    m.derivative(
-        carriage, (tau_s + radius * (offset - viscous - dry) + shaft.effort) / (whole - rotor)
-    )
-    m.output(W, speed)
-    m.output(PHI, angle)
-    m.output(X, radius * angle)
-    m.port(FLANGE, torque, speed)
-    m.supply(offset * v)
-    m.stored_energy(
-        rotor * speed**2 / 2 + (whole - rotor) * carriage**2 / 2 + stiffness * twist**2 / 2
-    )
+    tau_s = p.k * x.twist + p.d * rate - spring.effort
+    turned = x.angle + p.x_0 / radius
+    shaft = m.balance("screw", "rotation", velocity=x.w_c, angle=turned - x.twist, load=tau_s)
+    motor = m.balance("rotor", "rotation", velocity=x.speed, angle=turned, load=u.tau)
+    m.derivative(x.angle, x.speed)
+    m.derivative(x.twist, rate)
+    m.derivative(x.speed, (u.tau - tau_s + motor.effort) / rotor)
+    m.derivative(x.w_c, (tau_s + radius * (p.F_0 - viscous - dry) + shaft.effort) / (whole - rotor))
+    m.output(qs.W, x.speed)
+    m.output(qs.PHI, x.angle)
+    m.output(qs.X, radius * x.angle)
+    m.port(qs.FLANGE, u.tau, x.speed)
+    m.supply(p.F_0 * v)
+    m.stored_energy(rotor * x.speed**2 / 2 + (whole - rotor) * x.w_c**2 / 2 + p.k * x.twist**2 / 2)
     m.loss("friction", (viscous + dry) * v)
-    m.loss("spring", damping * rate**2)
+    m.loss("spring", p.d * rate**2)

@@ -7,30 +7,10 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import ur5_arm as qs
 from ..laws.rigid_chain import Chain, ForwardDynamics, Posture, standard_dh, upper_triangle
 from ..laws.rotation import product, quaternion_rate, rotation_matrix, rotation_vector
 from ..model import SX, Model
-from . import (
-    ARM_BIAS,
-    ARM_INERTIA,
-    GRAVITY,
-    JOINT,
-    MOUNT_ACCELERATION,
-    MOUNT_ANGULAR_ACCELERATION,
-    MOUNT_FORCE,
-    MOUNT_MOMENT,
-    MOUNT_POSITION,
-    MOUNT_QUATERNION,
-    MOUNT_RATE,
-    MOUNT_ROTATION,
-    MOUNT_TRANSLATION,
-    MOUNT_VELOCITY,
-    QD,
-    TOOL_POSITION,
-    TOOL_ROTATION,
-    WRENCH,
-    Q,
-)
 
 
 class Mount(NamedTuple):
@@ -46,13 +26,21 @@ class Mount(NamedTuple):
 
 def read_mount(m: Model) -> Mount:
     """Declare the inputs that say how the mount moves."""
+    u = m.inputs(
+        qs.MOUNT_POSITION,
+        qs.MOUNT_QUATERNION,
+        qs.MOUNT_VELOCITY,
+        qs.MOUNT_RATE,
+        qs.MOUNT_ACCELERATION,
+        qs.MOUNT_ANGULAR_ACCELERATION,
+    )
     return Mount(
-        m.input(MOUNT_POSITION),
-        m.input(MOUNT_QUATERNION),
-        m.input(MOUNT_VELOCITY),
-        m.input(MOUNT_RATE),
-        m.input(MOUNT_ACCELERATION),
-        m.input(MOUNT_ANGULAR_ACCELERATION),
+        u.mount_position,
+        u.mount_quaternion,
+        u.mount_velocity,
+        u.mount_rate,
+        u.mount_acceleration,
+        u.mount_angular_acceleration,
     )
 
 
@@ -135,7 +123,8 @@ class Links:
 
 def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
     """Build the chain of the device and open the balances of gravity and of the tool."""
-    level = ca.vertcat(0, 0, -m.parameter(GRAVITY))
+    p = m.parameters(qs.GRAVITY)
+    level = ca.vertcat(0, 0, -p.gravity)
     tilted = level + m.balance("base", "gravity", value=level).effort
     rotation = rotation_matrix(mount.quaternion)
     gravity = rotation.T @ tilted
@@ -165,17 +154,17 @@ def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torqu
     position, _ = posture.flange()
     rotation = rotation_matrix(mount.quaternion)
     attitude = product(mount.quaternion, posture.flange_quaternion())
-    m.output(Q, q)
-    m.output(QD, qd)
-    m.output(TOOL_POSITION, mount.position + rotation @ position)
-    m.output(TOOL_ROTATION, rotation_vector(attitude))
-    m.port(JOINT, torque, qd)
+    m.output(qs.Q, q)
+    m.output(qs.QD, qd)
+    m.output(qs.TOOL_POSITION, mount.position + rotation @ position)
+    m.output(qs.TOOL_ROTATION, rotation_vector(attitude))
+    m.port(qs.JOINT, torque, qd)
 
 
 def output_wrench(m: Model, mount: Mount, inertia: SX, bias: SX, wrench: SX) -> None:
     """Output the wrench and what it consists of; bind the ports of the mount."""
-    m.output(WRENCH, wrench)
-    m.output(ARM_INERTIA, upper_triangle(inertia))
-    m.output(ARM_BIAS, bias)
-    m.port(MOUNT_TRANSLATION, m.output(MOUNT_FORCE, wrench[:3]), mount.velocity)
-    m.port(MOUNT_ROTATION, m.output(MOUNT_MOMENT, wrench[3:]), mount.rate)
+    m.output(qs.WRENCH, wrench)
+    m.output(qs.ARM_INERTIA, upper_triangle(inertia))
+    m.output(qs.ARM_BIAS, bias)
+    m.port(qs.MOUNT_TRANSLATION, m.output(qs.MOUNT_FORCE, wrench[:3]), mount.velocity)
+    m.port(qs.MOUNT_ROTATION, m.output(qs.MOUNT_MOMENT, wrench[3:]), mount.rate)

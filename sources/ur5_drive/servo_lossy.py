@@ -30,9 +30,9 @@ def equations(m: Model) -> None:
     """Collect the equations."""
     servo = read(m)
     coils = winding(m, servo.speed, control(m, servo))
-    blend = m.parameter(P_0)
+    p = m.parameters(P_0)
 
     def factor(eta: SX, power: SX) -> SX:
-        return eta ** ca.tanh(power / blend)
+        return eta ** ca.tanh(power / p.P_0)
 
     gear(m, servo, coils, factor)

@@ -35,12 +35,12 @@ C_Y = Quantity(
 
 def creep_coefficients(m: Model, c: Contact) -> tuple[SX, SX]:
     """Creep coefficients of a contact, with what effects add."""
-    rest, v_creep = m.parameter(REST), m.parameter(V_CREEP)
+    p = m.parameters(REST, V_CREEP)
 
     def coefficient(name: str, quantity: Quantity) -> SX:
         value = m.parameter(quantity)
         balance = m.balance(name, "coefficient", unit="m/(N.s)", value=value, speed=c.rolling)
-        return creep_coefficient(value, rest, c.rolling, v_creep) + balance.effort
+        return creep_coefficient(value, p.rest, c.rolling, p.v_creep) + balance.effort
 
     c_y = coefficient("creep_y", C_Y)
     return coefficient("creep_x", C_X), c_y
