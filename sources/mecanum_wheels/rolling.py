@@ -27,7 +27,7 @@ from .. import mecanum_wheels as qs
 from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
-from ..model import Model
+from ..model import SX, Model
 
 FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 FRONT = ca.DM([1, 1, -1, -1])
@@ -44,12 +44,13 @@ def equations(m: Model) -> None:
     drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(4), roller=p.load).effort
     cosine, sine = ca.repmat(ca.cos(p.gamma), 4), -FRONT * LEFT * ca.sin(p.gamma)
 
-    def rows(x: ca.SX, y: ca.SX) -> ca.SX:
+    def rows(x: SX, y: SX) -> SX:
         """(x, y) . v_i as rows on (v_x, v_y, w_z)."""
         return ca.horzcat(x, y, p_x * y - p_y * x)
 
     along, across = rows(cosine, sine), rows(-sine, cosine)
-    weight = p.load / (ca.sum1(p.load) / 4)
+    total: SX = ca.sum1(p.load)
+    weight = p.load / (total / 4)
     matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
     right = along.T @ (weight * cosine * p.r * w) - across.T @ (weight * drag * sine * p.r * w)
     v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, right))

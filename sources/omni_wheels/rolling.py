@@ -25,7 +25,7 @@ from .. import omni_wheels as qs
 from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
-from ..model import Model
+from ..model import SX, Model
 
 FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
@@ -40,7 +40,8 @@ def equations(m: Model) -> None:
     cosine, sine = ca.cos(p.alpha), ca.sin(p.alpha)
     along = ca.horzcat(-sine, cosine, ca.repmat(p.arm, 3))
     across = ca.horzcat(cosine, sine, ca.DM.zeros(3))
-    weight = p.load / (ca.sum1(p.load) / 3)
+    total: SX = ca.sum1(p.load)
+    weight = p.load / (total / 3)
     matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
     v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, along.T @ (weight * p.r * w)))
     x_rate, y_rate = rotated(x.pose_phi, v_x, v_y)
