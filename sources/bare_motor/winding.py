@@ -23,5 +23,5 @@ def equations(m: Model) -> None:
     """Collect the equations."""
     u = m.inputs(qs.U_SET, W)
     x = m.states(CURRENT)
-    command = u.u_set + m.balance("command", "signal", unit="V", value=u.u_set).effort
-    machine(m, x.current, x.current, command, u.w)
+    u_set = u.u_set + m.balance("command", "signal", unit="V", value=u.u_set).effort
+    machine(m, x.current, x.current, u_set, u.w)

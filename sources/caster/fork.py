@@ -86,35 +86,36 @@ def fork(m: Model, friction: Friction) -> None:
     swing = Swing(m.parameter)
     p = m.parameters(R, J_C, B_S, B_W, C_RR, W_RR)
     x = m.states(SPIN, SWIVEL_ANGLE, MOMENTUM)
+    w, psi = x.spin, x.swivel_angle
     trail, mass, moment, inertia = swing.trail, swing.mass, swing.moment, swing.inertia
 
     ratio = moment / inertia
-    h_x, h_y = ca.cos(x.swivel_angle), ca.sin(x.swivel_angle)
+    h_x, h_y = ca.cos(psi), ca.sin(psi)
     ahead, aside = h_x * u.v_x + h_y * u.v_y, h_x * u.v_y - h_y * u.v_x
     rate = swing.rate(x.momentum, aside)
     turning = rate - u.w_z
 
-    s_h, s_n = ahead - p.r * x.spin, aside - trail * rate
-    f_h, f_n = friction(s_h, s_n, u.f_n, p.r * x.spin, u.x_w, u.y_w)
+    s_h, s_n = ahead - p.r * w, aside - trail * rate
+    f_h, f_n = friction(s_h, s_n, u.f_n, p.r * w, u.x_w, u.y_w)
     m.loss("slip", -(f_h * s_h + f_n * s_n))
-    resistance = rolling_resistance(p.c_rr, u.f_n, p.r, x.spin, p.w_rr)
-    m.loss("rolling", resistance * x.spin)
+    resistance = rolling_resistance(p.c_rr, u.f_n, p.r, w, p.w_rr)
+    m.loss("rolling", resistance * w)
     m.loss("swivel", p.b_s * turning**2)
-    m.loss("bearing", p.b_w * x.spin**2)
+    m.loss("bearing", p.b_w * w**2)
 
-    swivel = m.balance("swivel", "rotation", velocity=turning, angle=x.swivel_angle, normal=u.f_n)
-    axle = m.balance("axle", "rotation", velocity=x.spin, normal=u.f_n, radius=p.r)
+    swivel = m.balance("swivel", "rotation", velocity=turning, angle=psi, normal=u.f_n)
+    axle = m.balance("axle", "rotation", velocity=w, normal=u.f_n, radius=p.r)
     floor = m.balance(
         "floor",
         "pivot",
         spin=rate,
-        rolling=ca.sqrt((p.r * x.spin) ** 2 + SMALL),
+        rolling=ca.sqrt((p.r * w) ** 2 + SMALL),
         normal=u.f_n,
     )
     hinge = swivel.effort - p.b_s * turning
     torque = hinge + floor.effort + u.tau_f - trail * f_n
-    m.derivative(x.spin, (axle.effort - p.r * f_h - p.b_w * x.spin - resistance) / p.J_c)
-    m.derivative(x.swivel_angle, turning)
+    m.derivative(w, (axle.effort - p.r * f_h - p.b_w * w - resistance) / p.J_c)
+    m.derivative(psi, turning)
     m.derivative(x.momentum, torque + moment * rate * ahead)
 
     relief = ratio * moment
@@ -124,14 +125,14 @@ def fork(m: Model, friction: Friction) -> None:
     f_y = m.output(qs.F_Y, along * h_y + across * h_x)
     m.output(qs.F_Z, u.f_n)
     m_z = m.output(qs.M_Z, -hinge)
-    m.output(qs.PSI, x.swivel_angle)
-    m.output(qs.W, x.spin)
+    m.output(qs.PSI, psi)
+    m.output(qs.W, w)
     m.output(qs.W_F, rate)
     m.output(qs.MASS, mass)
     m.output(qs.RELIEF, ca.vertcat(relief * h_y * h_y, -relief * h_x * h_y, relief * h_x * h_x))
     m.stored_energy(
         (mass * (u.v_x**2 + u.v_y**2) - relief * aside**2 + x.momentum**2 / inertia) / 2
-        + p.J_c * x.spin**2 / 2
+        + p.J_c * w**2 / 2
     )
     m.port(qs.PIVOT_X, f_x, u.v_x)
     m.port(qs.PIVOT_Y, f_y, u.v_y)

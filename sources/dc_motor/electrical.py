@@ -56,11 +56,12 @@ def equations(m: Model) -> None:
         qs.SPEED_FILTER,
         qs.SET_SPEED,
     )
-    sensed_current, sensed_speed, command = sensors(m, x.current, u.w, u.w_ref)
+    w_set = x.set_speed
+    i, w, w_ref = sensors(m, x.current, u.w, u.w_ref)
 
     m.derivative(
-        x.set_speed,
-        ca.fmax(-p.acc_max, ca.fmin((command - x.set_speed) / p.T_ref, p.acc_max)),
+        w_set,
+        ca.fmax(-p.acc_max, ca.fmin((w_ref - w_set) / p.T_ref, p.acc_max)),
     )
 
     def loop(error: SX, integral: SX, filtered: SX, gains: tuple[SX, SX, SX, SX], limit: SX) -> SX:
@@ -73,10 +74,10 @@ def equations(m: Model) -> None:
         return ca.fmax(-limit, ca.fmin(wanted, limit))
 
     gains = (p.Kp_v, p.Ki_v, p.Kd_v, p.T_fv)
-    e_v = x.set_speed - sensed_speed
+    e_v = w_set - w
     i_set = loop(e_v, x.speed_integral, x.speed_filter, gains, p.i_max)
     gains = (p.Kp_i, p.Ki_i, p.Kd_i, p.T_fi)
-    e_i = i_set - sensed_current
+    e_i = i_set - i
     u_a = loop(e_i, x.current_integral, x.current_filter, gains, p.u_max)
     m.output(qs.I_SET, i_set)
-    machine(m, x.current, sensed_current, u_a, u.w)
+    machine(m, x.current, i, u_a, u.w)

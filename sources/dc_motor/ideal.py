@@ -32,25 +32,26 @@ def equations(m: Model) -> None:
     u = m.inputs(qs.W_REF, qs.W)
     p = m.parameters(K_W, qs.K_T, qs.B_M, qs.R_A, qs.I_MAX, qs.ACC_MAX, qs.T_REF)
     x = m.states(qs.SET_SPEED)
+    w_set = x.set_speed
 
     sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=u.w)
     link = m.balance("command", "signal", unit="rad/s", value=u.w_ref)
     m.derivative(
-        x.set_speed,
-        ca.fmax(-p.acc_max, ca.fmin((u.w_ref + link.effort - x.set_speed) / p.T_ref, p.acc_max)),
+        w_set,
+        ca.fmax(-p.acc_max, ca.fmin((u.w_ref + link.effort - w_set) / p.T_ref, p.acc_max)),
     )
     limit = p.K_t * p.i_max
-    servo = ca.fmax(-limit, ca.fmin(p.k_w * (x.set_speed - u.w - sensor.effort), limit))
-    shaft = m.balance("shaft", "rotation", velocity=u.w, load=servo)
-    torque = servo - p.b_m * u.w + shaft.effort
-    current = servo / p.K_t
-    voltage = p.R_a * current + p.K_t * u.w
-    m.output(qs.TAU, torque)
-    m.output(qs.I, current)
+    tau_e = ca.fmax(-limit, ca.fmin(p.k_w * (w_set - u.w - sensor.effort), limit))
+    shaft = m.balance("shaft", "rotation", velocity=u.w, load=tau_e)
+    tau = tau_e - p.b_m * u.w + shaft.effort
+    i = tau_e / p.K_t
+    voltage = p.R_a * i + p.K_t * u.w
+    m.output(qs.TAU, tau)
+    m.output(qs.I, i)
     m.output(qs.U, voltage)
-    m.output(qs.I_SET, current)
-    m.output(qs.I_MEASURED, current)
-    m.port(qs.SHAFT, torque, u.w)
-    m.supply(voltage * current)
-    m.loss("winding", p.R_a * current**2)
+    m.output(qs.I_SET, i)
+    m.output(qs.I_MEASURED, i)
+    m.port(qs.SHAFT, tau, u.w)
+    m.supply(voltage * i)
+    m.loss("winding", p.R_a * i**2)
     m.loss("bearings", p.b_m * u.w**2)

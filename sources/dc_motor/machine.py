@@ -14,7 +14,7 @@ def sensors(m: Model, current: SX, speed: SX, command: SX) -> tuple[SX, SX, SX]:
     return sensed_current, sensed_speed, command
 
 
-def machine(m: Model, current: SX, measured: SX, voltage: SX, speed: SX) -> None:
+def machine(m: Model, i: SX, measured: SX, voltage: SX, w: SX) -> None:
     """Winding, torque, outputs and energy of the machine for a given terminal voltage.
 
     L di/dt = u - R i - K w,   tau = K i - b_m w
@@ -26,31 +26,31 @@ def machine(m: Model, current: SX, measured: SX, voltage: SX, speed: SX) -> None
         "coefficient",
         unit="N.m/A",
         value=p.K_t,
-        current=current,
-        speed=speed,
+        current=i,
+        speed=w,
     )
-    constant = p.K_t + ripple.effort
+    k_t = p.K_t + ripple.effort
     winding = m.balance(
         "winding",
         "winding",
-        current=current,
-        speed=speed,
+        current=i,
+        speed=w,
         voltage=voltage,
         resistance=p.R_a,
-        emf_constant=constant,
+        emf_constant=k_t,
     )
     m.derivative(
-        current,
-        (voltage - p.R_a * current - constant * speed + winding.effort) / p.L_a,
+        i,
+        (voltage - p.R_a * i - k_t * w + winding.effort) / p.L_a,
     )
-    shaft = m.balance("shaft", "rotation", velocity=speed, load=constant * current)
-    torque = constant * current - p.b_m * speed + shaft.effort
-    m.output(qs.TAU, torque)
-    m.output(qs.I, current)
+    shaft = m.balance("shaft", "rotation", velocity=w, load=k_t * i)
+    tau = k_t * i - p.b_m * w + shaft.effort
+    m.output(qs.TAU, tau)
+    m.output(qs.I, i)
     m.output(qs.U, voltage)
     m.output(qs.I_MEASURED, measured)
-    m.port(qs.SHAFT, torque, speed)
-    m.supply(voltage * current)
-    m.stored_energy(p.L_a * current**2 / 2)
-    m.loss("winding", p.R_a * current**2)
-    m.loss("bearings", p.b_m * speed**2)
+    m.port(qs.SHAFT, tau, w)
+    m.supply(voltage * i)
+    m.stored_energy(p.L_a * i**2 / 2)
+    m.loss("winding", p.R_a * i**2)
+    m.loss("bearings", p.b_m * w**2)

@@ -67,7 +67,7 @@ def equations(m: Model) -> None:
         qs.CURRENT_INTEGRAL,
         qs.CURRENT_FILTER,
     )
-    sensed_current, sensed_speed, command = sensors(m, x.current, u.w, u.w_ref)
+    i, w, w_ref = sensors(m, x.current, u.w, u.w_ref)
     speed_tick = m.clock("speed_loop", p.T_speed)
     current_tick = m.clock("current_loop", p.T_current)
 
@@ -90,13 +90,13 @@ def equations(m: Model) -> None:
         m.update(tick, filtered, filtered + period * rate)
 
     change = p.acc_max * p.T_speed
-    limited = z.set_speed + ca.fmax(-change, ca.fmin(command - z.set_speed, change))
-    m.update(speed_tick, z.set_speed, limited)
+    w_set = z.set_speed + ca.fmax(-change, ca.fmin(w_ref - z.set_speed, change))
+    m.update(speed_tick, z.set_speed, w_set)
     gains = (p.Kp_v, p.Ki_v, p.Kd_v, p.T_fv)
-    e_v, i_v, f_v = limited - sensed_speed, z.speed_integral, z.speed_filter
+    e_v, i_v, f_v = w_set - w, z.speed_integral, z.speed_filter
     loop(speed_tick, p.T_speed, e_v, i_v, f_v, gains, p.i_max, z.set_current)
     gains = (p.Kp_i, p.Ki_i, p.Kd_i, p.T_fi)
-    e_i, i_i, f_i = z.set_current - sensed_current, z.current_integral, z.current_filter
+    e_i, i_i, f_i = z.set_current - i, z.current_integral, z.current_filter
     loop(current_tick, p.T_current, e_i, i_i, f_i, gains, p.u_max, z.set_voltage)
     m.output(qs.I_SET, z.set_current)
-    machine(m, x.current, sensed_current, z.set_voltage, u.w)
+    machine(m, x.current, i, z.set_voltage, u.w)

@@ -57,7 +57,7 @@ def equations(m: Model) -> None:
     p = m.parameters(qs.RATIO, qs.ETA, qs.B, K, D, qs.J_A, qs.P_0, SIGNED)
     x = m.states(TWIST, ROTOR_SPEED)
     # A rotor without inertia would have no finite acceleration.
-    inertia = ca.fmax(p.J_a, SMALLEST_ROTOR)
+    j_a = ca.fmax(p.J_a, SMALLEST_ROTOR)
     w_a = x.rotor_speed
 
     ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, speed=u.w_b)
@@ -70,17 +70,17 @@ def equations(m: Model) -> None:
     flange_b = m.balance("flange_b", "rotation", velocity=u.w_b, load=tau_s)
     flange_a = m.balance("flange_a", "rotation", velocity=w_a, load=u.tau_a)
     into_mesh = u.tau_a + flange_a.effort
-    follows = ca.tanh(into_mesh * w_a / p.P_0)
-    factor = p.eta ** (1 - p.signed * (1 - follows))
+    s = 1 - p.signed * (1 - ca.tanh(into_mesh * w_a / p.P_0))
+    factor = p.eta**s
     m.derivative(x.twist, rate)
-    m.derivative(w_a, (factor * into_mesh - tau_s / ratio) / inertia)
+    m.derivative(w_a, (factor * into_mesh - tau_s / ratio) / j_a)
     tau_b = tau_s - p.b * u.w_b + flange_b.effort
     m.output(qs.W_A, w_a)
     m.output(qs.TAU_B, tau_b)
     m.output(qs.J_B, 0.0)
     m.port(qs.FLANGE_A, u.tau_a, w_a)
     m.port(qs.FLANGE_B, tau_b, u.w_b)
-    m.stored_energy(inertia * w_a**2 / 2 + p.k * x.twist**2 / 2)
+    m.stored_energy(j_a * w_a**2 / 2 + p.k * x.twist**2 / 2)
     m.loss("mesh", (1 - factor) * into_mesh * w_a)
     m.loss("bearings", p.b * u.w_b**2)
     m.loss("spring", p.d * rate**2)

@@ -31,21 +31,7 @@ from ..laws import planar_body
 from ..laws.symmetric import solve
 from ..model import SX, Balance, Model
 from ..quantity import Quantity
-from .body import (
-    CABINET_I_ZZ,
-    CABINET_MASS,
-    COM_X,
-    COM_Y,
-    DRIVE_INERTIA,
-    DRIVE_MASS,
-    GRAVITY,
-    I_ZZ,
-    MASS,
-    V_Y,
-    VEL_X,
-    VEL_Y,
-    YAW_RATE,
-)
+from . import body as bs
 from .mount import Mount, read_mount, write_planar_motion
 from .wheels import Drive, Places, add_wheels, read_caster_mass, read_places, write_wheels
 
@@ -75,9 +61,16 @@ def equations(m: Model) -> None:
         )
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
     p = m.parameters(
-        MASS, COM_X, COM_Y, CABINET_MASS, DRIVE_MASS, I_ZZ, CABINET_I_ZZ, DRIVE_INERTIA
+        bs.MASS,
+        bs.COM_X,
+        bs.COM_Y,
+        bs.CABINET_MASS,
+        bs.DRIVE_MASS,
+        bs.I_ZZ,
+        bs.CABINET_I_ZZ,
+        bs.DRIVE_INERTIA,
     )
-    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI, VEL_X, VEL_Y, YAW_RATE)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI, bs.VEL_X, bs.VEL_Y, bs.YAW_RATE)
     com = ca.vertcat(p.com_x, p.com_y, 0)
     com += m.balance("load", "position", value=com).effort
     w = x.yaw_rate
@@ -98,11 +91,11 @@ def equations(m: Model) -> None:
         "body",
         velocity=ca.vertcat(x.vel_x, x.vel_y, 0),
         rate=ca.vertcat(0, 0, w),
-        gravity=ca.vertcat(0, 0, -GRAVITY),
+        gravity=ca.vertcat(0, 0, -bs.GRAVITY),
         position=ca.vertcat(x.pose_x, x.pose_y, places.radius),
         rotation=ca.vertcat(ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)),
-        mass=own + carried + mount.weight / GRAVITY,
-        first_moment=ca.vertcat(s_x, s_y, 0) + mount.weight_moment / GRAVITY,
+        mass=own + carried + mount.weight / bs.GRAVITY,
+        first_moment=ca.vertcat(s_x, s_y, 0) + mount.weight_moment / bs.GRAVITY,
     )
     own += body.mass
     s_x, s_y = s_x + body.first_moment[0], s_y + body.first_moment[1]
@@ -151,7 +144,7 @@ def equations(m: Model) -> None:
         (qs.PHI, x.pose_phi),
         (qs.Z, places.radius),
         (qs.V, x.vel_x),
-        (V_Y, x.vel_y),
+        (bs.V_Y, x.vel_y),
         (qs.W_Z, w),
     ):
         m.output(quantity, value)
@@ -170,18 +163,18 @@ def _loads(
     p = m.parameters(PRELOAD, SHARE)
     f, n = body.effort[:3], body.effort[3:]
     force, moment = mount.bias[:3], mount.bias[3:]
-    weight = GRAVITY * mass - f[2] + force[2]
+    weight = bs.GRAVITY * mass - f[2] + force[2]
     height = mount.height
     m_x = (
         n[0]
         - places.radius * f[1]
-        - GRAVITY * s_y
+        - bs.GRAVITY * s_y
         - (moment[0] + mount.y * force[2] - height * force[1])
     )
     m_y = (
         n[1]
         + places.radius * f[0]
-        + GRAVITY * s_x
+        + bs.GRAVITY * s_x
         - (moment[1] + height * force[0] - mount.x * force[2])
     )
     level = (weight - 2 * p.preload) / (4 + 2 * p.share)

@@ -35,34 +35,7 @@ from ..laws.symmetric import solve
 from ..model import SX, Model
 from ..quantity import Quantity
 from ..wheel_contact.wheel import WIDTH, B, K
-from .body import (
-    CABINET_I_XX,
-    CABINET_I_YY,
-    CABINET_I_ZZ,
-    CABINET_MASS,
-    CABINET_Z,
-    CASTER_Z,
-    COM_X,
-    COM_Y,
-    COM_Z,
-    DRIVE_INERTIA,
-    DRIVE_MASS,
-    GRAVITY,
-    I_XX,
-    I_YY,
-    I_ZZ,
-    MASS,
-    PITCH,
-    PITCH_RATE,
-    POSE_Z,
-    ROLL,
-    ROLL_RATE,
-    V_Y,
-    VEL_X,
-    VEL_Y,
-    VEL_Z,
-    YAW_RATE,
-)
+from . import body as bs
 from .mount import read_mount, write_motion
 from .wheels import (
     CASTERS,
@@ -144,19 +117,19 @@ def _base_mass(m: Model, places: Places) -> _Mass:
     """Body and cabinet, with the drive wheels' inertia about their own centres."""
     r = places.radius
     p = m.parameters(
-        COM_X,
-        COM_Y,
-        COM_Z,
-        MASS,
-        I_XX,
-        I_YY,
-        I_ZZ,
-        CABINET_MASS,
-        CABINET_Z,
-        CABINET_I_XX,
-        CABINET_I_YY,
-        CABINET_I_ZZ,
-        DRIVE_INERTIA,
+        bs.COM_X,
+        bs.COM_Y,
+        bs.COM_Z,
+        bs.MASS,
+        bs.I_XX,
+        bs.I_YY,
+        bs.I_ZZ,
+        bs.CABINET_MASS,
+        bs.CABINET_Z,
+        bs.CABINET_I_XX,
+        bs.CABINET_I_YY,
+        bs.CABINET_I_ZZ,
+        bs.DRIVE_INERTIA,
     )
     com = ca.vertcat(p.com_x, p.com_y, p.com_z - r)
     load = m.balance("load", "position", value=com)
@@ -179,26 +152,26 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     """Collect the equations."""
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
     r = places.radius
-    p = m.parameters(DRIVE_MASS)
+    p = m.parameters(bs.DRIVE_MASS)
     x = m.states(
         qs.POSE_X,
         qs.POSE_Y,
         qs.POSE_PHI,
-        POSE_Z,
-        PITCH,
-        ROLL,
-        VEL_X,
-        VEL_Y,
-        VEL_Z,
-        ROLL_RATE,
-        PITCH_RATE,
-        YAW_RATE,
+        bs.POSE_Z,
+        bs.PITCH,
+        bs.ROLL,
+        bs.VEL_X,
+        bs.VEL_Y,
+        bs.VEL_Z,
+        bs.ROLL_RATE,
+        bs.PITCH_RATE,
+        bs.YAW_RATE,
     )
     unsprung = 2 * p.drive_mass if sprung else ca.SX(0)
     base = _base_mass(m, places)
     if not sprung:
         base += _ring(p.drive_mass, 2, 0, places.half_track, 0)
-    casters = _ring(caster_mass, 4, places.x, places.y, m.parameter(CASTER_Z) - r)
+    casters = _ring(caster_mass, 4, places.x, places.y, m.parameter(bs.CASTER_Z) - r)
 
     v: SX = ca.vertcat(x.vel_x, x.vel_y, x.vel_z)
     w: SX = ca.vertcat(x.roll_rate, x.pitch_rate, x.yaw_rate)
@@ -218,11 +191,11 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         "body",
         velocity=v,
         rate=w,
-        gravity=-GRAVITY * up,
+        gravity=-bs.GRAVITY * up,
         position=ca.vertcat(x.pose_x, x.pose_y, x.pose_z),
         rotation=rotation,
-        mass=plain.mass + unsprung + mount.weight / GRAVITY,
-        first_moment=plain.first + mount.weight_moment / GRAVITY,
+        mass=plain.mass + unsprung + mount.weight / bs.GRAVITY,
+        first_moment=plain.first + mount.weight_moment / bs.GRAVITY,
     )
     payload = _Mass(body.mass, body.first_moment, body.inertia)
     all_mass = plain + payload
@@ -253,7 +226,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         wheels.moment,
     ) - relief @ ca.vertcat(turning[0], turning[1], 0)
 
-    weight_force = -GRAVITY * up
+    weight_force = -bs.GRAVITY * up
     effort, moment = body.effort[:3], body.effort[3:]
     force = (
         all_mass.mass * weight_force
@@ -297,7 +270,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         (qs.PHI, x.pose_phi),
         (qs.Z, x.pose_z),
         (qs.V, v[0]),
-        (V_Y, v[1]),
+        (bs.V_Y, v[1]),
         (qs.W_Z, yaw),
     ):
         m.output(quantity, value)
@@ -315,7 +288,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     planar = (unsprung - 4 * caster_mass) * (u_x**2 + u_y**2)  # the casters count their own
     turn = (unsprung * half**2 - 4 * caster_mass * spread) * w[2] ** 2
     m.stored_energy(all_mass.energy(v, w) + (planar + turn) / 2)
-    m.stored_energy(GRAVITY * (all_mass.mass * x.pose_z + ca.dot(up, all_mass.first)))
+    m.stored_energy(bs.GRAVITY * (all_mass.mass * x.pose_z + ca.dot(up, all_mass.first)))
     wrench = mount.inertia @ q + mount.bias
     m.supply(-ca.dot(wrench[:3], v_m) - ca.dot(wrench[3:], w))
 
@@ -424,8 +397,8 @@ class _Legs:
         """Let the drive wheels push: the normal forces, or the springs between."""
         if self._springs:
             for (c, height), f_n, spring in zip(self._moving, contact, self._springs, strict=True):
-                self._m.derivative(c, (f_n - spring) / mass - GRAVITY)
-                self._m.stored_energy(mass * (c**2 / 2 + GRAVITY * height))
+                self._m.derivative(c, (f_n - spring) / mass - bs.GRAVITY)
+                self._m.stored_energy(mass * (c**2 / 2 + bs.GRAVITY * height))
             self.lift = (self._springs[0], self._springs[1])
         else:
             self.lift = contact

@@ -40,21 +40,20 @@ def equations(m: Model) -> None:
     u = m.inputs(qs.Q_REF, qs.PHI, qs.W, U_ADD)
     p = m.parameters(qs.T_LOOP, K_V, U_MAX, K_P, K_U)
     z = m.discretes(qs.U_HELD, BEFORE, BEFORE_LAST)
-    command = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
-    sensed = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
+    q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
     tick = m.clock("loops", p.T_loop)
-    held = z.u_held
 
-    measured = (sensed - z.phi_before_last) / (2 * p.T_loop)
-    wanted = p.K_v * (p.K_p * (command - sensed) - measured) + u.u_add
-    m.update(tick, held, ca.fmax(-p.u_max, ca.fmin(wanted, p.u_max)))
+    w_m = (phi - z.phi_before_last) / (2 * p.T_loop)
+    wanted = p.K_v * (p.K_p * (q_ref - phi) - w_m) + u.u_add
+    m.update(tick, z.u_held, ca.fmax(-p.u_max, ca.fmin(wanted, p.u_max)))
     m.update(tick, z.phi_before_last, z.phi_before)
-    m.update(tick, z.phi_before, sensed)
+    m.update(tick, z.phi_before, phi)
 
-    amplifier = m.balance("amplifier", "signal", unit="V", value=held)
+    amplifier = m.balance("amplifier", "signal", unit="V", value=z.u_held)
     shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi)
-    torque = p.K_u * (held + amplifier.effort)
+    torque = p.K_u * (z.u_held + amplifier.effort)
     m.output(qs.TAU, torque + shaft.effort)
-    m.output(qs.U, held)
+    m.output(qs.U, z.u_held)
     m.port(qs.SHAFT, torque + shaft.effort, u.w)
     m.supply(torque * u.w)

@@ -40,17 +40,16 @@ def equations(m: Model) -> None:
     p = m.parameters(qs.T_LOOP, K_D, R_A, K_T)
     z = m.discretes(qs.U_HELD)
     m.input_rate(u.phi, u.w)
-    command = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
-    sensed = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
+    q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
     tick = m.clock("loops", p.T_loop)
-    held = z.u_held
-    duty = ca.fmax(-1, ca.fmin(p.k_d * (command - sensed), 1))
-    m.update(tick, held, duty * u.u_supply)
+    d = ca.fmax(-1, ca.fmin(p.k_d * (q_ref - phi), 1))
+    m.update(tick, z.u_held, d * u.u_supply)
 
     on = ca.if_else(u.enable > 0.5, 1.0, 0.0)
-    nominal = on * (held - p.K_t * u.w) / p.R_a
+    nominal = on * (z.u_held - p.K_t * u.w) / p.R_a
     # One constant for torque and back-EMF, whatever an effect does to it: their powers cancel.
-    constant = (
+    k_t = (
         p.K_t
         + m.balance(
             "torque_constant",
@@ -61,24 +60,24 @@ def equations(m: Model) -> None:
             speed=u.w,
         ).effort
     )
-    plain = on * (held - constant * u.w) / p.R_a
+    plain = on * (z.u_held - k_t * u.w) / p.R_a
     winding = m.balance(
         "winding",
         "winding",
         current=plain,
         speed=u.w,
-        voltage=held,
+        voltage=z.u_held,
         resistance=p.R_a,
-        emf_constant=constant,
+        emf_constant=k_t,
     )
-    current = plain + on * winding.effort / p.R_a
-    shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi, load=constant * current)
-    torque = constant * current + shaft.effort
+    i = plain + on * winding.effort / p.R_a
+    shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi, load=k_t * i)
+    torque = k_t * i + shaft.effort
     m.output(qs.TAU, torque)
-    m.output(qs.U, held)
-    m.output(I, current)
+    m.output(qs.U, z.u_held)
+    m.output(I, i)
     m.port(qs.SHAFT, torque, u.w)
-    m.supply(on * held * current)
+    m.supply(on * z.u_held * i)
     # effects book their power at the current that flows without them: with no inductance there is
     # no other before they act; what they change of it is the winding's
-    m.loss("winding", p.R_a * current**2 - on * winding.effort * (current - plain))
+    m.loss("winding", p.R_a * i**2 - on * winding.effort * (i - plain))

@@ -40,28 +40,29 @@ def equations(m: Model) -> None:
     u = m.inputs(qs.TAU)
     p = m.parameters(qs.LEAD, qs.MASS, SHARE, K, D, qs.F_V, qs.F_C, qs.V_0, qs.F_0, qs.X_0)
     x = m.states(qs.ANGLE, TWIST, qs.SPEED, CARRIAGE)
-    radius = p.lead / (2 * math.pi)
-    whole = p.M * radius**2
-    rotor = p.share * whole
-    v, rate = radius * x.w_c, x.speed - x.w_c
-    viscous = p.F_v * v
-    dry = p.F_c * ca.tanh(v / p.v_0)
+    phi, w, w_2 = x.angle, x.speed, x.w_c
+    r = p.lead / (2 * math.pi)
+    whole = p.M * r**2
+    j_1 = p.share * whole
+    v_c, rate = r * w_2, w - w_2
+    viscous = p.F_v * v_c
+    dry = p.F_c * ca.tanh(v_c / p.v_0)
     spring = m.balance(
         "spring", "compliance", deflection=x.twist, rate=rate, stiffness=p.k, damping=p.d
     )
     tau_s = p.k * x.twist + p.d * rate - spring.effort
-    turned = x.angle + p.x_0 / radius
-    shaft = m.balance("screw", "rotation", velocity=x.w_c, angle=turned - x.twist, load=tau_s)
-    motor = m.balance("rotor", "rotation", velocity=x.speed, angle=turned, load=u.tau)
-    m.derivative(x.angle, x.speed)
+    turned = phi + p.x_0 / r
+    shaft = m.balance("screw", "rotation", velocity=w_2, angle=turned - x.twist, load=tau_s)
+    motor = m.balance("rotor", "rotation", velocity=w, angle=turned, load=u.tau)
+    m.derivative(phi, w)
     m.derivative(x.twist, rate)
-    m.derivative(x.speed, (u.tau - tau_s + motor.effort) / rotor)
-    m.derivative(x.w_c, (tau_s + radius * (p.F_0 - viscous - dry) + shaft.effort) / (whole - rotor))
-    m.output(qs.W, x.speed)
-    m.output(qs.PHI, x.angle)
-    m.output(qs.X, radius * x.angle)
-    m.port(qs.FLANGE, u.tau, x.speed)
-    m.supply(p.F_0 * v)
-    m.stored_energy(rotor * x.speed**2 / 2 + (whole - rotor) * x.w_c**2 / 2 + p.k * x.twist**2 / 2)
-    m.loss("friction", (viscous + dry) * v)
+    m.derivative(w, (u.tau - tau_s + motor.effort) / j_1)
+    m.derivative(w_2, (tau_s + r * (p.F_0 - viscous - dry) + shaft.effort) / (whole - j_1))
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.output(qs.X, r * phi)
+    m.port(qs.FLANGE, u.tau, w)
+    m.supply(p.F_0 * v_c)
+    m.stored_energy(j_1 * w**2 / 2 + (whole - j_1) * w_2**2 / 2 + p.k * x.twist**2 / 2)
+    m.loss("friction", (viscous + dry) * v_c)
     m.loss("spring", p.d * rate**2)

@@ -30,19 +30,20 @@ def equations(m: Model) -> None:
     u = m.inputs(qs.TAU)
     p = m.parameters(qs.LEAD, qs.MASS, qs.F_V, qs.F_C, qs.V_0, qs.F_0, qs.X_0)
     x = m.states(qs.ANGLE, qs.SPEED)
-    radius = p.lead / (2 * math.pi)
-    inertia = p.M * radius**2
-    v = radius * x.speed
+    phi, w = x.angle, x.speed
+    r = p.lead / (2 * math.pi)
+    inertia = p.M * r**2
+    v = r * w
     viscous = p.F_v * v
     dry = p.F_c * ca.tanh(v / p.v_0)
-    turned = x.angle + p.x_0 / radius
-    shaft = m.balance("screw", "rotation", velocity=x.speed, angle=turned, load=u.tau)
-    m.derivative(x.angle, x.speed)
-    m.derivative(x.speed, (u.tau + radius * (p.F_0 - viscous - dry) + shaft.effort) / inertia)
-    m.output(qs.W, x.speed)
-    m.output(qs.PHI, x.angle)
-    m.output(qs.X, radius * x.angle)
-    m.port(qs.FLANGE, u.tau, x.speed)
+    turned = phi + p.x_0 / r
+    shaft = m.balance("screw", "rotation", velocity=w, angle=turned, load=u.tau)
+    m.derivative(phi, w)
+    m.derivative(w, (u.tau + r * (p.F_0 - viscous - dry) + shaft.effort) / inertia)
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.output(qs.X, r * phi)
+    m.port(qs.FLANGE, u.tau, w)
     m.supply(p.F_0 * v)
-    m.stored_energy(inertia * x.speed**2 / 2)
+    m.stored_energy(inertia * w**2 / 2)
     m.loss("friction", (viscous + dry) * v)

@@ -32,15 +32,15 @@ def equations(m: Model) -> None:
     now = profile(m)
     p = m.parameters(CRAB)
     x = m.states(qs.HEADING)
-    speed = now.speed
-    speed += m.balance("speed", "signal", unit="m/s", value=speed).effort
+    s = now.speed
+    s += m.balance("speed", "signal", unit="m/s", value=s).effort
     w_d = now.curvature * now.speed + now.turn + u.w_set
     w_d += m.balance("yaw_rate", "signal", unit="rad/s", value=w_d).effort
     phi_d = x.heading
     m.derivative(phi_d, w_d)
-    course = phi_d + p.crab
-    xd_d = speed * ca.cos(course) + u.v_set * ca.cos(phi_d)
-    yd_d = speed * ca.sin(course) + u.v_set * ca.sin(phi_d)
+    chi = phi_d + p.crab
+    xd_d = s * ca.cos(chi) + u.v_set * ca.cos(phi_d)
+    yd_d = s * ca.sin(chi) + u.v_set * ca.sin(phi_d)
     m.output(qs.V_D, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d)
     m.output(qs.W_D, w_d)
     m.output(qs.XD_D, xd_d)

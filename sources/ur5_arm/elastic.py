@@ -72,10 +72,10 @@ def equations(m: Model) -> None:
     u = m.inputs(qs.TAU, qs.J_ADDED)
     p = m.parameters(K, D, J_HUB)
     x = m.states(qs.ANGLE, qs.SPEED, TWIST, TWIST_RATE)
-    theta = x.angle
-    q, qd = theta - x.twist, x.speed - x.twist_rate
+    theta, thetad = x.angle, x.speed
+    q, qd = theta - x.twist, thetad - x.twist_rate
     hub = u.J_added + p.J_hub
-    driving = u.tau + joint_efforts(m, x.speed, theta, u.tau)
+    driving = u.tau + joint_efforts(m, thetad, theta, u.tau)
     gear = m.balance(
         "gear", "compliance", deflection=x.twist, rate=x.twist_rate, stiffness=p.K, damping=p.D
     )
@@ -84,16 +84,16 @@ def equations(m: Model) -> None:
     output = m.parameter(J_OUT) * ca.SX.ones(6)
     dynamics = arm.accelerate(through, output)
     acceleration = (driving - through) / hub
-    m.derivative(theta, x.speed)
+    m.derivative(theta, thetad)
     m.derivative(x.twist, x.twist_rate)
-    m.derivative(x.speed, acceleration)
+    m.derivative(thetad, acceleration)
     m.derivative(x.twist_rate, acceleration - dynamics.acceleration)
-    output_motion(m, mount, theta, x.speed, arm.posture, u.tau)
+    output_motion(m, mount, theta, thetad, arm.posture, u.tau)
     m.output(Q_LINK, q)
     m.output(QD_LINK, qd)
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
     kinetic, potential = arm.energy()
     m.stored_energy(kinetic + potential + ca.dot(output, qd**2) / 2)
-    m.stored_energy(ca.dot(hub, x.speed**2) / 2 + ca.dot(p.K, x.twist**2) / 2)
+    m.stored_energy(ca.dot(hub, thetad**2) / 2 + ca.dot(p.K, x.twist**2) / 2)
     m.loss("gears", ca.dot(p.D, x.twist_rate**2))

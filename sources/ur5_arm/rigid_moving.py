@@ -33,15 +33,15 @@ def equations(m: Model) -> None:
     move_mount(m, mount)
     u = m.inputs(qs.TAU, qs.J_ADDED)
     x = m.states(qs.ANGLE, qs.SPEED)
-    q = x.angle
-    torque = u.tau + joint_efforts(m, x.speed, q, u.tau)
-    arm = links(m, mount, q, x.speed)
+    q, qd = x.angle, x.speed
+    torque = u.tau + joint_efforts(m, qd, q, u.tau)
+    arm = links(m, mount, q, qd)
     dynamics = arm.accelerate(torque, u.J_added)
-    m.derivative(q, x.speed)
-    m.derivative(x.speed, dynamics.acceleration)
-    output_motion(m, mount, q, x.speed, arm.posture, u.tau)
+    m.derivative(q, qd)
+    m.derivative(qd, dynamics.acceleration)
+    output_motion(m, mount, q, qd, arm.posture, u.tau)
     acceleration = ca.vertcat(mount.acceleration, mount.angular_acceleration)
     wrench = dynamics.inertia @ acceleration + dynamics.bias
     output_wrench(m, mount, dynamics.inertia, dynamics.bias, wrench)
     kinetic, potential = arm.energy()
-    m.stored_energy(kinetic + potential + ca.dot(u.J_added, x.speed**2) / 2)
+    m.stored_energy(kinetic + potential + ca.dot(u.J_added, qd**2) / 2)

@@ -41,21 +41,20 @@ def equations(m: Model) -> None:
     p = m.parameters(T)
     x = m.states(qs.ANGLE, qs.SPEED)
     z = m.discretes(HELD_SPEED, HELD_ACCELERATION)
+    q, qd, qdd = x.angle, z.held_speed, z.held_acceleration
     tick = m.clock("mechanics", p.T)
-    q = x.angle
-    qd = z.held_speed
     effort = joint_efforts(m, qd, q, u.tau)
     arm = links(m, mount, q, qd)
     dynamics = arm.accelerate(u.tau + effort, u.J_added)
     m.update(tick, qd, qd + p.T * dynamics.acceleration)
-    m.update(tick, z.held_acceleration, dynamics.acceleration)
+    m.update(tick, qdd, dynamics.acceleration)
     m.derivative(q, qd)
-    m.derivative(x.speed, z.held_acceleration)
+    m.derivative(x.speed, qdd)
     output_motion(m, mount, q, qd, arm.posture, u.tau)
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
     kinetic, potential = replace(arm, qd=x.speed).energy()
     stored = kinetic + potential + ca.dot(u.J_added, x.speed**2) / 2
-    rate = ca.jtimes(stored, ca.vertcat(q, x.speed), ca.vertcat(qd, z.held_acceleration))
+    rate = ca.jtimes(stored, ca.vertcat(q, x.speed), ca.vertcat(qd, qdd))
     m.stored_energy(stored)
     m.supply(rate - ca.dot(u.tau + effort, qd) - ca.dot(arm.load, arm.tool_twist))

@@ -50,11 +50,11 @@ def equations(m: Model) -> None:
     torque = hold + effort(
         m, "joint", "rotation", velocity=servo.speed, angle=servo.angle, load=hold
     )
-    current = hold / (p.eta * p.N * p.K_t)
+    i = hold / (p.eta * p.N * p.K_t)
     m.output(qs.TAU, torque)
-    m.output(qs.I, current)
-    m.output(qs.U, p.R_a * current + p.K_t * p.N * servo.speed)
-    output_current(m, current)
+    m.output(qs.I, i)
+    m.output(qs.U, p.R_a * i + p.K_t * p.N * servo.speed)
+    output_current(m, i)
     m.output(qs.J_B, p.N**2 * m.parameter(qs.J_M))
     m.port(qs.JOINT, torque, servo.speed)
     m.supply(ca.dot(hold, servo.speed))

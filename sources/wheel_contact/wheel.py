@@ -67,10 +67,11 @@ def wheel(
     u = m.inputs(qs.TAU, qs.J_ADDED, qs.V_X, qs.V_Y, qs.V_Z, qs.W_Z, qs.Z, qs.F_N, qs.X_W, qs.Y_W)
     p = m.parameters(qs.R, qs.J_W, qs.C_RR, qs.W_RR, qs.T_TURN)
     x = m.states(qs.ANGLE, qs.SPEED)
+    phi, w = x.angle, x.speed
 
-    runout = m.balance("radius", "coefficient", unit="m", value=p.r, angle=x.angle)
-    radius = p.r + runout.effort
-    slope = ca.jacobian(radius, x.angle)  # of an eccentric wheel, else structurally 0
+    runout = m.balance("radius", "coefficient", unit="m", value=p.r, angle=phi)
+    r = p.r + runout.effort
+    slope = ca.jacobian(r, phi)  # of an eccentric wheel, else structurally 0
     toe = m.balance("toe", "coefficient", unit="rad", value=0).effort
     direction = toe - p.t_turn * u.w_z
     cos, sin = ca.cos(direction), ca.sin(direction)
@@ -78,7 +79,7 @@ def wheel(
     if computes_normal:
         m.input_rate(u.z, u.v_z)
         k, b, width = m.parameter(K), m.parameter(B), m.parameter(WIDTH)
-        f_n, energy, loss = normal_force(radius - u.z, slope * x.speed - u.v_z, k, b, width)
+        f_n, energy, loss = normal_force(r - u.z, slope * w - u.v_z, k, b, width)
         m.stored_energy(energy)
         m.loss("normal", loss)
         lift = slope * f_n
@@ -87,43 +88,43 @@ def wheel(
         f_n, lift = u.f_n, 0
         m.port(qs.HUB_Z, 0, u.v_z)  # a rigid floor: the given force does no work
 
-    s_x = cos * u.v_x + sin * u.v_y - radius * x.speed
+    s_x = cos * u.v_x + sin * u.v_y - r * w
     s_y = cos * u.v_y - sin * u.v_x
-    along, across = friction(Contact(s_x, s_y, f_n, radius * x.speed, u.x_w, u.y_w))
+    along, across = friction(Contact(s_x, s_y, f_n, r * w, u.x_w, u.y_w))
     if not elastic:
         m.loss("slip", -(along * s_x + across * s_y))
-    resistance = rolling_resistance(p.c_rr, f_n, radius, x.speed, p.w_rr)
-    m.loss("rolling", resistance * x.speed)
+    resistance = rolling_resistance(p.c_rr, f_n, r, w, p.w_rr)
+    m.loss("rolling", resistance * w)
 
     axle = m.balance(
         "axle",
         "rotation",
-        velocity=x.speed,
-        angle=x.angle,
+        velocity=w,
+        angle=phi,
         load=u.tau,
         normal=f_n,
-        radius=radius,
+        radius=r,
     )
     floor = m.balance(
         "floor",
         "pivot",
         spin=u.w_z,
-        rolling=ca.sqrt((radius * x.speed) ** 2 + SMALL),
+        rolling=ca.sqrt((r * w) ** 2 + SMALL),
         normal=f_n,
     )
-    m.derivative(x.angle, x.speed)
+    m.derivative(phi, w)
     m.derivative(
-        x.speed,
-        (u.tau - radius * along - resistance - lift + axle.effort) / (p.J_w + u.J_added),
+        w,
+        (u.tau - r * along - resistance - lift + axle.effort) / (p.J_w + u.J_added),
     )
     f_x = m.output(qs.F_X, cos * along - sin * across)
     f_y = m.output(qs.F_Y, sin * along + cos * across)
     m.output(qs.F_Z, f_n)
     m_z = m.output(qs.M_Z, floor.effort)
-    m.output(qs.W, x.speed)
-    m.output(qs.PHI, x.angle)
-    m.stored_energy((p.J_w + u.J_added) * x.speed**2 / 2)
-    m.port(qs.AXLE, u.tau, x.speed)
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.stored_energy((p.J_w + u.J_added) * w**2 / 2)
+    m.port(qs.AXLE, u.tau, w)
     m.port(qs.HUB_X, f_x, u.v_x)
     m.port(qs.HUB_Y, f_y, u.v_y)
     m.port(qs.YAW, m_z, u.w_z)
