@@ -117,9 +117,8 @@ def equations(m: Model) -> None:
     growth = p.slip_b * difference + p.slip_c * w_inner
     turning = ca.fmax(p.slip_a + growth, E_MINIMUM)
     outer = (1 - locked) * turning + locked * p.e_outer_locked
-    inner = (1 - locked) * ca.fmax(
-        p.e_inner - p.exchange * growth, E_MINIMUM
-    ) + locked * p.e_inner_locked
+    given = ca.fmax(p.e_inner - p.exchange * growth, E_MINIMUM)
+    inner = (1 - locked) * given + locked * p.e_inner_locked
     e2 = (outer + inner) / 2 + side * (outer - inner) / 2
     e3 = (outer + inner) / 2 - side * (outer - inner) / 2
 

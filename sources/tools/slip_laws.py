@@ -53,7 +53,7 @@ class SlipLaw(Protocol):
 
 
 @dataclass(frozen=True)
-class Candidate:
+class LawCandidate:
     """A law.
 
     Attributes:
@@ -131,7 +131,7 @@ def _candidates() -> tuple[SlipLaw, ...]:
     single = [(term,) for term in TERMS]
     pairs = [("1", term) for term in TERMS if term != "1"]
     inner = [(), *single, *pairs, ("sum",)]
-    linear = [Candidate(outer, other) for outer in [*single, *pairs] for other in inner]
+    linear = [LawCandidate(outer, other) for outer in [*single, *pairs] for other in inner]
     return (*linear, OuterSkid())
 
 

@@ -13,7 +13,7 @@ from ..laws.rotation import product, quaternion_rate, rotation_matrix, rotation_
 from ..model import SX, Model
 
 
-class Mount(NamedTuple):
+class MountMotion(NamedTuple):
     """Motion of the mount: pose in the world, twist and acceleration in its own axes."""
 
     position: SX
@@ -24,7 +24,7 @@ class Mount(NamedTuple):
     angular_acceleration: SX
 
 
-def read_mount(m: Model) -> Mount:
+def read_mount(m: Model) -> MountMotion:
     """Declare the inputs that say how the mount moves."""
     u = m.inputs(
         qs.MOUNT_POSITION,
@@ -34,7 +34,7 @@ def read_mount(m: Model) -> Mount:
         qs.MOUNT_ACCELERATION,
         qs.MOUNT_ANGULAR_ACCELERATION,
     )
-    return Mount(
+    return MountMotion(
         u.mount_position,
         u.mount_quaternion,
         u.mount_velocity,
@@ -44,13 +44,13 @@ def read_mount(m: Model) -> Mount:
     )
 
 
-def at_rest(mount: Mount) -> Mount:
+def at_rest(mount: MountMotion) -> MountMotion:
     """The same pose without motion."""
     zero = ca.SX.zeros(3)
-    return Mount(mount.position, mount.quaternion, zero, zero, zero, zero)
+    return MountMotion(mount.position, mount.quaternion, zero, zero, zero, zero)
 
 
-def move_mount(m: Model, mount: Mount) -> None:
+def move_mount(m: Model, mount: MountMotion) -> None:
     """Tell the energy test how the mount's pose and velocity follow from its twist."""
     m.input_rate(mount.position, rotation_matrix(mount.quaternion) @ mount.velocity)
     m.input_rate(mount.quaternion, quaternion_rate(mount.quaternion, mount.rate))
@@ -90,7 +90,7 @@ class Links:
         tool_twist: velocity and angular velocity of the flange, in its axes.
     """
 
-    mount: Mount
+    mount: MountMotion
     posture: Posture
     qd: SX
     gravity: SX
@@ -121,7 +121,7 @@ class Links:
         return self.posture.kinetic_energy(rates, velocities), -ca.dot(self.gravity, moment)
 
 
-def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
+def links(m: Model, mount: MountMotion, q: SX, qd: SX) -> Links:
     """Build the chain of the device and open the balances of gravity and of the tool."""
     p = m.parameters(qs.GRAVITY)
     level = ca.vertcat(0, 0, -p.gravity)
@@ -146,7 +146,9 @@ def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
     return Links(mount, posture, qd, gravity, tool.effort, ca.vertcat(velocity, rate))
 
 
-def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torque: SX) -> None:
+def output_motion(
+    m: Model, mount: MountMotion, q: SX, qd: SX, posture: Posture, torque: SX
+) -> None:
     """Output joint motion and tool pose and bind the port of the joints.
 
     `q`, `qd` belong to the gear outputs, `posture` to the links.
@@ -161,7 +163,7 @@ def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torqu
     m.port(qs.JOINT, torque, qd)
 
 
-def output_wrench(m: Model, mount: Mount, inertia: SX, bias: SX, wrench: SX) -> None:
+def output_wrench(m: Model, mount: MountMotion, inertia: SX, bias: SX, wrench: SX) -> None:
     """Output the wrench and what it consists of; bind the ports of the mount."""
     m.output(qs.WRENCH, wrench)
     m.output(qs.ARM_INERTIA, upper_triangle(inertia))

@@ -12,7 +12,7 @@ import pytest
 
 from sources import variant
 from sources.component import Fidelity
-from sources.model import ModelError
+from sources.model import Model, ModelError
 from sources.quantity import Quantity
 
 READERS = (variant.components, variant.fidelities, variant.effects)
@@ -154,3 +154,19 @@ def test_limits_need_what_makes_them(fields: dict[str, Any], message: str) -> No
     with pytest.raises(ValueError) as caught:
         Fidelity(level=1, **fields)
     assert str(caught.value) == message
+
+
+def test_a_misspelt_symbol_is_told_which_there_are() -> None:
+    p = Model(variant.components()["gearbox"], "ratio").parameters(K, C)
+    assert p.c.numel() == 2
+    with pytest.raises(AttributeError, match=r"^no symbol 'kk'; declared are k, c$"):
+        p.kk  # noqa: B018 - the access is what fails
+
+
+def test_sampled_values_are_declared_in_their_order() -> None:
+    m = Model(variant.components()["gearbox"], "ratio")
+    z = m.discretes(C, K)
+    assert [v.name for v in m.of_role("discrete")] == ["c[1]", "c[2]", "k"]
+    tick = m.clock("tick", 0.1)
+    m.update(tick, z.k, z.c[0])
+    assert set(tick.updates) == {"k"}
