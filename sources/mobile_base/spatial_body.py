@@ -370,19 +370,19 @@ class _Legs:
     def sprung_drives(self) -> tuple[Drive, Drive]:
         """Drive wheels on springs, with states of their own."""
         m = self._m
-        k, d, preload = m.parameter(SPRING), m.parameter(DAMPER), m.parameter(SPRING_PRELOAD)
+        p = m.parameters(SPRING, DAMPER, SPRING_PRELOAD)
         drives, springs = [], []
-        for name, p, travelled, climbing in zip(
+        for name, seat, travelled, climbing in zip(
             ("left", "right"), self._seats, (TRAVEL_L, TRAVEL_R), (CLIMB_L, CLIMB_R), strict=True
         ):
             h, c = m.state(travelled), m.state(climbing)
-            rate = c - self._rise(p)
+            rate = c - self._rise(seat)
             m.derivative(h, rate)
-            height = self._height(p) + h
+            height = self._height(seat) + h
             drives.append(self._drive(name, height, c))
-            springs.append(preload + k * h + d * rate)
-            m.stored_energy((preload + k * h / 2) * h)
-            m.loss(f"{name}.damper", d * rate**2)
+            springs.append(p.spring_preload + p.spring * h + p.damper * rate)
+            m.stored_energy((p.spring_preload + p.spring * h / 2) * h)
+            m.loss(f"{name}.damper", p.damper * rate**2)
             self._moving.append((c, height))
         self._springs = tuple(springs)
         return drives[0], drives[1]

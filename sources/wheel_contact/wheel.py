@@ -78,8 +78,8 @@ def wheel(
 
     if computes_normal:
         m.input_rate(u.z, u.v_z)
-        k, b, width = m.parameter(K), m.parameter(B), m.parameter(WIDTH)
-        f_n, energy, loss = normal_force(r - u.z, slope * w - u.v_z, k, b, width)
+        law = m.parameters(K, B, WIDTH)
+        f_n, energy, loss = normal_force(r - u.z, slope * w - u.v_z, law.k, law.b, law.width)
         m.stored_energy(energy)
         m.loss("normal", loss)
         lift = slope * f_n
