@@ -35,7 +35,9 @@ T_S = Quantity(
 )
 DRAWN = Quantity("drawn", "1", "standard normal number drawn last")
 
-EFFECT = Effect("noise", "White noise on a signal.", ("signal", "point"), SIGMA, source="textbook")
+EFFECT = Effect(
+    "noise", "White noise on a signal.", ("signal", "point"), SIGMA, source="textbook", random=True
+)
 
 
 def law(e: EffectModel) -> None:
