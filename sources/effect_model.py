@@ -80,10 +80,6 @@ class EffectModel:
         named = {item.name: item for item in quantities} | symbols
         return Symbols({symbol: self.parameter(item) for symbol, item in named.items()})
 
-    def states(self, *quantities: Quantity) -> Symbols:
-        """Declare states, in this order; `x = e.states(Z)` gives `x.z`."""
-        return Symbols({item.name: self.state(item) for item in quantities})
-
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state of the effect."""
         return self._model.state(quantity)
