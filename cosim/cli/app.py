@@ -27,6 +27,7 @@ from ..master import algorithms
 from ..scenario import scenario
 from ..scenario.runner import Result, run
 from ..system.provider import FolderProvider, Provider
+from ..system.variants import component as component_of
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
@@ -131,7 +132,7 @@ def fmus_list(
 
 
 def _is_of(variant: str, component: str) -> bool:
-    return not component or variant.partition("/")[0].partition(".")[0] == component
+    return not component or component_of(variant) == component
 
 
 @fmus_app.command("build")
