@@ -19,6 +19,7 @@ from ..calibrate.nuisance import settled
 from ..calibrate.sensitivity import Correlation, correlation_index, local, tornado
 from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import InputError
+from ..files import make_folder, write_text
 
 
 def calibrate_command(
@@ -55,13 +56,12 @@ def calibrate_command(
     correlation = correlation_index(problem, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
     content["wall_s"] = time.perf_counter() - started
-    folder = out or Path("out") / problem.name
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = make_folder(out or Path("out") / problem.name)
     content["files"] = [str(folder / "calibration.json")]
     if correlation is not None:
         content["files"].append(str(tornado(correlation, folder / "tornado.png")))
     text = json.dumps(content, indent=2)
-    (folder / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    write_text(folder / "calibration.json", text + "\n")
     if as_json:
         typer.echo(text)
     else:

@@ -15,6 +15,7 @@ from rich.table import Table
 from ..calibrate.mapping import read_problem
 from ..diagnose import Diagnosis, diagnose
 from ..diagnose.further import Further
+from ..files import make_folder, write_text
 from ..report import write_page
 
 
@@ -37,8 +38,7 @@ def diagnose_command(
     Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
-    folder = out or Path("out") / problem.name
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = make_folder(out or Path("out") / problem.name)
     begun = time.monotonic()
     result = diagnose(
         problem, folder,
@@ -48,7 +48,7 @@ def diagnose_command(
     write_page(result, page)
     result.files += [page, table]
     content = result.to_dict()
-    table.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write_text(table, json.dumps(content, indent=2) + "\n")
     if as_json:
         typer.echo(json.dumps(content, indent=2))
     else:

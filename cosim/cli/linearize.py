@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..control.linearize import Linear, Margins, connect, loop_margins, operating_point, plot_bode
-from ..files import atomic, write_text
+from ..files import write_text
 from ..installation import builder
 from ..master.master import Driver, Master
 from ..scenario import scenario as scenarios
@@ -48,8 +48,7 @@ def linearize_command(
     content = _content(name, system, loops)
     if out is not None:
         if loops:
-            with atomic(out / "bode.png") as picture:
-                plot_bode(loops, picture)
+            plot_bode(loops, out / "bode.png")
         matrices = {key: getattr(system, key).tolist() for key in "abcd"}
         text = json.dumps({**content, **matrices}, indent=1)
         write_text(out / "linear.json", text + "\n")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..diagnose.bursts import written
+from ..files import write_text
 from .chart import COLOURS, Line, lines
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ small,.note{color:#6b7280}.wide{overflow-x:auto}@media(max-width:800px){.grid{gr
 
 def write_page(result: Diagnosis, path: Path) -> None:
     """Write the report."""
-    path.write_text(page(result), encoding="utf-8")
+    write_text(path, page(result))
 
 
 def page(result: Diagnosis) -> str:
