@@ -198,10 +198,6 @@ class Instance:
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(f"{self.label}: {what}{when}")
 
-    def take_messages(self) -> tuple[str, ...]:
-        """What the FMU logged since the last call."""
-        return take(self._key)
-
     def _call(self, what: str, name: str, *arguments: Any) -> None:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
