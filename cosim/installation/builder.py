@@ -62,7 +62,7 @@ class Builder:
         self._build = sources("packaging.build").build
         if kernel.find() is None:  # a checkout's first run: compile the executor as an FMU
             sources("packaging.kernel").build_kernel(
-                kernel.SOURCE,
+                kernel.SOURCES,
                 kernel.cache_folder() / kernel.library_name(),
                 sources("packaging.build").host_platform(),
             )

@@ -26,7 +26,8 @@ from ..algebraic_loops import Newton
 from ..input_derivatives import Ramps
 from ..plan import Op, Plan
 
-SOURCE = Path(__file__).with_name("kernel.c")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
+"""Of the library; the first is compiled and includes the others."""
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
@@ -129,8 +130,9 @@ _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _
 
 
 def library_name() -> str:
-    """File name of the library for this source and this machine."""
-    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    """File name of the library for these sources and this machine."""
+    content = b"\0".join(path.read_bytes() for path in SOURCES)
+    digest = hashlib.sha256(content).hexdigest()[:16]
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
         platform.machine().lower(), platform.machine().lower()
     )
@@ -159,7 +161,7 @@ def _load(path: str) -> Any:
 
 def find() -> Path | None:
     """The library, None if this machine has none."""
-    for folder in (SOURCE.parent / "lib", cache_folder()):
+    for folder in (SOURCES[0].parent / "lib", cache_folder()):
         path = folder / library_name()
         if path.is_file():
             return path
