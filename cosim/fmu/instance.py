@@ -223,7 +223,7 @@ class Instance:
         if status > 1:
             raise self.failed_access(False, part, status)
 
-    def ramp(
+    def set_input_derivatives(
         self, references: NDArray[np.uint32], orders: NDArray[np.int32], values: Vector
     ) -> None:
         """Derivatives of inputs in time, by which they move in the steps to come (FMI 2)."""
@@ -232,9 +232,9 @@ class Instance:
             values.ctypes.data,
         )  # fmt: skip
         if status > 1:
-            raise self.failed_ramp(references, status)
+            raise self.failed_derivatives(references, status)
 
-    def failed_ramp(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
+    def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
         """The error for derivatives of inputs that the FMU refused."""
         return self.failure(f"setting derivatives of {self._names(references, 'Float64')}", status)
 

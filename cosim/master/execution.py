@@ -20,7 +20,7 @@ from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from . import kernel
 from .algebraic_loops import Newton
-from .input_derivatives import Ramps, bend
+from .input_derivatives import InputDerivatives, bend
 from .iteration import Iterated
 from .plan import PARTS, Loop, Mean, Op, Plan
 from .startup import find_past
@@ -86,7 +86,7 @@ class Execution:
         self.newtons = [Newton(loop.sources.size) for loop in plan.loops]
         self.history = np.zeros((len(plan.means), 4))
         self.past = np.zeros(1, dtype=np.int64)  # values in the history before the first step
-        self.ramps = Ramps(plan, self.instances)
+        self.derivatives = InputDerivatives(plan, self.instances)
         self.held = np.zeros(len(self.layout.bond_input))
         moving = {mean.target: i for i, mean in enumerate(plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
@@ -199,7 +199,7 @@ class Execution:
             bound = kernel.Kernel(
                 self.plan, self.instances, self.outputs, self.inputs, self.values, self.times,
                 self.master.step, self.external, self.rows, self.bond_energy, self.every,
-                self.newtons, self.history, self.past, self.ramps, self.bond_mean,
+                self.newtons, self.history, self.past, self.derivatives, self.bond_mean,
             )  # fmt: skip
         except FileNotFoundError as error:
             raise ValueRangeError(
@@ -240,8 +240,8 @@ class Execution:
         if op is Op.GET or self.index:  # it has stepped: where it is by its own count
             last = self.index if op is Op.GET else self.index - 1
             instance.time = self.instants[last] + self.master.step
-        if op is Op.RAMP:
-            raise instance.failed_ramp(part, status)
+        if op is Op.SET_DERIVATIVES:
+            raise instance.failed_derivatives(part, status)
         if status == kernel.UNFIT:
             raise self.inputs[self.instances.index(instance)].unfit(part)
         raise instance.failed_access(op is Op.GET, part, status)
@@ -396,7 +396,7 @@ class Execution:
                 self.held = values[layout.bond_input]
                 for term, index in enumerate(self.bond_mean):
                     if index >= 0:
-                        self.held[term] = self.ramps.average[index]
+                        self.held[term] = self.derivatives.average[index]
             case Op.SOLVE:
                 self.solve(a)
             case Op.ITERATE:
@@ -408,8 +408,8 @@ class Execution:
             case Op.EXTRAPOLATE:
                 for index in range(a, b):
                     self.extrapolate(index, self.plan.means[index])
-            case Op.RAMP:
-                self.ramps.tell(a, b)
+            case Op.SET_DERIVATIVES:
+                self.derivatives.tell(a, b)
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 size = self.master.step
@@ -421,13 +421,14 @@ class Execution:
         past = self.history[index].tolist()
         if mean.bonded or not mean.moving:
             average = self.mean(mean, past) * mean.gain + mean.offset
-            self.ramps.average[index] = average
+            self.derivatives.average[index] = average
         if not mean.moving:
             self.values[mean.target] = average
             return
         slope, curve = self.slopes(mean, past)
         self.values[mean.target] = past[0] * mean.gain + mean.offset
-        self.ramps.slope[index], self.ramps.curve[index] = slope * mean.gain, curve * mean.gain
+        self.derivatives.slope[index] = slope * mean.gain
+        self.derivatives.curve[index] = curve * mean.gain
 
     def slopes(self, mean: Mean, past: list[float]) -> tuple[float, float]:
         """Derivatives at the begin of the step of the polynomial through the last values."""

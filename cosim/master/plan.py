@@ -37,7 +37,7 @@ class Op(IntEnum):
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
     HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
     ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
-    RAMP = 13  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    SET_DERIVATIVES = 13  # how an instance's inputs move: means a <= i < b, all of them its own
 
 
 PARTS = 1 << 16
@@ -156,7 +156,7 @@ class Plan:
         loops: what SOLVE solves.
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
-        means: what EXTRAPOLATE and RAMP set.
+        means: what EXTRAPOLATE and SET_DERIVATIVES set.
         iteration: what ITERATE and step control need.
     """
 

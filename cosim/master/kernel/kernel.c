@@ -189,9 +189,9 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   }
 }
 
-static const Ramp *ramp(const Ramp *r, const Ramp *end, int *status) {
+static const Derivatives *set_derivatives(const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
-    *status = ((Ramp2)r->function)(r->component, r->references, r->n, r->orders, r->values);
+    *status = ((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values);
     if (*status > 1) return r;
   }
   return 0;
@@ -210,7 +210,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
   const Call *const calls = run->calls, *call = 0;
   const Member *const members = run->members, *member = 0;
-  const Ramp *ramped = 0;
+  const Derivatives *refused = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
     switch (in->operation) {
@@ -269,8 +269,8 @@ static int execute(Run *run, int64_t first, int64_t last) {
     case EXTRAPOLATE:
       extrapolate(run, in->first, in->last);
       break;
-    case RAMP:
-      ramped = ramp(run->ramps + in->first, run->ramps + in->last, &status);
+    case SET_DERIVATIVES:
+      refused = set_derivatives(run->derivatives + in->first, run->derivatives + in->last, &status);
       break;
     case SUBSTEP:
       member = substep(run, members + in->first, in->last, &status);
@@ -279,7 +279,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
     if (status > 1) {
       run->failed_call = call ? call - calls : -1;
       run->failed_member = member ? member - members : -1;
-      run->failed_ramp = ramped ? ramped - run->ramps : -1;
+      run->failed_derivatives = refused ? refused - run->derivatives : -1;
       return status;
     }
   }
@@ -327,6 +327,6 @@ EXPORT int cosim_run_within(Run *run, int64_t last, double limit, double most) {
 /* The layout that this library was compiled for, to be compared with the caller's. */
 EXPORT int64_t cosim_size(int what) {
   const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term),
-                          sizeof(Loop), sizeof(Mean), sizeof(Ramp)};
+                          sizeof(Loop), sizeof(Mean), sizeof(Derivatives)};
   return (int64_t)sizes[what];
 }

@@ -7,7 +7,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, RAMP };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8, TOO_LONG = 9, TOO_LARGE = 10 };
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
@@ -68,7 +68,7 @@ typedef struct {
   const int32_t *orders;
   const double *values;
   size_t n;
-} Ramp;
+} Derivatives;
 
 typedef struct {
   const Member *members;
@@ -96,12 +96,12 @@ typedef struct {
   const int64_t *past; /* how many of them there are before the first step */
   int64_t n_means;
   double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
-  const Ramp *ramps;
-  int64_t failed_loop, failed_call, failed_member, failed_ramp; /* -1: none; none of them: a recorded value is not finite */
+  const Derivatives *derivatives;
+  int64_t failed_loop, failed_call, failed_member, failed_derivatives; /* -1: none; none of them: a recorded value is not finite */
 } Run;
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
-typedef int (*Ramp2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
+typedef int (*SetDerivatives2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
 typedef int (*Step2)(void *, double, double, int);
 typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);
