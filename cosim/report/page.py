@@ -74,7 +74,7 @@ def page(result: Diagnosis) -> str:
         _residuals(result),
         _located(result),
         _candidates(result),
-        _next(result, table),
+        _next(table),
         _power(table["power"]),
         "</body></html>",
     ]
@@ -380,7 +380,7 @@ def _candidates(result: Diagnosis) -> str:
     )
 
 
-def _next(result: Diagnosis, table: dict[str, Any]) -> str:
+def _next(table: dict[str, Any]) -> str:
     proposal = table["proposed_experiment"]
     if not proposal:
         return ""
