@@ -68,14 +68,16 @@ def shares(master: Master, settings: dict[str, Any], repeats: int) -> dict[str, 
         initialize(run)
         half = session.count // 2
         session._stepper.advance(half)
-        run.ramps.slope[:] = run.ramps.curve[:] = 0.0  # else each step begins with a jump back
+        run.derivatives.slope[:] = run.derivatives.curve[:] = (
+            0.0  # else each step begins with a jump back
+        )
         steps = min(50, (session.count - half) // repeats)  # near the state of the run
         for index, name in enumerate(run.layout.instances):
-            ramps = [
+            derivatives = [
                 (a, b) for op, a, b in run.plan.step.tolist()
-                if op == Op.RAMP and run.plan.means[a].instance == index
+                if op == Op.SET_DERIVATIVES and run.plan.means[a].instance == index
             ]  # fmt: skip
-            own = [(Op.SET, index, 0), *((Op.RAMP, a, b) for a, b in ramps)]
+            own = [(Op.SET, index, 0), *((Op.SET_DERIVATIVES, a, b) for a, b in derivatives)]
             rows = [*own, (Op.STEP, index, 0), (Op.GET, index, 0)]
             plan = replace(run.plan, step=operations(rows))
             alone = kernel.Kernel(run, plan)

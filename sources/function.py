@@ -61,7 +61,7 @@ def _column(expressions: list[Any]) -> Any:
     return ca.vertcat(*expressions) if expressions else ca.SX(0, 1)
 
 
-def _update(model: Model, clock: Clock, discrete: list[Declared]) -> Any:
+def _update(clock: Clock, discrete: list[Declared]) -> Any:
     return _column([clock.updates.get(v.name, v.symbol) for v in discrete])
 
 
@@ -114,7 +114,7 @@ def build_functions(model: Model) -> Functions:
         jacobian_pattern=tuple(zip(rows, columns, strict=True)),
         directional=function("f_directional", [tangent[:split], tangent[split:]], seeds),
         updates=tuple(
-            function(f"f_update{index}", [_update(model, clock, roles["discrete"])])
+            function(f"f_update{index}", [_update(clock, roles["discrete"])])
             for index, clock in enumerate(model.clocks)
         ),
         periods=ca.Function(

@@ -22,7 +22,15 @@ from .effect import KINDS, Effect
 from .model import Balance, Declared, Model, misfit
 from .packaging.catalog import names
 from .quantity import Quantity
-from .variant import build_model, components, device_values, devices, effects, fidelities
+from .variant import (
+    build_model,
+    components,
+    device_values,
+    devices,
+    effects,
+    fidelities,
+    parse_name,
+)
 
 DOCS = Path(__file__).parent.parent / "docs"
 COMMAND = "python -m sources.tables"
@@ -313,14 +321,14 @@ def catalogue_page() -> str:
     """What `cosim fmus build` builds, by component."""
     listed: dict[str, list[str]] = {}
     for name in names():
-        listed.setdefault(name.partition("/")[0].partition(".")[0], []).append(name)
+        listed.setdefault(parse_name(name).component, []).append(name)
     rows = [
         (
             f"[{component}](../docs/components/{component}.md)",
             ", ".join(
                 f"`{n.partition('/')[2]}`" for n in variants if "+" not in n and "." not in n
             ),
-            ", ".join(f"`{n}`" for n in variants if "." in n.partition("/")[0]),
+            ", ".join(f"`{n}`" for n in variants if parse_name(n).device),
             ", ".join(f"`+{n.partition('+')[2]}`" for n in variants if "+" in n),
         )
         for component, variants in listed.items()

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, InputError, UnknownNameError, listing
+from ..files import atomic
 from ..fmu.exchange import DTYPES
 from ..fmu.instance import Instance
 from ..master.execution import Execution
@@ -414,6 +415,6 @@ def plot_bode(loops: Sequence[Margins], path: Path) -> Path:
     lower.set_ylabel("phase [deg]")
     lower.set_xlabel("frequency [Hz]")
     upper.legend()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    picture.savefig(path)
+    with atomic(path) as temporary:
+        picture.savefig(temporary)
     return path

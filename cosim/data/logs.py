@@ -159,7 +159,7 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
 
 
 @dataclass(frozen=True)
-class Run:
+class LoggedRun:
     """An entry of `set.toml`.
 
     Attributes:
@@ -190,7 +190,7 @@ class DataSet:
     folder: Path
     name: str
     rig: str
-    runs: Mapping[str, Run]
+    runs: Mapping[str, LoggedRun]
     sheet: Mapping[str, Any]
     units: Mapping[str, str]
     noise: Mapping[str, float]
@@ -229,7 +229,7 @@ def read_data_set(folder: Path | str) -> DataSet:
     sheet = _sheet(folder, table["sheet"]) if "sheet" in table else {}
     try:
         runs = {
-            entry["name"]: Run(
+            entry["name"]: LoggedRun(
                 entry["name"], folder / entry["file"], entry.get("purpose", ""), dict(entry)
             )
             for entry in table.get("run", [])

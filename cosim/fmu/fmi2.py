@@ -1,4 +1,4 @@
-"""The C interface of FMI 2.0 for co-simulation, behind the names of `binding.Binding`."""
+"""The C interface of FMI 2.0 for co-simulation, with the same Python face as `fmi3`."""
 
 from __future__ import annotations
 

@@ -198,10 +198,6 @@ class Instance:
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(f"{self.label}: {what}{when}")
 
-    def take_messages(self) -> tuple[str, ...]:
-        """What the FMU logged since the last call."""
-        return take(self._key)
-
     def _call(self, what: str, name: str, *arguments: Any) -> None:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
@@ -227,7 +223,7 @@ class Instance:
         if status > 1:
             raise self.failed_access(False, part, status)
 
-    def ramp(
+    def set_input_derivatives(
         self, references: NDArray[np.uint32], orders: NDArray[np.int32], values: Vector
     ) -> None:
         """Derivatives of inputs in time, by which they move in the steps to come (FMI 2)."""
@@ -236,9 +232,9 @@ class Instance:
             values.ctypes.data,
         )  # fmt: skip
         if status > 1:
-            raise self.failed_ramp(references, status)
+            raise self.failed_derivatives(references, status)
 
-    def failed_ramp(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
+    def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
         """The error for derivatives of inputs that the FMU refused."""
         return self.failure(f"setting derivatives of {self._names(references, 'Float64')}", status)
 

@@ -87,10 +87,12 @@ def interpolates(system: System, instance: str) -> bool:
     return description.fmi == 2 and description.can("canInterpolateInputs")
 
 
-def ramps(found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int) -> Rows:
+def set_derivatives(
+    found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int
+) -> Rows:
     """The operation that tells an instance how its inputs move, if it can use it."""
     first, last = spans[index]
-    return [(Op.RAMP, first, last)] if first < last and found[first].moving else []
+    return [(Op.SET_DERIVATIVES, first, last)] if first < last and found[first].moving else []
 
 
 def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int]:
@@ -138,7 +140,7 @@ def side_by_side(
         rows += [(Op.SET, index) for index in starting]
         for index in starting:
             if parts[layout.instances[index]] == 1:
-                rows += ramps(found, spans, index)
+                rows += set_derivatives(found, spans, index)
         for index in starting:
             n = parts[layout.instances[index]]
             rows.append(whole_or_part(index, n, int(instant * n)))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import AlgebraicLoopError, FmuCallError
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
-from .input_derivatives import Ramps, bend
+from .input_derivatives import InputDerivatives, bend
 from .newton import Newton
 from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
@@ -34,7 +34,7 @@ class Interpreter:
         bond_energy: energy that went over each bond [J].
         newtons: one per algebraic loop.
         history, past: of extrapolated inputs, and how many values it has before the first step.
-        ramps: derivatives of the inputs that move within a step.
+        derivatives: derivatives of the inputs that move within a step.
         bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
 
@@ -66,7 +66,7 @@ class Interpreter:
         self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
         self.history = np.zeros((len(self.plan.means), 4))
         self.past = np.zeros(1, dtype=np.int64)
-        self.ramps = Ramps(self.plan, self.instances)
+        self.derivatives = InputDerivatives(self.plan, self.instances)
         self.held = np.zeros(len(self.layout.bond_input))
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
@@ -118,7 +118,7 @@ class Interpreter:
                 self.held = values[layout.bond_input]
                 for term, index in enumerate(self.bond_mean):
                     if index >= 0:
-                        self.held[term] = self.ramps.average[index]
+                        self.held[term] = self.derivatives.average[index]
             case Op.SOLVE:
                 self.solve(a)
             case Op.NOTE:
@@ -127,8 +127,8 @@ class Interpreter:
             case Op.EXTRAPOLATE:
                 for index in range(a, b):
                     self.extrapolate(index, self.plan.means[index])
-            case Op.RAMP:
-                self.ramps.tell(a, b)
+            case Op.SET_DERIVATIVES:
+                self.derivatives.tell(a, b)
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 time = self.instants[self.index] + part * self.step / parts
@@ -139,13 +139,16 @@ class Interpreter:
         past = self.history[index].tolist()
         if mean.bonded or not mean.moving:
             average = self.mean(mean, past) * mean.gain + mean.offset
-            self.ramps.average[index] = average
+            self.derivatives.average[index] = average
         if not mean.moving:
             self.values[mean.target] = average
             return
         slope, curve = self.slopes(mean, past)
         self.values[mean.target] = past[0] * mean.gain + mean.offset
-        self.ramps.slope[index], self.ramps.curve[index] = slope * mean.gain, curve * mean.gain
+        self.derivatives.slope[index], self.derivatives.curve[index] = (
+            slope * mean.gain,
+            curve * mean.gain,
+        )
 
     def slopes(self, mean: Mean, past: list[float]) -> tuple[float, float]:
         """Derivatives at the begin of the step of the polynomial through the last values."""

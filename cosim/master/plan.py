@@ -37,7 +37,9 @@ class Op(IntEnum):
     EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step (begin, if moving)
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
     HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
-    RAMP = 12  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    SET_DERIVATIVES = (
+        12  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    )
 
 
 PARTS = 1 << 16
@@ -152,7 +154,7 @@ class Plan:
         loops: what SOLVE solves.
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
-        means: what EXTRAPOLATE and RAMP set.
+        means: what EXTRAPOLATE and SET_DERIVATIVES set.
         stepper: for algorithms that repeat steps, what makes a stepper of an
             `interpreter.Interpreter`; None if the operations of `step` are all there is.
     """

@@ -130,7 +130,7 @@ def _documentation(variant: Variant) -> bytes:
 def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
     """All files but the libraries, and the generated C source that these are compiled from."""
     identifier = variant.name.identifier
-    template = native.model_source(variant.model, variant.functions, variant.entries, identifier)
+    template = native.model_source(variant.functions, variant.entries, identifier)
     fixed = {path.name: path.read_text(encoding="utf-8") for path in native.C_SOURCES.glob("*.c")}
     xml2 = description.describe_fmi2(
         variant.model,

@@ -27,7 +27,7 @@ SINE = Function(lambda t: 20.0 * np.sin(30.0 * t))
 @pytest.fixture(scope="module", autouse=True)
 def library() -> Path:
     return build_kernel(
-        kernel.SOURCE, kernel.cache_folder() / kernel.library_name(), host_platform()
+        kernel.SOURCES, kernel.cache_folder() / kernel.library_name(), host_platform()
     )
 
 

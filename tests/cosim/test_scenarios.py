@@ -199,6 +199,8 @@ def test_apply_to_instance_component_or_slot() -> None:
     assert both["right"] == "gearbox.mir250/elastic+coulomb+backlash"
     slot = apply({"base": HERE["base"]}, {"wheel_contact": "brush"})
     assert slot == {"base": "mobile_base/six_dof[wheel_contact=brush]+payload@body"}
+    two = apply({"base": "mobile_base/six_dof[wheel_contact=brush,x=y]"}, {"wheel_contact": "a"})
+    assert two == {"base": "mobile_base/six_dof[wheel_contact=a,x=y]"}
     with pytest.raises(UnknownNameError, match=r"'wheel' is no instance, component or slot"):
         apply({"base": "x.fmu"}, {"wheel": "brush"})
 

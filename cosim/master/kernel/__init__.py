@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
 from ...spec import cache
-from ..input_derivatives import Ramps
+from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
 from ..plan import Op, Plan
 
-SOURCE = Path(__file__).with_name("kernel.c")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
+"""Of the library; the first is compiled and includes the others."""
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
@@ -75,7 +76,7 @@ class _Mean(ct.Structure):
     )  # fmt: skip
 
 
-class _Ramp(ct.Structure):
+class _Derivatives(ct.Structure):
     _fields_ = (
         ("component", _P), ("function", _P), ("references", _P), ("orders", _P), ("values", _P),
         ("n", _I64),
@@ -91,9 +92,9 @@ class _Run(ct.Structure):
         ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
         ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
         ("past", _P), ("n_means", _I64),
-        ("average", _P), ("slope", _P), ("curve", _P), ("ramps", _P),
+        ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
         ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
-        ("failed_ramp", _I64),
+        ("failed_derivatives", _I64),
     )  # fmt: skip
 
 
@@ -116,7 +117,7 @@ class _Code(IntEnum):
     EXTRAPOLATE = 13
     SUBSTEP = 14
     HOLD = 15
-    RAMP = 16
+    SET_DERIVATIVES = 16
 
 
 UNFIT = 7
@@ -125,12 +126,13 @@ UNSETTLED = 8
 """Status of an algebraic loop that has no solution or does not settle."""
 TOO_LONG, TOO_LARGE = 9, 10
 """Statuses of a run that took more than its limit, and of one that ran away."""
-_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Ramp)
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
 
 
 def library_name() -> str:
-    """File name of the library for this source and this machine."""
-    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    """File name of the library for these sources and this machine."""
+    content = b"\0".join(path.read_bytes() for path in SOURCES)
+    digest = hashlib.sha256(content).hexdigest()[:16]
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
         platform.machine().lower(), platform.machine().lower()
     )
@@ -159,7 +161,7 @@ def _load(path: str) -> Any:
 
 def find() -> Path | None:
     """The library, None if this machine has none."""
-    for folder in (SOURCE.parent / "lib", cache_folder()):
+    for folder in (SOURCES[0].parent / "lib", cache_folder()):
         path = folder / library_name()
         if path.is_file():
             return path
@@ -236,7 +238,7 @@ class Kernel:
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
-        told = self._ramps(bound.ramps)
+        told = self._derivatives(bound.derivatives)
         instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
         loops = []
@@ -266,17 +268,20 @@ class Kernel:
         self.run.n_means = len(plan.means)
         self.run.history, self.run.past = self._array(bound.history), self._array(bound.past)
 
-    def _ramps(self, ramps: Ramps) -> dict[tuple[int, int], tuple[int, int]]:
-        """Bind the calls of derivatives; per RAMP operation the first and behind the last."""
-        self.run.average = self._array(ramps.average)
-        self.run.slope, self.run.curve = self._array(ramps.slope), self._array(ramps.curve)
-        rows: list[_Ramp] = []
+    def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
+        """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
+        self.run.average = self._array(derivatives.average)
+        self.run.slope, self.run.curve = (
+            self._array(derivatives.slope),
+            self._array(derivatives.curve),
+        )
+        rows: list[_Derivatives] = []
         told = {}
-        for key, told_calls in ramps.calls.items():
+        for key, told_calls in derivatives.calls.items():
             for call in told_calls:
                 instance = self._instances[call.instance]
                 rows.append(
-                    _Ramp(
+                    _Derivatives(
                         instance.address, instance.functions["fmi2SetRealInputDerivatives"],
                         call.references.ctypes.data, call.orders.ctypes.data,
                         call.values.ctypes.data, call.references.size,
@@ -284,7 +289,7 @@ class Kernel:
                 )  # fmt: skip
                 self._told.append((instance, call.references))
             told[key] = (len(rows) - len(told_calls), len(rows))
-        self.run.ramps = self._structures(_Ramp, rows)
+        self.run.derivatives = self._structures(_Derivatives, rows)
         return told
 
     def _array(self, array: NDArray[Any]) -> int:
@@ -336,12 +341,12 @@ class Kernel:
         A recorded value that is not finite belongs to no instance.
         """
         call, member = int(self.run.failed_call), int(self.run.failed_member)
-        ramp = int(self.run.failed_ramp)
+        derivative = int(self.run.failed_derivatives)
         if call >= 0:
             return self._parts[call]
-        if ramp >= 0:
-            instance, references = self._told[ramp]
-            return Op.RAMP, instance, references
+        if derivative >= 0:
+            instance, references = self._told[derivative]
+            return Op.SET_DERIVATIVES, instance, references
         if member >= 0:
             return Op.STEP, self._instances[member], None
         return Op.RECORD, None, None
@@ -377,8 +382,8 @@ def _instructions(
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
             add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
-        elif op is Op.RAMP:
-            add(_Code.RAMP, *told[a, b])
+        elif op is Op.SET_DERIVATIVES:
+            add(_Code.SET_DERIVATIVES, *told[a, b])
         elif op is Op.SUBSTEP:
             found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
         elif op in (Op.SET, Op.GET):

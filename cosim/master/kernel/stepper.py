@@ -62,8 +62,8 @@ class Compiled:
         if op is Op.GET or run.index:  # it has stepped: where it is by its own count
             last = run.index if op is Op.GET else run.index - 1
             instance.time = run.instants[last] + run.step
-        if op is Op.RAMP:
-            raise instance.failed_ramp(part, status)
+        if op is Op.SET_DERIVATIVES:
+            raise instance.failed_derivatives(part, status)
         if status == UNFIT:
             raise run.inputs[run.instances.index(instance)].unfit(part)
         raise instance.failed_access(op is Op.GET, part, status)
