@@ -12,6 +12,7 @@
         - ValueRangeError           a value outside its bounds, or not finite
         - ScenarioError             a scenario, system or data file that cannot be read
       x FmuCallError                an FMU refused a call; carries its own log messages
+        + EndRequest                an FMU asked to end; a master ends the run without an error
         + StepError                 the run stopped; carries what was recorded until then
       x AlgebraicLoopError          connected values that do not settle
       x CheckError                  a scenario ran, but a check of it failed
@@ -106,6 +107,18 @@ class StepError(FmuCallError):
         super().__init__(text, messages)
         self.time = time
         self.recording = recording
+
+
+class EndRequest(FmuCallError):
+    """An FMU asked to end the simulation: the master ends the run there, without an error.
+
+    Attributes:
+        time: up to which the FMU has gone [s].
+    """
+
+    def __init__(self, text: str, messages: Iterable[str] = (), *, time: float) -> None:
+        super().__init__(text, messages)
+        self.time = time
 
 
 class AlgebraicLoopError(CosimError):

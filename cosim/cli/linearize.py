@@ -14,7 +14,8 @@ from ..installation import builder
 
 if TYPE_CHECKING:
     from ..control.linearize import Linear, Margins
-    from ..master.master import Driver, Master
+    from ..master.master import Master
+    from ..system.inputs import Driver
 
 MOST = 24
 """Loops that are looked at if none are named."""

@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, InputError, UnknownNameError, listing
 from ..files import atomic
-from ..fmu.exchange import DTYPES
 from ..fmu.instance import Instance
+from ..fmu.values import NUMBERS
 from ..master.execution import Execution
 from ..master.initialization import initialize
-from ..master.master import Driver, Master
+from ..master.master import Master
 from ..master.plan import Op, decoded
+from ..system.inputs import Driver
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -125,9 +126,11 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
     """An instance at its present communication point, and notes."""
     known = instance.description.variables
     states = [name[4:-1] for name in known if name.startswith("der(") and name[4:-1] in known]
-    inputs = [n for v in instance.description.of("input") if v.type in DTYPES for n in v.elements()]
+    inputs = [
+        n for v in instance.description.of("input") if v.type in NUMBERS for n in v.elements()
+    ]
     outputs = [
-        n for v in instance.description.of("output") if v.type in DTYPES for n in v.elements()
+        n for v in instance.description.of("output") if v.type in NUMBERS for n in v.elements()
     ]
     n, m = len(states), len(inputs)
     notes = []
@@ -153,6 +156,9 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
         full = np.zeros((len(outputs), m))
         start = dict(zip(inputs, instance.get(*inputs).tolist(), strict=True)) if inputs else {}
         for column, name in enumerate(inputs):
+            if not instance.description.whole(name).type.startswith("Float"):
+                notes.append(f"{instance.name}: {name} is no real number and is held")
+                continue
             step = INCREMENT * max(1.0, abs(start[name]))
             ends = []
             for value in (start[name] + step, start[name] - step):

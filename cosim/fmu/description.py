@@ -7,10 +7,12 @@ validates.
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,15 +23,21 @@ Causality = Literal[
     "parameter", "calculatedParameter", "structuralParameter", "input", "output", "local",
     "independent",
 ]  # fmt: skip
-Start = float | bool | str | None
+Start = float | bool | str | bytes | None
 
+_TRUE = ("true", "1")
 FMI2_TYPES = {
-    "Real": "Float64", "Integer": "Int32", "Enumeration": "Int32", "Boolean": "Boolean2",
+    "Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration2", "Boolean": "Boolean2",
     "String": "String",
 }  # fmt: skip
 FMI3_TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
     "Boolean", "Enumeration", "String", "Binary", "Clock",
+)  # fmt: skip
+
+INTEGERS = (
+    "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration",
+    "Enumeration2",
 )  # fmt: skip
 
 
@@ -45,7 +53,12 @@ class Variable:
         unit: None where the FMU declares none.
         start: start values, one per element.
         minimum, maximum, nominal: None where open.
-        size: number of values behind the value reference.
+        dimensions: of an array of FMI 3, () for a scalar.
+        index: of an element of an array, its position among the array's values; else None.
+        relative: a difference, so that the offset of its unit does not count (FMI 2's
+            relativeQuantity).
+        items: of an enumeration, what its values are called.
+        alias: of an alias of FMI 3, the variable whose second name it is; else "".
     """
 
     name: str
@@ -60,7 +73,16 @@ class Variable:
     maximum: float | None = None
     nominal: float | None = None
     text: str = ""
-    size: int = 1
+    dimensions: tuple[int, ...] = ()
+    index: int | None = None
+    relative: bool = False
+    items: Mapping[int, str] | None = None
+    alias: str = ""
+
+    @property
+    def size(self) -> int:
+        """Number of values behind the value reference."""
+        return math.prod(self.dimensions)
 
     @property
     def symbol(self) -> str:
@@ -68,10 +90,17 @@ class Variable:
         return self.unit.symbol if self.unit else ""
 
     def elements(self) -> tuple[str, ...]:
-        """Names of the scalar elements."""
-        if self.size == 1:
+        """Names of the scalar elements: `q[1]` of a vector, `A[2,1]` of a matrix, row by row."""
+        if not self.dimensions:
             return (self.name,)
-        return tuple(f"{self.name}[{index + 1}]" for index in range(self.size))
+        places = itertools.product(*(range(1, count + 1) for count in self.dimensions))
+        return tuple(f"{self.name}[{','.join(map(str, place))}]" for place in places)
+
+    def element(self, index: int) -> Variable:
+        """One element of an array, as a scalar variable."""
+        start = (self.start[index],) if len(self.start) == self.size else ()
+        name = self.elements()[index]
+        return replace(self, name=name, dimensions=(), index=index, start=start)
 
 
 @dataclass(frozen=True)
@@ -138,8 +167,8 @@ class Description:
         return any(self.capabilities.get(spelling) in ("true", "1") for spelling in spellings)
 
     def of(self, causality: Causality) -> list[Variable]:
-        """The variables of one causality."""
-        return [v for v in self.variables.values() if v.causality == causality]
+        """The variables of one causality, each under its first name."""
+        return [v for v in self.variables.values() if v.causality == causality and not v.alias]
 
     def find(self, name: str) -> Variable:
         """A variable by name.
@@ -154,17 +183,39 @@ class Description:
         return self.variables[name]
 
     def expand(self, name: str) -> list[Variable]:
-        """The variable `q`, or all of the vector `q[1]` ... `q[n]`.
+        """What a name means: the variable `q`, an element of an array, or scalars that count up.
+
+        FMI 2 has no arrays; there `q` means all of `q[1]`, `q[2]`, ... or `q[0]`, `q[1]`, ...
 
         Raises:
             UnknownNameError: neither exists.
         """
         if name in self.variables:
             return [self.variables[name]]
-        found: list[Variable] = []
-        while f"{name}[{len(found) + 1}]" in self.variables:
-            found.append(self.variables[f"{name}[{len(found) + 1}]"])
-        return found or [self.find(name)]
+        whole = self.variables.get(name.rpartition("[")[0])
+        if whole is not None and whole.dimensions:
+            wanted, names = name.replace(" ", ""), whole.elements()
+            if wanted not in names:
+                raise UnknownNameError(
+                    f"{self.name} has no element {name!r}: {whole.name} goes from {names[0]} to "
+                    f"{names[-1]}"
+                    if names
+                    else f"{self.name}: {whole.name} is an array without elements"
+                )
+            return [whole.element(names.index(wanted))]
+        for first in (1, 0):
+            found: list[Variable] = []
+            while f"{name}[{first + len(found)}]" in self.variables:
+                found.append(self.variables[f"{name}[{first + len(found)}]"])
+            if found:
+                if first == 1 and f"{name}[0]" in self.variables:
+                    found.insert(0, self.variables[f"{name}[0]"])
+                return found
+        return [self.find(name)]
+
+    def whole(self, name: str) -> Variable:
+        """The variable of the FMU that holds a scalar element (`x` for `x[2]` of an array)."""
+        return self.variables.get(name) or self.find(name.rpartition("[")[0])
 
 
 def _number(element: ET.Element, key: str) -> float | None:
@@ -191,11 +242,15 @@ def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str,
 def _start(text: str | None, type_: str) -> tuple[Start, ...]:
     if text is None:
         return ()
-    if type_ in ("String", "Binary"):
+    if type_ == "String":
         return (text,)
+    if type_ == "Binary":
+        return (bytes.fromhex(text),)
     items = text.split()
     if type_.startswith("Boolean"):
         return tuple(item in ("true", "1") for item in items)
+    if type_ in INTEGERS:
+        return tuple(int(item) for item in items)
     return tuple(float(item) for item in items)
 
 
@@ -215,6 +270,15 @@ class _Types:
     def number(self, element: ET.Element, key: str) -> float | None:
         text = self.get(element, key)
         return None if text is None else float(text)
+
+    def items(self, element: ET.Element) -> dict[int, str]:
+        """Names of the values of an enumeration; FMI 2 counts from 1 where it does not say."""
+        declared = self._types.get(element.get("declaredType", ""))
+        found = [] if declared is None else declared.findall("Item")
+        return {
+            int(item.get("value", index)): item.get("name", "")
+            for index, item in enumerate(found, start=1)
+        }
 
 
 def _named(elements: Iterable[ET.Element]) -> Iterator[tuple[str, ET.Element]]:
@@ -249,19 +313,23 @@ def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
                 maximum=types.number(inner, "max"),
                 nominal=types.number(inner, "nominal"),
                 text=element.get("description", ""),
+                relative=inner.tag == "Real" and types.get(inner, "relativeQuantity") in _TRUE,
+                items=types.items(inner) if inner.tag == "Enumeration" else None,
             )
         )
     return found
 
 
-def _size(element: ET.Element, starts: Mapping[int, Start]) -> int:
-    size = 1
-    for dimension in element.iterfind("Dimension"):
-        if "start" in dimension.attrib:
-            size *= int(dimension.attrib["start"])
-        else:
-            size *= int(starts.get(int(dimension.attrib["valueReference"])) or 1)
-    return size
+def _dimensions(element: ET.Element, starts: Mapping[int, Start]) -> tuple[int, ...]:
+    """Numbers of elements; a structural parameter has the one of its start value."""
+    return tuple(
+        int(
+            dimension.attrib["start"]
+            if "start" in dimension.attrib
+            else starts[int(dimension.attrib["valueReference"])] or 0
+        )
+        for dimension in element.iterfind("Dimension")
+    )
 
 
 def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
@@ -274,13 +342,16 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
     }
     found = []
     for element in elements:
-        type_ = "Int64" if element.tag == "Enumeration" else element.tag
-        size = _size(element, structural)
-        inner = element.find("Start")
-        text = inner.get("value") if inner is not None else element.get("start")
-        start = _start(text, type_)
-        if size > 1 and len(start) == 1:
-            start = start * size
+        type_ = element.tag
+        dimensions = _dimensions(element, structural)
+        inner = element.findall("Start")  # of strings and binaries, one per element
+        start = (
+            tuple(value for item in inner for value in _start(item.get("value"), type_))
+            if inner
+            else _start(element.get("start"), type_)
+        )
+        if dimensions and len(start) == 1:
+            start = start * math.prod(dimensions)
         default = "continuous" if element.tag in ("Float64", "Float32") else "discrete"
         found.append(
             Variable(
@@ -296,9 +367,20 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
                 maximum=types.number(element, "max"),
                 nominal=types.number(element, "nominal"),
                 text=element.get("description", ""),
-                size=size,
+                dimensions=dimensions,
+                relative=types.get(element, "relativeQuantity") in _TRUE,
+                items=types.items(element) if type_ == "Enumeration" else None,
             )
         )
+        found += [
+            replace(
+                found[-1],
+                name=alias.attrib["name"],
+                text=alias.get("description", ""),
+                alias=element.attrib["name"],
+            )
+            for alias in element.iterfind("Alias")
+        ]
     return found
 
 
@@ -372,7 +454,7 @@ def _assemble(
 ) -> Description:
     units = read_units(root.iterfind("UnitDefinitions/Unit"))
     variables = _variables2(root, units) if fmi == 2 else _variables3(root, units)
-    inputs = tuple(v.name for v in variables if v.causality == "input")
+    inputs = tuple(v.name for v in variables if v.causality == "input" and not v.alias)
     if fmi == 2:
         indexed = {index + 1: v for index, v in enumerate(variables)}
         unknowns = [
@@ -380,13 +462,15 @@ def _assemble(
             for e in root.iterfind("ModelStructure/Outputs/Unknown")
         ]
     else:
-        indexed = {v.reference: v for v in variables}
+        indexed = {v.reference: v for v in variables if not v.alias}
         unknowns = [
             (indexed[int(e.attrib["valueReference"])], e)
             for e in root.iterfind("ModelStructure/Output")
         ]
     dependencies, assumed = _dependencies(unknowns, indexed, inputs)
     for variable in variables:
+        if variable.alias:
+            continue
         if variable.causality == "output" and variable.name not in dependencies:
             dependencies[variable.name] = inputs
             assumed |= {variable.name}

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from ..data.recording import Recording
-from ..errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, StepError, ValueRangeError
 from . import kernel
 from .initialization import initialize
 from .interpreter import Interpreter
@@ -27,11 +27,8 @@ class Interpreted:
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""
-        run = self.run
-        while run.index < last:
-            for op, a, b in self.step:
-                run.do(op, a, b)
-            run.index += 1
+        while self.run.index < last:
+            self.run.communication_step(self.step)
 
     def restart(self) -> None:
         """Nothing to forget."""
@@ -56,6 +53,7 @@ class Execution:
     Attributes:
         run: the instances and their values.
         stepper: what makes the communication steps, None until the first one.
+        ended: the words of an FMU that asked to end the run, "" if none did.
     """
 
     def __init__(
@@ -72,6 +70,7 @@ class Execution:
         self.outline = outline
         self.run = interpreter(outline, stack)
         self.stepper: Stepper | None = None
+        self.ended = ""
 
     def execute(self, progress: Callable[[float], None] | None = None) -> Recording:
         """The whole run.
@@ -88,10 +87,13 @@ class Execution:
         initialize(self.run)
         try:
             stepper = self.begin()
-            while self.run.index < count:
-                stepper.advance(min(self.run.index + shown, count))
-                if progress is not None:
-                    progress(self.run.index / count)
+            try:
+                while self.run.index < count:
+                    stepper.advance(min(self.run.index + shown, count))
+                    if progress is not None:
+                        progress(self.run.index / count)
+            except EndRequest as request:
+                self.ended = str(request)
             self.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self.stopped(error, keep=True) from error
@@ -119,7 +121,17 @@ class Execution:
                     "Python does; take executor auto"
                 )
             return plan.stepper(self.run)
-        if wanted == "python" or (wanted == "auto" and kernel.find() is None):
+        objects = [
+            name
+            for name, carries in zip(plan.layout.names, plan.layout.objects.tolist(), strict=True)
+            if carries
+        ]
+        if objects and wanted == "c":
+            raise ValueRangeError(
+                f"executor 'c': {objects[0]} is a string, a binary or an integer of 64 bits, which "
+                "the executor in Python passes on; take executor auto, or do not record it"
+            )
+        if objects or wanted == "python" or (wanted == "auto" and kernel.find() is None):
             return Interpreted(self.run)
         try:
             return Compiled(self.run)
@@ -129,13 +141,16 @@ class Execution:
             ) from None
 
     def finish(self) -> None:
-        """Operations at the end of the run."""
+        """Operations at the end of the run, unless its present values are recorded already."""
+        if self.run.row > self.run.index // self.outline.every:
+            return
         for op, a, b in decoded(self.outline.plan.final):
             self.run.do(op, a, b)
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""
         self.run.restart()
+        self.ended = ""
         if self.stepper is not None:
             self.stepper.restart()
 
@@ -163,4 +178,6 @@ class Execution:
                 **(self.stepper.report() if self.stepper is not None else {}),
             },
             error,
+            objects=run.passing.kept,
+            notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],
         )

@@ -20,9 +20,7 @@ def smooth(system: System, layout: Layout) -> NDArray[np.bool_]:
     """Per copy, whether both ends are continuous in time."""
 
     def continuous(full: str) -> bool:
-        instance, _, variable = full.partition(".")
-        known = system.members[instance].description.variables
-        found = known[variable if variable in known else variable.rpartition("[")[0]]
+        found = system.declaration(full)
         return found.type in ("Float64", "Float32") and found.variability == "continuous"
 
     ends = zip(layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True)

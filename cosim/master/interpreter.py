@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import AlgebraicLoopError, FmuCallError
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from .input_derivatives import InputDerivatives, bend
 from .newton import Newton
+from .objects import ObjectPassing
 from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
 
@@ -27,7 +30,7 @@ class Interpreter:
         stack: ends the FMUs' instances.
 
     Attributes:
-        values: one per slot of the plan's layout.
+        values, objects: one per slot of the plan's layout.
         instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
         index: communication point at which the run stands.
         rows, row: recorded values, and how many rows there are.
@@ -43,6 +46,7 @@ class Interpreter:
         self.plan, self.layout = outline.plan, outline.plan.layout
         self.external, self.times, self.every = outline.external, outline.times, outline.every
         self.values = np.zeros(len(self.layout.names))
+        self.objects = np.full(len(self.layout.names), None, dtype=object)
         self.instances: list[Instance] = []
         self.outputs: list[Block] = []
         self.inputs: list[Block] = []
@@ -56,9 +60,14 @@ class Interpreter:
                 (self.outputs, self.layout.outputs, self.layout.fetched),
                 (self.inputs, self.layout.inputs, self.layout.given),
             ):
-                view = self.values[spans[index, 0] : spans[index, 1]]
+                span = slice(*spans[index].tolist())
                 variables = [member.description.variables[name] for name in names[index]]
-                blocks.append(Block(instance, variables, view))
+                blocks.append(Block(instance, variables, self.values[span], self.objects[span]))
+        origins = {c.target: c.source for c in self.system.connections}
+        origins.update({name: signal.text for name, signal in outline.signals.items()})
+        for block, owner in zip(self.inputs, self.system.members, strict=True):
+            block.origins = [origins.get(f"{owner}.{name}", "") for name in block.names]
+        self.passing = ObjectPassing(self.layout, outline.observed, outline.objects)
         self.rows = np.empty((outline.count // self.every + 1, len(outline.observed)))
         self.row = self.index = 0
         self.bond_energy = np.zeros(len(self.layout.bonds))
@@ -77,12 +86,32 @@ class Interpreter:
         """Communication points as the executor in Python takes them: a compiled one needs none."""
         return list(self.times.tolist())
 
+    def communication_step(self, step: Sequence[tuple[Op, int, int]], begin: int = 0) -> None:
+        """The operations of one communication step, from the one numbered `begin`.
+
+        Raises:
+            EndRequest: an FMU asked to end the simulation. If it went to the end of the step, the
+                others have done so, too, and the run stands there.
+        """
+        end = None
+        for op, a, b in step[begin:]:
+            try:
+                self.do(op, a, b)
+            except EndRequest as request:
+                if op is not Op.STEP or request.time < self.instants[self.index + 1]:
+                    raise
+                end = end or request
+        self.index += 1
+        if end is not None:
+            raise end
+
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""
         self.values[:] = 0.0
         self.bond_energy[:] = 0.0
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
+        self.passing.restart()
         self.past[0] = 0
         self.started = False
         for newton in self.newtons:
@@ -90,6 +119,14 @@ class Interpreter:
         for instance, member in zip(self.instances, self.system.members.values(), strict=True):
             instance.reset()
             instance.set(member.parameters)
+
+    def size(self, time: float, step: float) -> float:
+        """A step that does not end beyond the end of the run by rounding."""
+        if time + step > self.instants[-1]:
+            step = self.instants[-1] - time
+            while time + step > self.instants[-1]:
+                step = math.nextafter(step, 0.0)
+        return step
 
     # -- operations ------------------------------------------------------------------------------
 
@@ -102,14 +139,19 @@ class Interpreter:
             case Op.GET:
                 self.outputs[a].get()
             case Op.STEP:
-                self.instances[a].step(self.instants[self.index], self.step)
+                time = self.instants[self.index]
+                self.instances[a].step(time, self.size(time, self.step))
             case Op.COPY:
                 values[layout.copy_target[a:b]] = (
                     values[layout.copy_source[a:b]] * layout.copy_gain[a:b]
                     + layout.copy_offset[a:b]
                 )
+                if self.passing:
+                    self.passing.copy(self.values, self.objects, a, b)
             case Op.EXTERNAL:
                 values[layout.external] = self.external[self.index]
+                if self.passing:
+                    self.passing.drive(self.objects, self.index)
             case Op.RECORD:
                 self.record()
             case Op.ENERGY:
@@ -132,7 +174,7 @@ class Interpreter:
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 time = self.instants[self.index] + part * self.step / parts
-                self.instances[a].step(time, self.step / parts)
+                self.instances[a].step(time, self.size(time, self.step / parts))
 
     def extrapolate(self, index: int, mean: Mean) -> None:
         """Let an input follow the polynomial through the last values of its source."""
@@ -186,6 +228,8 @@ class Interpreter:
         if self.index % self.every:
             return
         self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+        if self.passing:
+            self.passing.keep(self.objects)
 
     def keep(self, row: Vector) -> None:
         """Add a row to the recording."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -36,6 +36,8 @@ class Outline:
         every: every n-th communication point is recorded.
         signals: scalar input -> what drives it.
         external: values of the driven inputs, one row per communication point.
+        objects: per column of `external` whose values travel as objects, one per communication
+            point.
     """
 
     system: System
@@ -50,6 +52,7 @@ class Outline:
     every: int
     signals: Mapping[str, Signal]
     external: Vector
+    objects: Mapping[int, Sequence[Any]]
 
     @property
     def count(self) -> int:
@@ -62,6 +65,9 @@ class Outline:
         bond_energy: Mapping[str, float],
         how: Mapping[str, Any],
         error: str = "",
+        *,
+        objects: Mapping[str, Sequence[Any]] | None = None,
+        notes: Sequence[str] = (),
     ) -> Recording:
         """A recording of this run.
 
@@ -70,6 +76,8 @@ class Outline:
             bond_energy: per power bond [J].
             how: what else its provenance says of how it was run.
             error: what ended it early.
+            objects: recorded values that travel as objects.
+            notes: what else is to be known.
         """
         return Recording(
             time=self.times[:: self.every][: len(rows)].copy(),
@@ -83,6 +91,11 @@ class Outline:
             },
             bond_energy=dict(bond_energy),
             error=error,
+            objects={
+                name: _column(self.system.declaration(name).type, items[: len(rows)])
+                for name, items in (objects or {}).items()
+            },
+            notes=tuple(notes),
         )
 
     def _provenance(self) -> dict[str, Any]:
@@ -107,6 +120,12 @@ class Outline:
             "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
             "versions": {name: _version(name) for name in ("cosim", "numpy")},
         }
+
+
+def _column(type_: str, items: Sequence[Any]) -> NDArray[Any]:
+    """Recorded objects as an array of their type."""
+    kinds = {"Int64": np.int64, "UInt64": np.uint64}
+    return np.array(items, dtype=kinds.get(type_, object))
 
 
 def _plain(value: Any) -> Any:

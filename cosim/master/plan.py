@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fmu.values import OBJECTS
 from ..system.system import Bond, System
 
 Integers = NDArray[np.int64]
@@ -58,6 +59,8 @@ class Layout:
         copies: per instance (first, behind last) of the copies into it.
         external: slots of the external inputs.
         record_source, record_gain, record_offset: where observed signals come from.
+        objects: per slot, whether it carries an object beside its number (64-bit integers, strings,
+            binaries), which the interpreter alone passes on.
         bonds: power bonds.
         bond_index, bond_output, bond_input, bond_sign: their terms.
     """
@@ -77,6 +80,7 @@ class Layout:
     record_source: Integers
     record_gain: Vector
     record_offset: Vector
+    objects: NDArray[np.bool_]
     bonds: tuple[Bond, ...]
     bond_index: Integers
     bond_output: Integers
@@ -181,13 +185,6 @@ def decoded(rows: Integers) -> list[tuple[Op, int, int]]:
     return [(Op(op), a, b) for op, a, b in rows.tolist()]
 
 
-def _whole(system: System, name: str) -> str:
-    """The FMU's variable that holds a scalar element (`x` for an element of an FMI 3 array)."""
-    instance, _, variable = name.partition(".")
-    known = system.members[instance].description.variables
-    return variable if variable in known else variable.rpartition("[")[0]
-
-
 def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) -> Layout:
     """Give every exchanged variable of a system its slot.
 
@@ -202,7 +199,7 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
     given: dict[str, dict[str, None]] = {name: {} for name in instances}
 
     def add(table: dict[str, dict[str, None]], full: str) -> None:
-        table[full.partition(".")[0]][_whole(system, full)] = None
+        table[full.partition(".")[0]][system.declaration(full).name] = None
 
     for connection in system.connections:
         add(fetched, connection.source)
@@ -257,6 +254,7 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
         record_source=np.array([item[0] for item in record], dtype=np.int64),
         record_gain=np.array([item[1] for item in record], dtype=np.float64),
         record_offset=np.array([item[2] for item in record], dtype=np.float64),
+        objects=np.array([system.declaration(name).type in OBJECTS for name in names], np.bool_),
         bonds=bonds,
         bond_index=np.array([term[0] for term in terms], dtype=np.int64),
         bond_output=np.array([term[1] for term in terms], dtype=np.int64),

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -21,13 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.recording import Recording
-from ..errors import AlgebraicLoopError, FmuCallError, ValueRangeError
-from ..fmu.exchange import Block, check_values
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
+from ..fmu.exchange import Block
+from ..fmu.values import check_values
+from ..system.inputs import Driver
 from . import kernel
 from .execution import Execution
 from .initialization import initialize
 from .kernel.stepper import Compiled
-from .master import Driver, Master
+from .master import Master
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
@@ -79,7 +81,16 @@ class Session:
     def _block(self, name: str) -> tuple[Block, Any]:
         member, variables = self.master.system.variables(name)
         position = list(self.master.system.members).index(member.name)
-        return Block(self._run.instances[position], variables), variables
+        whole = [member.description.whole(v.name) for v in variables]
+        return Block(self._run.instances[position], whole), variables
+
+    def _begin(self, name: str) -> list[Any]:
+        """Values of an array as the system has them."""
+        member, (variable,) = self.master.system.variables(name)
+        given = member.parameters.get(variable.name, variable.start)
+        if len(given) != variable.size:
+            raise ValueRangeError(f"{name} has no start values; set it as a whole")
+        return check_values(name, [variable], list(given))
 
     def run(
         self, values: Mapping[str, float] | Vector | None = None, *, limit: float = math.inf
@@ -105,19 +116,30 @@ class Session:
             values = dict(zip(self.targets, np.asarray(values).tolist(), strict=True))
         run = self._run
         self._execution.restart()
+        arrays: dict[str, tuple[Block, list[Any]]] = {}
         for name, value in values.items():
             if name not in self._blocks:
                 self._blocks[name] = self._block(name)
             block, variables = self._blocks[name]
-            block.set(check_values(name, variables, value))
+            found = check_values(name, variables, value)
+            if variables[0].index is None:
+                block.set(found)
+            else:  # an element: FMI sets arrays as a whole
+                whole = name.rpartition("[")[0]
+                arrays.setdefault(whole, (block, self._begin(whole)))[1][variables[0].index] = (
+                    found[0]
+                )
+        for block, items in arrays.values():
+            block.set(items)
         initialize(run)
         try:
             self._execution.begin()
-            self._advance_within(limit)
+            with suppress(EndRequest):  # an end that an FMU asks for is one
+                self._advance_within(limit)
             self._execution.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self._execution.stopped(error, keep=False) from error
-        return self.times, run.rows[: run.row].copy()
+        return self.times[: run.row], run.rows[: run.row].copy()
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):

@@ -145,6 +145,7 @@ class Result:
                 for key, item in run.comparisons.items()
             },
             "checks": [{**check.to_dict(), "name": name} for name, check in self.checks.items()],
+            "notes": list(dict.fromkeys(n for run in self.runs.values() for n in run.notes)),
             "files": [str(path) for path in self.files],
         }
 
@@ -266,7 +267,7 @@ class Prepared:
             checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
             wall_s=wall_s,
             fmu_steps=int(recording.provenance["fmu_steps"]),
-            notes=self.notes,
+            notes=(*self.notes, *recording.notes),
         )
 
 

@@ -72,7 +72,7 @@ def test_run_and_files(folder: Path, provider, tmp_path: Path) -> None:
     content = json.loads((tmp_path / "out" / "result.json").read_text())
     assert list(content) == [
         "scenario", "variants", "algorithm", "step", "simulated_s", "wall_s", "fmu_steps",
-        "energy_residual_J", "comparison", "checks", "files",
+        "energy_residual_J", "comparison", "checks", "notes", "files",
     ]  # fmt: skip
     assert set(content["comparison"]["w"]) == {"unit", "rms", "max", "reference"}
     assert content["comparison"]["w"]["unit"] == "rad/s"

@@ -141,10 +141,7 @@ class StepControl:
             self.power[bond] += 0.5 * nominal
 
     def _nominal(self, full: str) -> float:
-        instance, _, variable = full.partition(".")
-        known = self.run.system.members[instance].description.variables
-        found = known[variable if variable in known else variable.rpartition("[")[0]]
-        return abs(found.nominal or 1.0)
+        return abs(self.run.system.declaration(full).nominal or 1.0)
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""
@@ -191,11 +188,10 @@ class StepControl:
         run = self.run
         begin = run.values.copy()
         time, half = self.time, 0.5 * size
-        with saved(run) as states:
+        with saved(run) as before:
             self.go(time, size)
             whole = run.values[self.sources].copy()
-            restore(run, states)
-            run.values[:] = begin
+            restore(run, before)
             first, passed = self.go(time, half)
             middle = run.values.copy()
             second, also = self.go(time + half, half)
@@ -208,8 +204,7 @@ class StepControl:
                         f"{size:.3g} s misses the tolerance {self.settings.tolerance:g} of the "
                         f"step control ({self._worst(begin, whole)})"
                     )
-                restore(run, states)
-                run.values[:] = begin
+                restore(run, before)
                 self.size = size * (max(0.2, 0.9 * error**-0.5) if np.isfinite(error) else 0.2)
                 return
         self.taken += 1

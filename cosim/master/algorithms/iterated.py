@@ -24,14 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FmuCallError
-from ...fmu.instance import State
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import positive, refuse_without_states, smooth
 from ..interpreter import Interpreter
 from ..newton import Newton
 from ..plan import Op, Plan, decoded, final_operations, initial_sweep, lay_out, operations
-from ..rollback import restore, saved
+from ..rollback import Checkpoint, restore, saved
 
 Vector = NDArray[np.float64]
 FIXED_POINT = 12
@@ -102,12 +101,12 @@ class Iterated:
         """One communication step."""
         run = self.run
         begin = run.values.copy()
-        with saved(run) as states:
+        with saved(run) as before:
             end = begin[self.sources].tolist()
-            settled = not self.newton.valid[0] and self.fixed_point(states, begin, end)
+            settled = not self.newton.valid[0] and self.fixed_point(before, begin, end)
             if not settled:
                 end = begin[self.sources].tolist()
-                settled = self.newton.solve(lambda z: self.attempt(states, begin, z), end)
+                settled = self.newton.solve(lambda z: self.attempt(before, begin, z), end)
             if not settled:
                 raise FmuCallError(
                     f"{run.system.name}: the step of {run.step:.9g} s does not "
@@ -122,11 +121,11 @@ class Iterated:
         inputs = self.run.layout.inputs
         return slice(int(inputs[0, 0]), int(inputs[-1, 1]))
 
-    def fixed_point(self, states: list[State], begin: Vector, end: list[float]) -> bool:
+    def fixed_point(self, before: Checkpoint, begin: Vector, end: list[float]) -> bool:
         """Repeat the step with the end values of the last repetition; whether that settled."""
         last = np.inf
         for _ in range(FIXED_POINT):
-            found = self.attempt(states, begin, end)
+            found = self.attempt(before, begin, end)
             size = max(
                 (abs(a - b) / max(1.0, abs(b)) for a, b in zip(found, end, strict=True)),
                 default=0.0,
@@ -139,13 +138,12 @@ class Iterated:
             last = size
         return False
 
-    def attempt(self, states: list[State], begin: Vector, end: list[float]) -> list[float]:
+    def attempt(self, before: Checkpoint, begin: Vector, end: list[float]) -> list[float]:
         """End values of a step with inputs from given end values."""
         run, layout = self.run, self.run.layout
-        restore(run, states)
+        restore(run, before)
         self.repetitions += 1
         values = run.values
-        values[:] = begin
         values[self.sources] = 0.5 * (begin[self.sources] + np.array(end))
         values[layout.copy_target] = (
             values[layout.copy_source] * layout.copy_gain + layout.copy_offset

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import hashlib
+import math
 import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,21 +31,22 @@ SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.
 """Of the library; the first is compiled and includes the others."""
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
-    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
-    "Boolean",
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
+    "Boolean", "Boolean2",
 )  # fmt: skip
-_TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Boolean2": 6}
+_TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
 
 
 class _Call(ct.Structure):
     _fields_ = (
         ("component", _P), ("function", _P), ("references", _P), ("buffer", _P), ("slots", _P),
         ("n_references", _I64), ("n_values", _I64), ("type", _I32), ("version", _I32),
+        ("warned", _I64),
     )  # fmt: skip
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P))
+    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64))
 
 
 class _Instruction(ct.Structure):
@@ -86,7 +88,7 @@ class _Derivatives(ct.Structure):
 class _Run(ct.Structure):
     _fields_ = (
         ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
-        ("n_instructions", _I64), ("times", _P), ("step", _D), ("external", _P),
+        ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
         ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
@@ -120,11 +122,11 @@ class _Code(IntEnum):
     SET_DERIVATIVES = 16
 
 
-UNFIT = 7
+UNFIT = 8
 """Status of a set call that was not made, because a number does not fit the variable's type."""
-UNSETTLED = 8
+UNSETTLED = 9
 """Status of an algebraic loop that has no solution or does not settle."""
-TOO_LONG, TOO_LARGE = 9, 10
+TOO_LONG, TOO_LARGE = 10, 11
 """Statuses of a run that took more than its limit, and of one that ran away."""
 _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
 
@@ -184,6 +186,8 @@ class Kernel:
         plan = plan or bound.plan
         layout, instances = plan.layout, bound.instances
         self._keep: list[Any] = [bound]
+        self._made: dict[type[ct.Structure], Any] = {}
+        self._bound = bound
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
         self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
@@ -205,6 +209,7 @@ class Kernel:
             values=self._array(bound.values),
             times=self._array(bound.times),
             step=bound.step,
+            end=float(bound.times[-1]),
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
@@ -304,6 +309,7 @@ class Kernel:
         items = [row if isinstance(row, kind) else kind(*row) for row in rows]
         array = (kind * max(len(items), 1))(*items)
         self._keep.append(array)
+        self._made[kind] = array
         return ct.addressof(array)
 
     def _call(self, op: Op, instance: Instance, block: Block, part: Any, base: int) -> _Call:
@@ -332,6 +338,28 @@ class Kernel:
     def restart(self) -> None:
         """Begin again at the first communication point."""
         self.run.index = self.run.row = self.run.next_record = 0
+
+    def reached(self) -> float | None:
+        """The time that the failed step has reached, where the FMU says so [s]."""
+        instance = self._instances[self.run.failed_member]
+        if instance.binding.version != 3:
+            return None
+        return float(self._made[_Member][self.run.failed_member].reached)
+
+    def hand_over(self) -> None:
+        """Give the interpreter what it needs to go on within a step."""
+        terms = list(self._made[_Term])[: len(self._bound.previous)]
+        self._bound.previous = [term.previous for term in terms]
+        self._bound.held[:] = [term.held for term in terms]
+
+    def note_warnings(self) -> None:
+        """Tell the instances which of their calls returned warnings."""
+        for (op, instance, _), call in zip(self._parts, self._made[_Call], strict=False):
+            if call.warned:
+                instance.warned("getting values" if op is Op.GET else "setting values", math.nan)
+        for instance, member in zip(self._instances, self._made[_Member], strict=False):
+            if member.warned:
+                instance.warned("a step", math.nan)
 
     def failed(self) -> tuple[Op, Instance | None, Any]:
         """What failed: operation, instance and what it was about.

@@ -13,19 +13,22 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
+#include <float.h>
+
 #include "run.h"
 
-/* Whether a double can be cut to an integer; not-a-number cannot. */
-#define ANY(v) (true)
-#define SIGNED(bits, v) (trunc(v) >= -ldexp(1.0, bits - 1) && trunc(v) < ldexp(1.0, bits - 1))
-#define UNSIGNED(bits, v) (trunc(v) >= 0.0 && trunc(v) < ldexp(1.0, bits))
+/* Whether a number is whole up to rounding, and fits: see cosim/fmu/values.py. */
+#define WHOLE(v) (fabs((v) - rint(v)) <= 1e-9 + 4.0 * DBL_EPSILON * fabs(v))
+#define SIGNED(bits, v) (WHOLE(v) && rint(v) >= -ldexp(1.0, bits - 1) && rint(v) < ldexp(1.0, bits - 1))
+#define UNSIGNED(bits, v) (WHOLE(v) && rint(v) >= 0.0 && rint(v) < ldexp(1.0, bits))
+#define TRUTH(v) (WHOLE(v) && (rint(v) == 0.0 || rint(v) == 1.0))
 
-#define CONVERT(code, ctype, fits)                                                   \
+#define CONVERT(code, ctype, fits, rounded)                                          \
   case code:                                                                         \
     for (size_t i = 0; i < c->n_values; i++) {                                       \
       double *const v = values + c->slots[i];                                        \
       if (!into) *v = (double)((ctype *)c->buffer)[i];                               \
-      else if (fits) ((ctype *)c->buffer)[i] = (ctype)*v;                            \
+      else if (fits) ((ctype *)c->buffer)[i] = (ctype)(rounded);                     \
       else return UNFIT;                                                             \
     }                                                                                \
     break;
@@ -33,17 +36,17 @@
 /* Move numbers between the run's values and the buffer of a call. */
 static int convert(const Call *c, double *values, int into) {
   switch (c->type) {
-    CONVERT(0, double, ANY(*v))
-    CONVERT(1, float, ANY(*v))
-    CONVERT(2, int8_t, SIGNED(8, *v))
-    CONVERT(3, uint8_t, UNSIGNED(8, *v))
-    CONVERT(4, int16_t, SIGNED(16, *v))
-    CONVERT(5, uint16_t, UNSIGNED(16, *v))
-    CONVERT(6, int32_t, SIGNED(32, *v))
-    CONVERT(7, uint32_t, UNSIGNED(32, *v))
-    CONVERT(8, int64_t, SIGNED(64, *v))
-    CONVERT(9, uint64_t, UNSIGNED(64, *v))
-    CONVERT(10, bool, ANY(*v))
+    CONVERT(0, double, true, *v)
+    CONVERT(1, float, !(fabs(*v) > FLT_MAX), *v)
+    CONVERT(2, int8_t, SIGNED(8, *v), rint(*v))
+    CONVERT(3, uint8_t, UNSIGNED(8, *v), rint(*v))
+    CONVERT(4, int16_t, SIGNED(16, *v), rint(*v))
+    CONVERT(5, uint16_t, UNSIGNED(16, *v), rint(*v))
+    CONVERT(6, int32_t, SIGNED(32, *v), rint(*v))
+    CONVERT(7, uint32_t, UNSIGNED(32, *v), rint(*v))
+    CONVERT(8, int64_t, SIGNED(64, *v), rint(*v)) /* enumerations of FMI 3 */
+    CONVERT(9, bool, TRUTH(*v), rint(*v))
+    CONVERT(10, int32_t, TRUTH(*v), rint(*v)) /* booleans of FMI 2 */
   }
   return 0;
 }
@@ -55,47 +58,58 @@ static inline int access_call(const Call *c) {
 }
 
 /* Calls whose buffers are part of the run's values; the first that failed, or null. */
-static const Call *call2(const Call *c, const Call *end, int *status) {
+static Call *call2(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
     if (*status > 1) return c;
+    c->warned |= *status;
   }
   return 0;
 }
 
-static const Call *call3(const Call *c, const Call *end, int *status) {
+static Call *call3(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
     if (*status > 1) return c;
+    c->warned |= *status;
   }
   return 0;
 }
 
-static const Call *call_converted(const Call *c, const Call *end, double *values, int set, int *status) {
+static Call *call_converted(Call *c, const Call *end, double *values, int set, int *status) {
   for (; c < end; c++) {
     if (set && c->slots && (*status = convert(c, values, 1))) return c;
     *status = access_call(c);
     if (*status > 1) return c;
+    c->warned |= *status;
     if (!set && c->slots) convert(c, values, 0);
   }
   return 0;
 }
 
-static const Member *step2(const Member *m, const Member *end, double t, double h, int *status) {
+/* A step that does not end beyond the end of the run by rounding. */
+static double bounded(const Run *run, double t, double h) {
+  if (t + h > run->end)
+    for (h = run->end - t; t + h > run->end;) h = nextafter(h, 0.0);
+  return h;
+}
+
+static Member *step2(Member *m, const Member *end, double t, double h, int *status) {
   for (; m < end; m++) {
     *status = ((Step2)m->step)(m->component, t, h, 1);
     if (*status > 1) return m;
+    m->warned |= *status;
   }
   return 0;
 }
 
-static const Member *step3(const Member *m, const Member *end, double t, double h, int *status) {
+static Member *step3(Member *m, const Member *end, double t, double h, int *status) {
   bool event = false, stop = false, early = false;
-  double last = 0;
   for (; m < end; m++) {
-    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &last);
+    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
     if (*status <= 1 && stop) *status = TERMINATED;
     if (*status > 1) return m;
+    m->warned |= *status;
   }
   return 0;
 }
@@ -197,9 +211,9 @@ static const Derivatives *set_derivatives(const Derivatives *r, const Derivative
   return 0;
 }
 
-static const Member *substep(const Run *run, const Member *m, int64_t code, int *status) {
+static Member *substep(const Run *run, Member *m, int64_t code, int *status) {
   const double parts = (double)(code / PARTS / 4), part = (double)(code / 4 % PARTS);
-  const double t = run->times[run->index] + part * run->step / parts, h = run->step / parts;
+  const double t = run->times[run->index] + part * run->step / parts, h = bounded(run, t, run->step / parts);
   return code % 4 == 2 ? step2(m, m + 1, t, h, status) : step3(m, m + 1, t, h, status);
 }
 
@@ -208,8 +222,9 @@ static const Member *substep(const Run *run, const Member *m, int64_t code, int 
 /* Instructions from first to before last; 0 or the status that ended them. */
 static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
-  const Call *const calls = run->calls, *call = 0;
-  const Member *const members = run->members, *member = 0;
+  Call *const calls = run->calls, *call = 0;
+  Member *const members = run->members, *member = 0;
+  const double now = run->times[run->index], size = bounded(run, now, run->step);
   const Derivatives *refused = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
@@ -238,10 +253,10 @@ static int execute(Run *run, int64_t first, int64_t last) {
       call = call_converted(calls + in->first, calls + in->last, run->values, in->operation == CONVERT_SET, &status);
       break;
     case STEP2:
-      member = step2(members + in->first, members + in->last, run->times[run->index], run->step, &status);
+      member = step2(members + in->first, members + in->last, now, size, &status);
       break;
     case STEP3:
-      member = step3(members + in->first, members + in->last, run->times[run->index], run->step, &status);
+      member = step3(members + in->first, members + in->last, now, size, &status);
       break;
     case ENERGY:
       if (in->first == 1) add_energy(run, 1);

@@ -9,7 +9,7 @@
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
        SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
 /* beyond the statuses of FMI */
-enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8, TOO_LONG = 9, TOO_LARGE = 10 };
+enum { TERMINATED = 6, NOT_FINITE = 7, UNFIT = 8, UNSETTLED = 9, TOO_LONG = 10, TOO_LARGE = 11 };
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
 enum { PARTS = 1 << 16 };        /* as in cosim/master/plan.py */
 
@@ -22,10 +22,13 @@ typedef struct {
   const int64_t *slots;     /* where they stand in the run's values; null: the buffer is there */
   size_t n_references, n_values;
   int32_t type, version;
+  int64_t warned; /* whether the FMU has returned a warning */
 } Call;
 
 typedef struct {
   void *component, *step;
+  double reached; /* the time at which an FMU of FMI 3 says that it stands */
+  int64_t warned;
 } Member;
 
 /* What one operation does: with calls, members, copies from first to before last. */
@@ -71,13 +74,13 @@ typedef struct {
 } Derivatives;
 
 typedef struct {
-  const Member *members;
-  const Call *calls;
+  Member *members;
+  Call *calls;
   double *values;
   const Instruction *instructions;
   int64_t n_instructions;
   const double *times;
-  double step;
+  double step, end; /* the time at which the run ends */
   const double *external; /* rows per communication point */
   const int64_t *external_slot;
   int64_t n_external;

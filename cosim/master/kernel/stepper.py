@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
+from ...errors import EndRequest, FmuCallError
+from ...fmu.instance import Instance
 from ..interpreter import Interpreter
-from ..plan import Op
+from ..plan import Op, decoded
 from . import TOO_LARGE, TOO_LONG, UNFIT, UNSETTLED, Kernel
 
 
@@ -37,7 +39,8 @@ class Compiled:
         return self.run.index
 
     def report(self) -> Mapping[str, Any]:
-        """Nothing to say."""
+        """Nothing to say; instances are told of warnings."""
+        self.kernel.note_warnings()
         return {}
 
     def _ended(self, status: int) -> int:
@@ -58,7 +61,8 @@ class Compiled:
             return
         if op is Op.STEP:
             instance.time = run.instants[run.index]
-            raise instance.failed_step(run.step, status)
+            size = run.size(instance.time, run.step)
+            self._raise_step(instance, instance.failed_step(size, status, self.kernel.reached()))
         if op is Op.GET or run.index:  # it has stepped: where it is by its own count
             last = run.index if op is Op.GET else run.index - 1
             instance.time = run.instants[last] + run.step
@@ -67,3 +71,12 @@ class Compiled:
         if status == UNFIT:
             raise run.inputs[run.instances.index(instance)].unfit(part)
         raise instance.failed_access(op is Op.GET, part, status)
+
+    def _raise_step(self, instance: Instance, error: FmuCallError) -> NoReturn:
+        """Raise; if an FMU asked to end, the interpreter first brings the others to its time."""
+        run = self.run
+        if isinstance(error, EndRequest) and error.time >= run.instants[run.index + 1]:
+            self.kernel.hand_over()
+            steps, member = decoded(run.plan.step), run.instances.index(instance)
+            run.communication_step(steps, steps.index((Op.STEP, member, 0)) + 1)
+        raise error
