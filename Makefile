@@ -36,6 +36,7 @@ bench: $(STAMP)
 	$(BIN)/python -m benchmarks.fmu_step
 	$(BIN)/python -m benchmarks.masters
 	$(BIN)/python -m benchmarks.speed
+	$(BIN)/python -m benchmarks.startup
 
 wheel: $(STAMP)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .

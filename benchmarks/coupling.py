@@ -32,10 +32,11 @@ from cosim.data.recording import Recording
 from cosim.data.signals import Constant
 from cosim.errors import CosimError
 from cosim.installation.builder import default_provider
-from cosim.master.master import Driver, Master
+from cosim.master.master import Master
 from cosim.master.session import Session
 from cosim.scenario import scenario as scenarios
 from cosim.spec.units import conversion, parse
+from cosim.system.inputs import Driver, spread
 from cosim.system.system import System
 from cosim.system.toml import read_system
 from cosim.system.variants import apply
@@ -140,7 +141,9 @@ def of_scenario(name: str) -> Case:
     steps = tuple(item.step * factor for factor in (2.0, 1.0, 0.5, 0.25))
     # windings make the equations stiff: solved as one, a whole run takes up to hours
     long = bool({"motor_left", "arm"} & set(system.members))
-    return Case(system, item.duration, columns_of(system), item.inputs, usual, steps, long)
+    return Case(
+        system, item.duration, columns_of(system), spread(system, item.inputs), usual, steps, long
+    )
 
 
 def columns_of(system: System) -> tuple[Column, ...]:

@@ -28,7 +28,7 @@ from cosim.system.toml import read_system
 from sources.tools.crawler_identification import Constants, Turns
 from sources.tools.slip_laws import (
     CANDIDATES,
-    Score,
+    LawScore,
     SlipLaw,
     left_out,
     nested,
@@ -64,7 +64,7 @@ def table() -> tuple[Turns, Vector, Vector]:
     return turns, column("e2_m"), column("e3_m")
 
 
-def line(name: str, score: Score, size: int | str) -> str:
+def line(name: str, score: LawScore, size: int | str) -> str:
     """A row of the table."""
 
     def rms(values: Vector) -> float:

@@ -22,7 +22,7 @@ from typing import Any
 
 from benchmarks.coupling import of_scenario
 from cosim.master import kernel
-from cosim.master.execution import Execution
+from cosim.master.initialization import initialize
 from cosim.master.master import Master
 from cosim.master.plan import Op, operations
 from cosim.master.session import Session
@@ -63,27 +63,24 @@ def shares(master: Master, settings: dict[str, Any], repeats: int) -> dict[str, 
     """Processor time per communication step of each FMU [s]."""
     found = {}
     with Session(master, **settings) as session:
-        run: Execution = session._run
-        run.restart()
-        run.initialize()
+        run = session._run
+        session._execution.restart()
+        initialize(run)
         half = session.count // 2
-        advance = run.executor()
-        advance(half)
-        run.ramps.slope[:] = run.ramps.curve[:] = 0.0  # else each step begins with a jump back
+        session._stepper.advance(half)
+        run.derivatives.slope[:] = run.derivatives.curve[:] = (
+            0.0  # else each step begins with a jump back
+        )
         steps = min(50, (session.count - half) // repeats)  # near the state of the run
         for index, name in enumerate(run.layout.instances):
-            ramps = [
+            derivatives = [
                 (a, b) for op, a, b in run.plan.step.tolist()
-                if op == Op.RAMP and run.plan.means[a].instance == index
+                if op == Op.SET_DERIVATIVES and run.plan.means[a].instance == index
             ]  # fmt: skip
-            own = [(Op.SET, index, 0), *((Op.RAMP, a, b) for a, b in ramps)]
+            own = [(Op.SET, index, 0), *((Op.SET_DERIVATIVES, a, b) for a, b in derivatives)]
             rows = [*own, (Op.STEP, index, 0), (Op.GET, index, 0)]
             plan = replace(run.plan, step=operations(rows))
-            alone = kernel.Kernel(
-                plan, run.instances, run.outputs, run.inputs, run.values, run.times, master.step,
-                run.external, run.rows, run.bond_energy, run.every, run.newtons, run.history,
-                run.past, run.ramps, run.bond_mean,
-            )  # fmt: skip
+            alone = kernel.Kernel(run, plan)
             alone.run.index = half
             times = []
             for _ in range(repeats):

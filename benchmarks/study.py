@@ -21,8 +21,8 @@ from typing import Any
 
 from cosim.installation.builder import default_provider
 from cosim.study import Progress, parallel, run_study, study_from
-from cosim.study.compute import Outcome, Pool
-from cosim.study.planning import Plan, Task, make_plan
+from cosim.study.compute import RunnerPool, TaskResult
+from cosim.study.planning import StudyPlan, Task, plan_study
 
 SCHEDSTAT = "/proc/self/task/{}/schedstat"
 
@@ -33,16 +33,16 @@ def queued() -> float:
     return int(path.read_text().split()[1]) * 1e-9 if path.exists() else 0.0
 
 
-def nothing(*_: Task | Outcome | str) -> None:
+def nothing(*_: Task | TaskResult | str) -> None:
     """Results are not looked at."""
 
 
-def timed(plan: Plan, workers: int) -> tuple[float, float, float]:
+def timed(plan: StudyPlan, workers: int) -> tuple[float, float, float]:
     """Wall time, CPU time, and time of the busiest thread without waiting for a processor [s]."""
     busy: dict[int, list[float]] = {}
     compute = parallel.compute
 
-    def watched(*arguments: Any) -> Outcome:
+    def watched(*arguments: Any) -> TaskResult:
         sums = busy.setdefault(threading.get_native_id(), [0.0, 0.0])
         begin, waited, cpu = time.perf_counter(), queued(), time.thread_time()
         outcome = compute(*arguments)
@@ -53,7 +53,7 @@ def timed(plan: Plan, workers: int) -> tuple[float, float, float]:
     parallel.compute = watched
     try:
         begin = time.perf_counter()
-        pool = Pool(plan.provider, workers)
+        pool = RunnerPool(plan.provider, workers)
         parallel.in_threads(plan.tasks.values(), pool, workers, nothing, nothing)
         wall = time.perf_counter() - begin
     finally:
@@ -64,7 +64,9 @@ def timed(plan: Plan, workers: int) -> tuple[float, float, float]:
 def threads(runs: int, repeats: int) -> None:
     """Print times with one thread and with two, alternating."""
     axis = {"load.J": {"from": 0.07, "to": 0.09, "count": runs}}
-    plan = make_plan(study_from({"scenario": "motor_bench/ST1", "param": axis}), default_provider())
+    plan = plan_study(
+        study_from({"scenario": "motor_bench/ST1", "param": axis}), default_provider()
+    )
     found: dict[int, list[tuple[float, float, float]]] = {1: [], 2: []}
     for _ in range(repeats):
         for workers, times in found.items():

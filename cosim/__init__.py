@@ -6,15 +6,22 @@ result.recording.to_pandas()
 result.recording.plot(path="bench.png")
 """
 
-from .data.recording import Recording, read_recording
-from .data.signals import Constant, Function, Table
-from .errors import CosimError
-from .fmu.instance import Instance
-from .master.master import Master
-from .scenario.runner import Result, RunResult, run
-from .system.provider import FolderProvider
-from .system.system import System
-from .system.toml import read_system
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import errors
+    from .data.recording import Recording, read_recording
+    from .data.signals import Constant, Function, Table
+    from .errors import CosimError
+    from .fmu.instance import Instance
+    from .master.master import Master
+    from .running.runner import Result, RunResult, run
+    from .system.provider import FolderProvider
+    from .system.system import System
+    from .system.toml import read_system
 
 __all__ = [
     "Constant",
@@ -28,7 +35,44 @@ __all__ = [
     "RunResult",
     "System",
     "Table",
+    "errors",
     "read_recording",
     "read_system",
     "run",
 ]
+
+_HOMES = {
+    "Constant": "data.signals",
+    "CosimError": "errors",
+    "FolderProvider": "system.provider",
+    "Function": "data.signals",
+    "Instance": "fmu.instance",
+    "Master": "master.master",
+    "Recording": "data.recording",
+    "Result": "running.runner",
+    "RunResult": "running.runner",
+    "System": "system.system",
+    "Table": "data.signals",
+    "read_recording": "data.recording",
+    "read_system": "system.toml",
+    "run": "running.runner",
+}
+"""Name -> module, loaded when the name is first used (PEP 562).
+
+A module of this package, the command line above all, then loads what it needs and no more.
+"""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+    elif name == "errors":
+        value = importlib.import_module(".errors", __name__)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

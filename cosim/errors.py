@@ -12,6 +12,7 @@
         - ValueRangeError           a value outside its bounds, or not finite
         - ScenarioError             a scenario, system or data file that cannot be read
       x FmuCallError                an FMU refused a call; carries its own log messages
+        + EndRequest                an FMU asked to end; a master ends the run without an error
         + StepError                 the run stopped; carries what was recorded until then
       x AlgebraicLoopError          connected values that do not settle
       x CheckError                  a scenario ran, but a check of it failed
@@ -25,10 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .data.recording import Recording
+from typing import Any
 
 
 class CosimError(Exception):
@@ -96,7 +94,7 @@ class StepError(FmuCallError):
 
     Attributes:
         time: the communication point from which the failing step started [s].
-        recording: what was recorded until then, None if nothing was.
+        recording: what was recorded until then, a `data.recording.Recording`; None if nothing was.
     """
 
     def __init__(
@@ -105,11 +103,23 @@ class StepError(FmuCallError):
         messages: Iterable[str] = (),
         *,
         time: float,
-        recording: Recording | None = None,
+        recording: Any = None,
     ) -> None:
         super().__init__(text, messages)
         self.time = time
         self.recording = recording
+
+
+class EndRequest(FmuCallError):
+    """An FMU asked to end the simulation: the master ends the run there, without an error.
+
+    Attributes:
+        time: up to which the FMU has gone [s].
+    """
+
+    def __init__(self, text: str, messages: Iterable[str] = (), *, time: float) -> None:
+        super().__init__(text, messages)
+        self.time = time
 
 
 class AlgebraicLoopError(CosimError):

@@ -11,8 +11,35 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, ScenarioError
-from .limits import TEXT
-from .schema import DEPTH, depth_of
+from .reading.limits import TEXT
+from .reading.schema import DEPTH, depth_of
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what the file system says in the block into an error that names `path`.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another folder with "
+            "--out"
+        ) from error
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder for results, with those above it.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    with writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 @contextlib.contextmanager
@@ -20,26 +47,23 @@ def atomic(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`; it takes that name if the block ends without an error.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, or the disk is full.
     """
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(
             prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent
         )
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror}); choose another folder with --out"
-        ) from error
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
-        # mkstemp makes files private; a result is as readable as any other new file
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
+        with writing(path):
+            yield temporary
+            # mkstemp makes files private; a result is as readable as any other new file
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(path)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

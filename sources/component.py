@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from .quantity import Quantity
@@ -69,3 +70,49 @@ class Solver:
     method: Literal["rk4", "rodas3", "dopri5", "rodas3_adaptive", "rosw3_adaptive"] = "rk4"
     step: float = 1e-3
     tolerance: float = 1e-6
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """One set of equations of a component: what its module declares besides `equations(m)`.
+
+    A finer fidelity contains another one as a limit (`limits`) by a quantity that is infinite there
+    (`stiff`) or by quantities that vanish there (`soft`); a search tries it like an effect.
+
+    Attributes:
+        level: order among the component's fidelities, 0 is the simplest.
+        solver: the solver inside the FMU.
+        slots: part that a variant may exchange -> its fidelity unless the variant names another.
+        limits: fidelity that is the limit -> values without which the limit is another one.
+        stiff: quantity that is infinite in the limit.
+        soft: quantities of an element (a joint); the first vanishes in the limit, where the others
+            mean nothing. Their elements count one by one.
+        called: what a search calls an element with `soft` quantities.
+        places: balances of these elements, one each.
+
+    Raises:
+        ValueError: limits without what makes them, or what makes them without limits.
+    """
+
+    level: int
+    solver: Solver = Solver()
+    slots: Mapping[str, str] = field(default_factory=dict)
+    limits: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    stiff: Quantity | None = None
+    soft: tuple[Quantity, ...] = ()
+    called: str = ""
+    places: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        makers = (self.stiff is not None) + bool(self.soft)
+        if makers != bool(self.limits):
+            raise ValueError(
+                f"a fidelity with limits ({', '.join(self.limits) or 'none'}) needs exactly one of "
+                f"stiff and soft, one without limits neither; it has {makers}"
+            )
+        elements = self.soft[0].size if self.soft else 0
+        if bool(self.called) != bool(self.soft) or len(self.places) != elements:
+            raise ValueError(
+                f"soft quantities of {elements} elements need `called` and as many places; "
+                f"called is {self.called!r} and places are {', '.join(self.places) or 'none'}"
+            )

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from .effect import Effect, Law
 from .quantity import Quantity
-from .units import parse
+from .units import coherent
 
 SX = Any
 Role = Literal["input", "state", "parameter", "discrete", "output"]
@@ -31,7 +31,7 @@ class Symbols:
 
 
 @dataclass
-class Variable:
+class Declared:
     """One scalar variable of a variant.
 
     Attributes:
@@ -108,7 +108,7 @@ def misfit(effect: Effect, balance: Balance) -> str:
             f"effect {effect.name!r} cannot act on balance {balance.name!r} of kind "
             f"{balance.kind!r}; it fits {', '.join(effect.kinds)}"
         )
-    if effect.unit and parse(effect.unit).exponents != parse(balance.unit or "1").exponents:
+    if effect.unit and coherent(effect.unit).exponents != coherent(balance.unit or "1").exponents:
         return (
             f"effect {effect.name!r} adds {effect.unit}, but balance {balance.name!r} "
             f"is in {balance.unit or '1'}"

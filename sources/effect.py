@@ -149,6 +149,7 @@ class Effect:
         probe: whether it stands for no law of physics and is no explanation.
         alone: whether it is looked for where its balance comes with a finer fidelity only, together
             with that (play in a gear that is declared as rigid).
+        random: whether it draws random numbers: its values say nothing about a log.
         general: effect with the same law for any unit, which need not be tried where this one fits.
     """
 
@@ -162,6 +163,7 @@ class Effect:
     unit: str = ""
     general: str = ""
     probe: bool = False
+    random: bool = False
     alone: bool = False
 
     def __post_init__(self) -> None:

@@ -53,9 +53,13 @@ class EffectModel:
         """A signal of the balance, see `effect.KINDS`."""
         return self._balance.signals[name]
 
-    def signals(self, *names: str) -> Symbols:
-        """Signals of the balance; `s = e.signals("velocity")` gives `s.velocity`."""
-        return Symbols({name: self.signal(name) for name in names})
+    def signals(self, *names: str, **symbols: str) -> Symbols:
+        """Signals of the balance by their names, or by the symbols of a formula.
+
+        `s = e.signals("load", v="velocity")` gives `s.load` and `s.v`.
+        """
+        named = {name: name for name in names} | symbols
+        return Symbols({symbol: self.signal(name) for symbol, name in named.items()})
 
     def offers(self, name: str) -> bool:
         """Whether the balance has this optional signal."""
@@ -68,13 +72,13 @@ class EffectModel:
             return known
         return self._parameters.parameter(quantity)
 
-    def parameters(self, *quantities: Quantity) -> Symbols:
-        """Declare parameters, in this order; `p = e.parameters(K)` gives `p.k`."""
-        return Symbols({item.name: self.parameter(item) for item in quantities})
+    def parameters(self, *quantities: Quantity, **symbols: Quantity) -> Symbols:
+        """Declare parameters, in this order, under their names or the symbols of a formula.
 
-    def states(self, *quantities: Quantity) -> Symbols:
-        """Declare states, in this order; `x = e.states(Z)` gives `x.z`."""
-        return Symbols({item.name: self.state(item) for item in quantities})
+        `p = e.parameters(K, f_c=TAU_C)` gives `p.k` and `p.f_c`.
+        """
+        named = {item.name: item for item in quantities} | symbols
+        return Symbols({symbol: self.parameter(item) for symbol, item in named.items()})
 
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state of the effect."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from .model import Clock, Model, Variable
+from .model import Clock, Declared, Model
 
 Vector = NDArray[np.float64]
 QUICK, LARGE = 8, 200
@@ -53,7 +53,7 @@ class Functions:
     derivative_dependencies: dict[str, tuple[str, ...]]
 
 
-def _stack(variables: list[Variable]) -> Any:
+def _stack(variables: list[Declared]) -> Any:
     return ca.vertcat(*[variable.symbol for variable in variables]) if variables else ca.SX(0, 1)
 
 
@@ -61,7 +61,7 @@ def _column(expressions: list[Any]) -> Any:
     return ca.vertcat(*expressions) if expressions else ca.SX(0, 1)
 
 
-def _update(model: Model, clock: Clock, discrete: list[Variable]) -> Any:
+def _update(clock: Clock, discrete: list[Declared]) -> Any:
     return _column([clock.updates.get(v.name, v.symbol) for v in discrete])
 
 
@@ -114,7 +114,7 @@ def build_functions(model: Model) -> Functions:
         jacobian_pattern=tuple(zip(rows, columns, strict=True)),
         directional=function("f_directional", [tangent[:split], tangent[split:]], seeds),
         updates=tuple(
-            function(f"f_update{index}", [_update(model, clock, roles["discrete"])])
+            function(f"f_update{index}", [_update(clock, roles["discrete"])])
             for index, clock in enumerate(model.clocks)
         ),
         periods=ca.Function(

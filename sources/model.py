@@ -18,10 +18,10 @@ from .declarations import (
     Attachment,
     Balance,
     Clock,
+    Declared,
     ModelError,
     Role,
     Symbols,
-    Variable,
     misfit,
 )
 from .effect import KINDS
@@ -35,7 +35,7 @@ __all__ = [
     "Model",
     "ModelError",
     "Role",
-    "Variable",
+    "Declared",
     "misfit",
 ]
 
@@ -71,7 +71,7 @@ class Model:
         self._root: Model = parent._root if parent else self
         if parent is None:
             self.time = ca.SX.sym("time")
-            self.variables: dict[str, Variable] = {}
+            self.variables: dict[str, Declared] = {}
             self.derivatives: dict[str, SX] = {}
             self.clocks: list[Clock] = []
             self.balances: dict[str, Balance] = {}
@@ -115,7 +115,7 @@ class Model:
                     f"but its expression has {symbol.numel()}"
                 )
         for index, (name, start) in enumerate(zip(names, quantity.starts(), strict=True)):
-            root.variables[name] = Variable(
+            root.variables[name] = Declared(
                 name, quantity, role, start, symbol[index], self._of_effect
             )
         root._vectors[full] = symbol
@@ -162,6 +162,10 @@ class Model:
     def states(self, *quantities: Quantity) -> Symbols:
         """Declare states, in this order; `x = m.states(TWIST)` gives `x.twist`."""
         return Symbols({item.name: self.state(item) for item in quantities})
+
+    def discretes(self, *quantities: Quantity) -> Symbols:
+        """Declare sampled values, in this order; `z = m.discretes(HELD)` gives `z.held`."""
+        return Symbols({item.name: self.discrete(item) for item in quantities})
 
     def input_rate(self, symbol: SX, rate: SX) -> None:
         """Say how an input moves that others of the inputs determine, e.g. an angle by its speed.
@@ -375,7 +379,7 @@ class Model:
             self.output(P_LOSS, sum((power for _, power in self.losses), ca.SX(0)))
         return self
 
-    def of_role(self, role: Role) -> list[Variable]:
+    def of_role(self, role: Role) -> list[Declared]:
         """The scalar variables of a role, in order of declaration, those of effects last.
 
         Effects last keeps the elimination order of the implicit solver, and with it every rounding,

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from . import units
+from .units import coherent
 
 Variability = Literal["tunable", "fixed"]
 Mix = Literal["", "turn", "shift"]
@@ -21,7 +21,7 @@ class Quantity:
 
     Attributes:
         name: local name, a plain identifier; a vector of `size` n is named `name[1]` ... `name[n]`.
-        unit: SI unit in the notation of `units.parse`.
+        unit: SI unit in the notation of `cosim.spec.units`.
         text: one line of meaning, with the sign where it has one.
         start: start value, one number for all or one per element; a device file overrides it.
         minimum, maximum: bounds that the FMU enforces, None where open.
@@ -58,7 +58,7 @@ class Quantity:
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
             raise ValueError(f"quantity name {self.name!r} is not a plain identifier")
-        units.parse(self.unit)
+        coherent(self.unit)
         if not self.text:
             raise ValueError(f"quantity {self.name!r} has no description")
         for value in self.starts():

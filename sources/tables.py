@@ -17,12 +17,20 @@ from typing import Any
 
 import casadi as ca
 
-from .component import Component, Solver
+from .component import Component, Fidelity
 from .effect import KINDS, Effect
-from .model import Balance, Model, Variable, misfit
+from .model import Balance, Declared, Model, misfit
 from .packaging.catalog import names
 from .quantity import Quantity
-from .variant import build_model, components, device_values, devices, effects, fidelities
+from .variant import (
+    build_model,
+    components,
+    device_values,
+    devices,
+    effects,
+    fidelities,
+    parse_name,
+)
 
 DOCS = Path(__file__).parent.parent / "docs"
 COMMAND = "python -m sources.tables"
@@ -75,9 +83,9 @@ def _docstring(module: Any) -> str:
     return inspect.cleandoc(module.__doc__ or "") + "\n"
 
 
-def _symbols(variables: Iterable[Variable]) -> list[tuple[str, ...]]:
+def _symbols(variables: Iterable[Declared]) -> list[tuple[str, ...]]:
     """Rows of a symbol table; the elements of a vector share one row."""
-    groups: dict[str, list[Variable]] = {}
+    groups: dict[str, list[Declared]] = {}
     for variable in variables:
         groups.setdefault(re.sub(r"\[\d+\]$", "", variable.name), []).append(variable)
     rows = []
@@ -137,10 +145,10 @@ def _ports(component: Component) -> str:
 
 def _fidelity(component: str, fidelity: str, module: Any) -> str:
     model = _model(component, fidelity)
-    solver: Solver = model.solver
+    own: Fidelity = module.FIDELITY
     parts = [f"### `{component}/{fidelity}`\n", _docstring(module)]
     if model.of_role("state"):
-        parts.append(f"Solver: {solver.method}, step {_number(solver.step)} s.\n")
+        parts.append(f"Solver: {own.solver.method}, step {_number(own.solver.step)} s.\n")
     if model.clocks:
         parameters = model.of_role("parameter")
         symbols = ca.vertcat(*[v.symbol for v in parameters])
@@ -151,8 +159,7 @@ def _fidelity(component: str, fidelity: str, module: Any) -> str:
             for clock, period in zip(model.clocks, found.tolist(), strict=True)
         )
         parts.append(f"Sample clocks: {listed}.\n")
-    slots: dict[str, str] = getattr(module, "SLOTS", {})
-    for slot, default in slots.items():
+    for slot, default in own.slots.items():
         parts.append(f"Slot `{slot}`: `{default}` unless the variant names another.\n")
     parts.append(_table(_SYMBOL_HEAD, _symbols(model.variables.values())))
     rows = [
@@ -314,14 +321,14 @@ def catalogue_page() -> str:
     """What `cosim fmus build` builds, by component."""
     listed: dict[str, list[str]] = {}
     for name in names():
-        listed.setdefault(name.partition("/")[0].partition(".")[0], []).append(name)
+        listed.setdefault(parse_name(name).component, []).append(name)
     rows = [
         (
             f"[{component}](../docs/components/{component}.md)",
             ", ".join(
                 f"`{n.partition('/')[2]}`" for n in variants if "+" not in n and "." not in n
             ),
-            ", ".join(f"`{n}`" for n in variants if "." in n.partition("/")[0]),
+            ", ".join(f"`{n}`" for n in variants if parse_name(n).device),
             ", ".join(f"`+{n.partition('+')[2]}`" for n in variants if "+" in n),
         )
         for component, variants in listed.items()

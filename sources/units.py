@@ -1,62 +1,35 @@
-"""Units as SI exponents: the part of unit algebra that FMI's `BaseUnit` can express."""
+"""Units of declarations: coherent SI, so that no equation needs a factor."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
 from functools import lru_cache
 
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-"""FMI base units, in the order of the attributes of `BaseUnit`."""
-
-_SYMBOLS: dict[str, tuple[dict[str, int], float]] = {
-    "1": ({}, 1.0),
-    **{name: ({name: 1}, 1.0) for name in BASE},
-    "N": ({"kg": 1, "m": 1, "s": -2}, 1.0),
-    "J": ({"kg": 1, "m": 2, "s": -2}, 1.0),
-    "W": ({"kg": 1, "m": 2, "s": -3}, 1.0),
-    "V": ({"kg": 1, "m": 2, "s": -3, "A": -1}, 1.0),
-    "ohm": ({"kg": 1, "m": 2, "s": -3, "A": -2}, 1.0),
-    "H": ({"kg": 1, "m": 2, "s": -2, "A": -2}, 1.0),
-    "C": ({"A": 1, "s": 1}, 1.0),
-    "Hz": ({"s": -1}, 1.0),
-    "Pa": ({"kg": 1, "m": -1, "s": -2}, 1.0),
-}
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit `value_SI = factor * value`, with integer exponents of the FMI base units."""
-
-    symbol: str
-    exponents: tuple[tuple[str, int], ...]
-    factor: float = 1.0
+from cosim.errors import UnitError
+from cosim.spec.units import BASE, Unit, parse
 
 
 @lru_cache(maxsize=None)
-def parse(symbol: str) -> Unit:
-    """Parse a unit such as `N.m.s/rad`, `kg.m2` or `V/(A.s)`.
-
-    `.` multiplies, a trailing integer is an exponent, and what follows `/` (one factor, or several
-    in brackets) divides.
+def coherent(symbol: str) -> Unit:
+    """A unit without factor and offset, such as `N.m.s/rad`; the grammar is `cosim.spec.units`.
 
     Raises:
-        ValueError: an unknown symbol, with the known ones.
+        ValueError: an unknown unit, none at all, or one with a factor or an offset.
     """
-    total: dict[str, int] = {}
-    factor = 1.0
-    numerator, _, denominator = symbol.partition("/")
-    parts = [(part, 1) for part in numerator.split(".")]
-    if denominator:
-        parts += [(part, -1) for part in denominator.strip("()").split(".")]
-    for part, sign in parts:
-        match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", part)
-        if match is None or match[1] not in _SYMBOLS:
-            known = ", ".join(sorted(_SYMBOLS))
-            raise ValueError(f"unit {symbol!r}: {part!r} is not a known unit (known: {known})")
-        exponents, scale = _SYMBOLS[match[1]]
-        power = sign * int(match[2] or 1)
-        factor *= scale**power
-        for name, exponent in exponents.items():
-            total[name] = total.get(name, 0) + power * exponent
-    return Unit(symbol, tuple((name, total[name]) for name in BASE if total.get(name)), factor)
+    try:
+        unit = parse(symbol)
+    except UnitError as error:
+        raise ValueError(str(error)) from error
+    if symbol in ("", "-"):
+        raise ValueError(f"unit {symbol!r}: a plain number is declared in '1'")
+    if (unit.factor, unit.offset) != (1.0, 0.0):
+        raise ValueError(
+            f"unit {symbol!r} is {unit.factor:g} {unit.dimension()}"
+            + (f" from {unit.offset:g}" if unit.offset else "")
+            + f"; declarations and device files are in SI units, here {unit.dimension()!r}"
+        )
+    return unit
+
+
+def base_exponents(unit: Unit) -> dict[str, int]:
+    """The exponents that are not 0, by base unit, as FMI's `BaseUnit` lists them."""
+    return {name: power for name, power in zip(BASE, unit.exponents, strict=True) if power}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,12 +16,14 @@ from cosim.errors import VariantError
 from cosim.spec import variant as spec
 from cosim.spec.variant import Name
 
-from .component import Component, Solver
+from .component import Component, Fidelity
 from .effect import Effect, Law
-from .model import Attachment, Model
-from .units import parse
+from .model import Attachment, Model, ModelError
+from .units import coherent
 
 _ROOT = Path(__file__).parent
+_OTHER_FOLDERS = ("effects", "laws", "packaging", "tools")
+"""Folders of `sources/` that are no components."""
 
 
 class UnknownVariantError(ValueError):
@@ -40,40 +42,86 @@ def parse_name(text: str) -> Name:
         raise UnknownVariantError(str(error)) from error
 
 
+def _modules(package: ModuleType) -> dict[str, ModuleType]:
+    """The modules of a package by their short names."""
+    return {
+        info.name: importlib.import_module(f"{package.__name__}.{info.name}")
+        for info in pkgutil.iter_modules(package.__path__)
+    }
+
+
+def _declared(module: ModuleType, name: str, kind: type[Any]) -> Any:
+    """A module's declaration, or an error that says where it is missing."""
+    declared = vars(module).get(name)
+    if not isinstance(declared, kind):
+        raise ModelError(
+            f"{module.__name__} needs `{name} = {kind.__name__}(...)`; it has "
+            + (f"{name} = {declared!r}" if name in vars(module) else f"no {name}")
+        )
+    return declared
+
+
+def _named(module: ModuleType, name: str, kind: type[Any]) -> Any:
+    """A declaration that bears the name of its module."""
+    declared, short = _declared(module, name, kind), module.__name__.rpartition(".")[2]
+    if declared.name != short:
+        raise ModelError(
+            f"{module.__name__}: {name} is named {declared.name!r} instead of {short!r}"
+        )
+    return declared
+
+
 @lru_cache(maxsize=None)
 def components() -> dict[str, Component]:
-    """All components: the folders whose `__init__` declares a `COMPONENT`."""
+    """All components: the folders below `sources/` that are none of the others.
+
+    Raises:
+        ModelError: a folder whose `__init__` declares no `COMPONENT` of its name.
+    """
+    package = importlib.import_module(__package__ or "")
     found = {}
-    for info in pkgutil.iter_modules([str(_ROOT)]):
-        if info.ispkg:
-            module = importlib.import_module(f"{__package__}.{info.name}")
-            declared = getattr(module, "COMPONENT", None)
-            if isinstance(declared, Component):
-                found[info.name] = declared
+    for info in pkgutil.iter_modules(package.__path__):
+        if info.ispkg and info.name not in _OTHER_FOLDERS:
+            module = importlib.import_module(f"{package.__name__}.{info.name}")
+            found[info.name] = _named(module, "COMPONENT", Component)
     return dict(sorted(found.items()))
 
 
 @lru_cache(maxsize=None)
 def fidelities(component: str) -> dict[str, ModuleType]:
-    """The fidelities of a component: the modules of its folder with `equations`, simplest first."""
+    """The fidelities of a component: modules with `FIDELITY` and `equations`, simplest first.
+
+    Raises:
+        ModelError: a module with one of the two only, or a limit that is no fidelity.
+    """
     package = importlib.import_module(f"{__package__}.{component}")
     found = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
-        if hasattr(module, "equations"):
-            found[info.name] = module
-    return dict(sorted(found.items(), key=lambda item: (getattr(item[1], "LEVEL", 0), item[0])))
+    for name, module in _modules(package).items():
+        written = callable(vars(module).get("equations"))
+        if "FIDELITY" in vars(module) and not written:
+            raise ModelError(f"{module.__name__} declares a FIDELITY but has no `equations(m)`")
+        if written:
+            _declared(module, "FIDELITY", Fidelity)
+            found[name] = module
+    found = dict(sorted(found.items(), key=lambda item: (item[1].FIDELITY.level, item[0])))
+    for module in found.values():
+        for limit in module.FIDELITY.limits:
+            _choose(f"fidelity, named as a limit by {module.__name__}, called", limit, found)
+    return found
 
 
 @lru_cache(maxsize=None)
 def effects() -> dict[str, ModuleType]:
-    """All effects: the modules of `sources/effects` that declare an `EFFECT`."""
-    package = importlib.import_module(f"{__package__}.effects")
-    found = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
-        if isinstance(getattr(module, "EFFECT", None), Effect):
-            found[info.name] = module
+    """All effects: every module of `sources/effects`.
+
+    Raises:
+        ModelError: a module without `EFFECT` of its name or without `law`.
+    """
+    found = _modules(importlib.import_module(f"{__package__}.effects"))
+    for module in found.values():
+        _named(module, "EFFECT", Effect)
+        if not callable(vars(module).get("law")):
+            raise ModelError(f"{module.__name__} declares an EFFECT but has no `law(e)`")
     return dict(sorted(found.items()))
 
 
@@ -127,7 +175,7 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
             raise ValueError(
                 f"{available[device].name}: {name!r} lacks {', '.join(sorted(missing))}"
             )
-        parse(entry["unit"])
+        coherent(entry["unit"])
         values[name] = Origin(
             tuple(entry["value"]) if isinstance(entry["value"], list) else entry["value"],
             entry["unit"],
@@ -138,7 +186,7 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
     return values
 
 
-def _choose(kind: str, wanted: str, available: dict[str, Any]) -> Any:
+def _choose(kind: str, wanted: str, available: Mapping[str, Any]) -> Any:
     if wanted not in available:
         raise UnknownVariantError(
             f"there is no {kind} {wanted!r}; there is {', '.join(available) or 'none'}"
@@ -146,11 +194,11 @@ def _choose(kind: str, wanted: str, available: dict[str, Any]) -> Any:
     return available[wanted]
 
 
-def fidelity(component: str, name: str) -> tuple[Component, Callable[[Model], None], Solver]:
-    """A component's declaration, the equations of one fidelity and their solver."""
+def fidelity(component: str, name: str) -> tuple[Component, Callable[[Model], None]]:
+    """A component's declaration and the equations of one of its fidelities, for `Model.part`."""
     declared = _choose("component", component, components())
     module = _choose(f"fidelity of {component!r} called", name, fidelities(component))
-    return declared, module.equations, getattr(module, "SOLVER", Solver())
+    return declared, module.equations
 
 
 def build_model(name: Name | str) -> Model:
@@ -162,11 +210,10 @@ def build_model(name: Name | str) -> Model:
     """
     if isinstance(name, str):
         name = parse_name(name)
-    component, equations, solver = fidelity(name.component, name.fidelity)
-    module = fidelities(name.component)[name.fidelity]
-    offered: dict[str, str] = getattr(module, "SLOTS", {})
+    component, equations = fidelity(name.component, name.fidelity)
+    own: Fidelity = fidelities(name.component)[name.fidelity].FIDELITY
     for slot, _ in name.slots:
-        _choose(f"slot of {name.component}/{name.fidelity} called", slot, offered)
+        _choose(f"slot of {name.component}/{name.fidelity} called", slot, own.slots)
     attachments = []
     for effect, balance in name.effects:
         law_module = _choose("effect", effect, effects())
@@ -181,17 +228,18 @@ def build_model(name: Name | str) -> Model:
         name.fidelity,
         values={key: origin.value for key, origin in origins.items()},
         attachments=tuple(attachments),
-        slots={**offered, **dict(name.slots)},
+        slots={**own.slots, **dict(name.slots)},
         device=name.device or component.device,
     )
-    model.solver = solver
+    model.solver = own.solver
     equations(model)
     model.finish()
     for key, origin in origins.items():
         declared = next(
             (v.quantity for n, v in model.variables.items() if n.partition("[")[0] == key), None
         )
-        if declared is not None and parse(declared.unit).exponents != parse(origin.unit).exponents:
+        unit = coherent(origin.unit)
+        if declared is not None and coherent(declared.unit).exponents != unit.exponents:
             raise ValueError(
                 f"device file {name.device or component.device}.toml gives {key!r} in "
                 f"{origin.unit}, but it is declared in {declared.unit}"

@@ -1,4 +1,4 @@
-"""cosim runs FMUs that others made: it must not know how ours are made."""
+"""Arrows between rooms go down, and cosim does not know how our FMUs are made."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "cosim").rglob("*.py"))
+ROOMS = (
+    "errors", "reading", "files", "spec", "data", "fmu", "drawing", "system", "master",
+    "installation", "scenario", "ssp", "running", "control", "study", "calibrate", "diagnose",
+    "report", "cli", "__main__",
+)  # fmt: skip
+"""Of `cosim`, from the bottom up: each may import those before it."""
 FORBIDDEN = {"sources", "cosim_library", "casadi", "pythonfmu", "ziglang", "scenarios", "tests"}
 
 
@@ -35,14 +41,99 @@ def test_cosim_imports_nothing_of_the_sources(path: Path) -> None:
     assert not imported(tree, depth) & (FORBIDDEN | {"beyond"})
 
 
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def inner_imports(path: Path, modules: set[str]) -> set[str]:
+    """Modules of cosim that a module imports: anywhere, within functions and for typing too."""
+    package = module_name(path).split(".")
+    if path.name != "__init__.py":
+        package.pop()
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            parent = ".".join([*base, *filter(None, [node.module])])
+            for alias in node.names:
+                whole = f"{parent}.{alias.name}"
+                found.add(whole if whole in modules else parent)
+    return (found & modules) - {module_name(path)}
+
+
+def graph() -> dict[str, set[str]]:
+    modules = {module_name(path) for path in MODULES}
+    return {module_name(path): inner_imports(path, modules) for path in MODULES}
+
+
+def room(module: str) -> str:
+    return module.split(".")[1] if "." in module else ""
+
+
+def test_every_room_has_its_place() -> None:
+    assert {room(module) for module in graph()} == {"", *ROOMS}
+
+
+def test_arrows_between_rooms_go_down() -> None:
+    upwards = [
+        f"{module} -> {target}"
+        for module, targets in graph().items()
+        for target in targets
+        if room(module) and room(target) != room(module)
+        and (not room(target) or ROOMS.index(room(target)) > ROOMS.index(room(module)))
+    ]  # fmt: skip
+    assert upwards == []
+
+
+def circles(arrows: dict[str, set[str]]) -> list[str]:
+    """What is left when modules at the bottom, then those at the top, are taken away."""
+    left = {module: set(targets) for module, targets in arrows.items()}
+    for _ in range(2):
+        while bottom := [module for module, targets in left.items() if not targets & set(left)]:
+            for module in bottom:
+                del left[module]
+        turned: dict[str, set[str]] = {module: set() for module in left}
+        for module, targets in left.items():
+            for target in targets & set(left):
+                turned[target].add(module)
+        left = turned
+    return sorted(left)
+
+
+def test_no_modules_import_each_other() -> None:
+    assert circles(graph()) == []
+
+
+def test_a_circle_is_seen() -> None:
+    arrows = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"e"}, "e": set()}
+    assert circles(arrows) == ["b", "c"]
+
+
+def test_few_files_lie_outside_of_rooms_and_none_is_long() -> None:
+    at_top = [path for path in MODULES if path.parent == ROOT / "cosim"]
+    sources = [*MODULES, *(ROOT / "sources").rglob("*.py"), *(ROOT / "cosim").rglob("*.c")]
+    lines = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
+        for path in sources
+    }
+    assert len(at_top) <= 8
+    assert {name: count for name, count in lines.items() if count > 500} == {}
+
+
 def test_only_the_builder_and_the_algorithms_import_by_name() -> None:
     users = {
         path.relative_to(ROOT).as_posix()
         for path in MODULES
         if "import_module" in path.read_text(encoding="utf-8")
     }
-    # algorithms/__init__ imports its own submodules, the builder the sources
-    assert users == {"cosim/master/algorithms/__init__.py", "cosim/installation/builder.py"}
+    assert users == {
+        "cosim/__init__.py",  # its names when they are used
+        "cosim/installation/builder.py",  # the sources
+        "cosim/master/algorithms/__init__.py",  # its own submodules
+    }
 
 
 @pytest.mark.slow

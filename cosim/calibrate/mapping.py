@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.logs import DataSet, Log, read_data_set
-from ..data.logs import Run as DataRun
+from ..data.logs import DataSet, Log, LoggedRun, read_data_set
 from ..data.segments import pieces, relative_pose, windows
 from ..data.signals import Table
 from ..errors import ScenarioError, UnknownNameError, listing
@@ -157,7 +156,7 @@ def _plain(folder: Path, path: Path) -> DataSet:
         )
     try:
         found = {
-            entry["name"]: DataRun(
+            entry["name"]: LoggedRun(
                 entry["name"], folder / entry["file"], entry["purpose"], dict(entry)
             )
             for entry in runs

@@ -23,6 +23,7 @@ from scipy.stats import qmc
 from scipy.stats import t as student
 
 from ..errors import FmuCallError
+from ..files import atomic
 from .estimate import Estimate
 from .problem import Problem
 
@@ -115,5 +116,6 @@ def tornado(correlation: Correlation, path: Path) -> Path:
         axes.axvline(side * correlation.limit, color="tab:red", linestyle="--", linewidth=1.0)
     axes.set_xlim(-1.0, 1.0)
     axes.set_xlabel(f"correlation with the residual, {correlation.samples} sets; dashed: 5 % limit")
-    figure.savefig(path, dpi=120)
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=120)
     return path

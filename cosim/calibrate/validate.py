@@ -3,7 +3,6 @@
 `check_data` needs the log only. `check_model` compares it with the model at nominal values: a
 column that follows the model with the wrong sign or scale, another column's signal, or a shifted
 clock.
-`check_machines` asks after a fit whether single runs want other parameters than the rest.
 """
 
 from __future__ import annotations
@@ -16,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CosimError
-from .estimate import Estimate
-from .normal import Normal
 from .parts import Run
 from .problem import Problem
 
@@ -355,34 +352,3 @@ def _check_inputs(problem: Problem, models: dict[str, Vector], theta: Vector) ->
 
 def _cost(problem: Problem, run: Run, model: Vector) -> float:
     return float(np.nansum(((run.data - model) / problem.sigma) ** 2))
-
-
-def check_machines(estimate: Estimate, share: float = 0.3) -> list[Finding]:
-    """Runs that want other parameters than the rest: another machine, or another state of it.
-
-    Args:
-        estimate: of all runs together.
-        share: of a run's cost that its own parameters must save.
-    """
-    problem, found = estimate.problem, []
-    common = [i for i, p in enumerate(problem.parameters) if not p.run]
-    for item, residual in zip(estimate.jacobian, estimate.residuals, strict=True):
-        normal = Normal(problem, estimate.theta, [item], [residual])
-        matrix = normal.matrix + 1e-6 * max(np.trace(normal.matrix), 1.0) * np.eye(
-            len(normal.matrix)
-        )
-        change = np.linalg.solve(matrix, normal.gradient)
-        saved = 2.0 * float(change @ normal.gradient) - float(change @ normal.matrix @ change)
-        total = float(np.nansum(residual[1] ** 2))
-        excess = total - float(np.isfinite(residual[1]).sum())
-        if excess > 0.2 * total and saved > share * total:
-            worst = max(common, key=lambda i: abs(float(change[i])))
-            parameter = problem.parameters[worst]
-            wanted = estimate.theta[worst] + float(change[worst]) * problem.scale[worst]
-            text = (
-                f"wants other parameters than the rest, {parameter.name} about {wanted:.4g} "
-                f"instead of {estimate.theta[worst]:.4g} {parameter.unit}: another machine, or "
-                "another state of it"
-            )
-            found.append(Finding("warning", "machine", item.run, parameter.name, text))
-    return found

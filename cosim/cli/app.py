@@ -2,6 +2,9 @@
 
 Results go to stdout (one JSON value with `--json`), messages and progress to stderr. Exit codes:
 0 done, 1 the work failed, 2 wrong usage or input.
+
+Modules of this folder import at their top what declares the commands; what does the work is
+imported by the command, so that `--help` answers at once.
 """
 
 from __future__ import annotations
@@ -12,28 +15,26 @@ import sys
 from collections import Counter
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import Progress
-from rich.table import Table
 
 from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError
-from ..fmu.archive import open_fmu
-from ..fmu.check import check
 from ..installation import places
 from ..installation.builder import default_provider, naming_errors, sources
 from ..master import algorithms
-from ..scenario import scenario
-from ..scenario.runner import Result, run
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .linearize import linearize_command
 from .study import study_command
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..running.runner import Result
 
 app = typer.Typer(
     help="Robot subsystems as FMUs, run together and compared with measurements.",
@@ -80,6 +81,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to st
 
 def _describe_file(path: Path) -> dict[str, Any]:
     """What `fmus list` says, from an FMU instead of the sources."""
+    from ..fmu.archive import open_fmu
+
     description = open_fmu(path).description
 
     def listed(causality: Any) -> list[dict[str, str]]:
@@ -133,7 +136,9 @@ def fmus_list(
 
 
 def _is_of(variant: str, component: str) -> bool:
-    return not component or variant.partition("/")[0].partition(".")[0] == component
+    from ..system import variants
+
+    return not component or variants.component(variant) == component
 
 
 @fmus_app.command("build")
@@ -194,6 +199,8 @@ def fmus_check(
 
     Example: `cosim fmus check gearbox.fmu`
     """
+    from ..fmu.check import check
+
     paths = list(files or sorted(places.fmus().rglob("*.fmu")))
     for path in paths:
         if not path.is_file():
@@ -227,6 +234,8 @@ def list_scenarios(as_json: AsJson = False) -> None:
 
     Example: `cosim scenarios`
     """
+    from ..scenario import scenario
+
     files = scenario.scenario_files()
     if as_json:
         _print_json(
@@ -287,6 +296,11 @@ def run_command(
 
     Example: `cosim run motor_bench --set gearbox=elastic+backlash --param gearbox.eta=0.8`
     """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ..running.runner import run
+
     changes = dict(_pair(item, "--set", "INSTANCE=VARIANT") for item in variants or [])
     values = dict(_pair(item, "--param", "INSTANCE.NAME=VALUE") for item in parameters or [])
     chosen = dict(_pair(item, "--option", "NAME=VALUE") for item in options or [])
@@ -350,6 +364,8 @@ def _number(text: str) -> Any:
 
 
 def _print_result(result: Result) -> None:
+    from rich.markup import escape
+
     content, console = result.to_dict(), _console()
     console.print(
         f"{content['scenario']}: {content['simulated_s']:g} s simulated in "
@@ -399,10 +415,14 @@ def _print_result(result: Result) -> None:
 
 def _console() -> Console:
     """Standard output; wide if nobody looks at it, so that names stay whole for other programs."""
+    from rich.console import Console
+
     return Console() if sys.stdout.isatty() else Console(width=160)
 
 
 def _table(first: str, *others: str) -> Table:
+    from rich.table import Table
+
     table = Table()
     table.add_column(first, no_wrap=True)
     for name in others:

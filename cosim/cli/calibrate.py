@@ -6,19 +6,17 @@ import json
 import math
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from ..calibrate.estimate import Estimate, channel_rms
-from ..calibrate.fit import fit
-from ..calibrate.mapping import read_problem
-from ..calibrate.nuisance import settled
-from ..calibrate.sensitivity import Correlation, correlation_index, local, tornado
-from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import InputError
+from ..files import make_folder, write_text
+
+if TYPE_CHECKING:
+    from ..calibrate.estimate import Estimate
+    from ..calibrate.sensitivity import Correlation
+    from ..calibrate.validate import Finding
 
 
 def calibrate_command(
@@ -42,6 +40,11 @@ def calibrate_command(
 
     Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
+    from ..calibrate.fit import fit
+    from ..calibrate.mapping import read_problem
+    from ..calibrate.sensitivity import correlation_index, tornado
+    from ..calibrate.validate import check_data, check_model
+
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
     findings = check_data(problem)
@@ -55,13 +58,12 @@ def calibrate_command(
     correlation = correlation_index(problem, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
     content["wall_s"] = time.perf_counter() - started
-    folder = out or Path("out") / problem.name
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = make_folder(out or Path("out") / problem.name)
     content["files"] = [str(folder / "calibration.json")]
     if correlation is not None:
         content["files"].append(str(tornado(correlation, folder / "tornado.png")))
     text = json.dumps(content, indent=2)
-    (folder / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    write_text(folder / "calibration.json", text + "\n")
     if as_json:
         typer.echo(text)
     else:
@@ -72,6 +74,9 @@ def calibration_table(
     estimate: Estimate, correlation: Correlation | None, findings: list[Finding]
 ) -> dict[str, Any]:
     """What `--json` prints."""
+    from ..calibrate.estimate import channel_rms
+    from ..calibrate.sensitivity import local
+
     problem = estimate.problem
     fitted = channel_rms(problem, estimate.residuals)
     unused = [run.name for run in problem.runs if run.purpose == "validation"]
@@ -116,6 +121,9 @@ def calibration_table(
 
 def validation_rms(estimate: Estimate) -> dict[str, float]:
     """Residuals over sigma on the runs that were not fitted, their own values fitted."""
+    from ..calibrate.estimate import channel_rms
+    from ..calibrate.nuisance import settled
+
     problem = estimate.problem
     names = [run.name for run in problem.runs if run.purpose == "validation"]
     return channel_rms(problem, problem.residuals(settled(problem, estimate.theta, names), names))
@@ -126,6 +134,9 @@ def _scaled(value: float | None, sigma: float) -> float | None:
 
 
 def _print(content: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console()
     console.print(f"{content['dataset']} with {content['system']}, {content['wall_s']:.1f} s")
     table = Table("parameter", "value", "95 %", "unit", "nominal", "")

@@ -6,16 +6,15 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from ..calibrate.mapping import read_problem
-from ..diagnose import Diagnosis, diagnose
-from ..diagnose.further import Further
-from ..report import write_page
+from ..files import make_folder, write_text
+
+if TYPE_CHECKING:
+    from ..diagnose import Diagnosis
+    from ..diagnose.further import Further
 
 
 def diagnose_command(
@@ -36,9 +35,12 @@ def diagnose_command(
 
     Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
+    from ..calibrate.mapping import read_problem
+    from ..diagnose import diagnose
+    from ..report import write_page
+
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
-    folder = out or Path("out") / problem.name
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = make_folder(out or Path("out") / problem.name)
     begun = time.monotonic()
     result = diagnose(
         problem, folder,
@@ -48,7 +50,7 @@ def diagnose_command(
     write_page(result, page)
     result.files += [page, table]
     content = result.to_dict()
-    table.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write_text(table, json.dumps(content, indent=2) + "\n")
     if as_json:
         typer.echo(json.dumps(content, indent=2))
     else:
@@ -56,6 +58,9 @@ def diagnose_command(
 
 
 def _print(result: Diagnosis) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.effects():

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
 from ..files import write_text
 from ..installation import builder
-from ..scenario import scenario as scenarios
-from ..scenario.scenario import Scenario
-from ..ssp import export
-from ..system.variants import apply
+
+if TYPE_CHECKING:
+    from ..scenario.scenario import Scenario
 
 Name = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="Name, folder or .toml file, with /RUN.")
@@ -22,6 +21,8 @@ Name = Annotated[
 
 
 def _only(name: str) -> Scenario:
+    from ..scenario import scenario as scenarios
+
     file, wanted = scenarios.find(name)
     if not wanted and len(file.runs) > 1:
         raise InputError(
@@ -39,6 +40,8 @@ def export_command(
 
     Example: `cosim export mobile_manipulator/IY --ssp iy.ssp`
     """
+    from ..ssp import export
+
     if ssp_version not in ("1.0", "2.0"):
         raise InputError(f"--ssp-version {ssp_version}: must be 1.0 or 2.0")
     print(export(_only(name), ssp, builder.default_provider(), version=ssp_version))
@@ -51,6 +54,8 @@ def draw_command(
 
     Example: `cosim draw mobile_manipulator/IY --out iy.svg`
     """
+    from ..system.variants import apply
+
     item, provider = _only(name), builder.default_provider()
     instances = apply(item.system.instances, item.variants, provider, item.folder)
     system = replace(item.system, instances=instances).build(provider, item.parameters)

@@ -5,19 +5,17 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from ..control.linearize import Linear, Margins, connect, loop_margins, operating_point, plot_bode
-from ..files import atomic, write_text
+from ..files import write_text
 from ..installation import builder
-from ..master.master import Driver, Master
-from ..scenario import scenario as scenarios
-from ..system.system import System
-from ..system.variants import apply
+
+if TYPE_CHECKING:
+    from ..control.linearize import Linear, Margins
+    from ..master.master import Master
+    from ..system.inputs import Driver
 
 MOST = 24
 """Loops that are looked at if none are named."""
@@ -40,6 +38,8 @@ def linearize_command(
 
     Example: `cosim linearize motor_bench --at 1 --cut motor.w --out out/linear`
     """
+    from ..control.linearize import connect, loop_margins, operating_point, plot_bode
+
     master, inputs = _master(name)
     parts, notes = operating_point(master, at, inputs)
     system = connect(master, parts, notes)
@@ -48,8 +48,7 @@ def linearize_command(
     content = _content(name, system, loops)
     if out is not None:
         if loops:
-            with atomic(out / "bode.png") as picture:
-                plot_bode(loops, picture)
+            plot_bode(loops, out / "bode.png")
         matrices = {key: getattr(system, key).tolist() for key in "abcd"}
         text = json.dumps({**content, **matrices}, indent=1)
         write_text(out / "linear.json", text + "\n")
@@ -60,6 +59,11 @@ def linearize_command(
 
 
 def _master(name: str) -> tuple[Master, dict[str, Driver]]:
+    from ..master.master import Master
+    from ..scenario import scenario as scenarios
+    from ..system.system import System
+    from ..system.variants import apply
+
     if name.endswith(".fmu"):
         system = System(Path(name).stem)
         system.add("fmu", name)
@@ -116,6 +120,9 @@ def _content(name: str, system: Linear, loops: list[Margins]) -> dict[str, Any]:
 
 
 def _print(content: dict[str, Any], out: Path | None) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console()
     console.print(
         f"{content['of']} at t = {content['time_s'] or 0.0:g} s: {len(content['states'])} states",

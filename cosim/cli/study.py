@@ -4,25 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-from rich.table import Table
 
 from ..errors import InputError, StudyError
-from ..study import Progress as State
-from ..study import StudyResult, read_study, run_study
 from ..system.provider import FolderProvider, Provider
+
+if TYPE_CHECKING:
+    from ..study import StudyResult
 
 SHOWN = 40
 """Runs that are printed one by one; of more, each variant gets a row."""
@@ -58,6 +48,19 @@ def study_command(
 
     Example: `cosim study motor_bench --out out/swap`, or `cosim study my/study.toml`
     """
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from ..study import Progress as State
+    from ..study import read_study, run_study
+
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
     provider: Provider | None = FolderProvider(fmus) if fmus is not None else None
@@ -116,6 +119,10 @@ def _made_with(row: dict[str, Any], result: StudyResult) -> str:
 
 
 def _print(result: StudyResult) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
     console = Console() if Console().is_terminal else Console(width=200)
     table, rows = result.table, result.table.rows
     corrupt = f", {len(result.corrupt)} unusable files set aside" if result.corrupt else ""

@@ -24,11 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, InputError, UnknownNameError, listing
-from ..fmu.exchange import DTYPES
+from ..files import atomic
 from ..fmu.instance import Instance
+from ..fmu.values import NUMBERS
 from ..master.execution import Execution
-from ..master.master import Driver, Master
-from ..master.plan import Op
+from ..master.initialization import initialize
+from ..master.master import Master
+from ..master.plan import Op, decoded
+from ..system.inputs import Driver
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -123,9 +126,11 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
     """An instance at its present communication point, and notes."""
     known = instance.description.variables
     states = [name[4:-1] for name in known if name.startswith("der(") and name[4:-1] in known]
-    inputs = [n for v in instance.description.of("input") if v.type in DTYPES for n in v.elements()]
+    inputs = [
+        n for v in instance.description.of("input") if v.type in NUMBERS for n in v.elements()
+    ]
     outputs = [
-        n for v in instance.description.of("output") if v.type in DTYPES for n in v.elements()
+        n for v in instance.description.of("output") if v.type in NUMBERS for n in v.elements()
     ]
     n, m = len(states), len(inputs)
     notes = []
@@ -151,6 +156,9 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
         full = np.zeros((len(outputs), m))
         start = dict(zip(inputs, instance.get(*inputs).tolist(), strict=True)) if inputs else {}
         for column, name in enumerate(inputs):
+            if not instance.description.whole(name).type.startswith("Float"):
+                notes.append(f"{instance.name}: {name} is no real number and is held")
+                continue
             step = INCREMENT * max(1.0, abs(start[name]))
             ends = []
             for value in (start[name] + step, start[name] - step):
@@ -195,24 +203,22 @@ def operating_point(
     master: Master, at: float, inputs: Mapping[str, Driver] | None
 ) -> tuple[list[Linear], list[str]]:
     """The instances at time `at` of a run."""
-    signals = master._signals(inputs or {})
-    plan = master.compile(list(signals), [])
-    count = max(master._count(at, 1), 1) if at > 0.0 else 0
-    times = master.step * np.arange(max(count, 1) + 1, dtype=np.float64)
-    external = master._external(signals, times)
+    outline = master.outline(at if at > 0.0 else master.step, inputs=inputs, record=[])
+    count = outline.count if at > 0.0 else 0
     parts, notes = [], []
     with ExitStack() as stack:
-        run = Execution(master, plan, [], external, times, 1, signals, stack)
-        run.initialize()
+        execution = Execution(outline, stack)
+        run = execution.run
+        initialize(run)
         if count:
-            run.executor()(count)
+            execution.prepare().advance(count)
         run.do(Op.EXTERNAL, 0, 0)
-        for op, a, b in run.plan.solving.tolist():
-            run.do(Op(op), a, b)
+        for op, a, b in decoded(run.plan.solving):
+            run.do(op, a, b)
         for index, instance in enumerate(run.instances):
             run.do(Op.COPY, *run.layout.copies[index].tolist())
             run.do(Op.SET, index, 0)
-            instance.time = float(times[count])
+            instance.time = float(outline.times[count])
             part, said = linearize_instance(instance)
             parts.append(part)
             notes += said
@@ -415,6 +421,6 @@ def plot_bode(loops: Sequence[Margins], path: Path) -> Path:
     lower.set_ylabel("phase [deg]")
     lower.set_xlabel("frequency [Hz]")
     upper.legend()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    picture.savefig(path)
+    with atomic(path) as temporary:
+        picture.savefig(temporary)
     return path

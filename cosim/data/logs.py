@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import is_file, read_toml
-from ..limits import DATA
+from ..reading.limits import DATA
 from .matlab import read_matlab
 from .npz import read_npz
 from .parquet import read_table
@@ -165,7 +165,7 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
 
 
 @dataclass(frozen=True)
-class Run:
+class LoggedRun:
     """An entry of `set.toml`.
 
     Attributes:
@@ -196,7 +196,7 @@ class DataSet:
     folder: Path
     name: str
     rig: str
-    runs: Mapping[str, Run]
+    runs: Mapping[str, LoggedRun]
     sheet: Mapping[str, Any]
     units: Mapping[str, str]
     noise: Mapping[str, float]
@@ -236,7 +236,7 @@ def read_data_set(folder: Path | str) -> DataSet:
     sheet = _sheet(folder, str(table["sheet"])) if "sheet" in table else {}
     try:
         runs = {
-            entry["name"]: Run(
+            entry["name"]: LoggedRun(
                 entry["name"], folder / entry["file"], entry.get("purpose", ""), dict(entry)
             )
             for entry in table.get("run", [])

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import archives
 from ..errors import ScenarioError
-from ..limits import DATA
+from ..reading import archives
+from ..reading.limits import DATA
 
 _HEADER = 10_128
 """Longest header that numpy reads, with what stands before it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 _META = b"cosim"
+_TYPES = ("double", "int64", "uint64", "string", "binary")
+"""Of columns in Parquet; one of objects without rows has none."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,10 @@ class Recording:
         provenance: FMU files and hashes, parameters, algorithm, step, versions.
         bond_energy: energy that the coupling invented at each power bond [J], positive if the two
             ends together received more than was sent.
-        error: why the run stopped before its end, "" if it did not.
+        error: why the run stopped before its end by a fault, "" if it did not.
+        objects: columns that doubles do not carry: integers of 64 bits, strings, binaries. The
+            first are in `values`, too, as the nearest double; the others are nan there.
+        notes: what else is to be known: an end that an FMU asked for, warnings.
     """
 
     time: Vector
@@ -46,6 +52,8 @@ class Recording:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     bond_energy: Mapping[str, float] = field(default_factory=dict)
     error: str = ""
+    objects: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def energy_residual(self) -> float:
@@ -60,16 +68,18 @@ class Recording:
         """
         if name in self.names:
             return [self.names.index(name)]
-        found: list[int] = []
-        while f"{name}[{len(found) + 1}]" in self.names:
-            found.append(self.names.index(f"{name}[{len(found) + 1}]"))
+        element = re.compile(re.escape(name) + r"\[\d+(,\d+)*\]")
+        found = [column for column, item in enumerate(self.names) if element.fullmatch(item)]
         if not found:
             raise UnknownNameError(f"no signal {name!r} was recorded; {listing(self.names, name)}")
         return found
 
-    def __getitem__(self, name: str) -> Vector:
-        """A signal over time; a vector has one column per element."""
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A signal over time; a vector or matrix has one column per element."""
         columns = self.find(name)
+        if any(self.names[column] in self.objects for column in columns):
+            objects = np.column_stack([self.objects[self.names[column]] for column in columns])
+            return objects[:, 0] if name in self.names else objects
         whole = self.values[:, columns]
         return whole[:, 0] if name in self.names else whole
 
@@ -90,9 +100,12 @@ class Recording:
         frame = pd.DataFrame(
             self.values, index=pd.Index(self.time, name="time"), columns=list(self.names)
         )
+        for name, column in self.objects.items():
+            frame[name] = column
         frame.attrs.update(
-            units=dict(self.units), provenance=dict(self.provenance), error=self.error
-        )
+            units=dict(self.units), provenance=dict(self.provenance), error=self.error,
+            notes=self.notes,
+        )  # fmt: skip
         return frame
 
     def _meta(self) -> dict[str, Any]:
@@ -101,7 +114,14 @@ class Recording:
             "provenance": dict(self.provenance),
             "bond_energy_J": dict(self.bond_energy),
             "error": self.error,
+            "notes": list(self.notes),
         }
+
+    def _columns(self) -> list[NDArray[Any]]:
+        """The signals as they are: objects where there are such."""
+        return [
+            self.objects.get(name, self.values[:, column]) for column, name in enumerate(self.names)
+        ]
 
     def write_csv(self, path: Path | str) -> Path:
         """Write a CSV file whose head names each column with its unit, `motor.w [rad/s]`."""
@@ -115,8 +135,8 @@ class Recording:
         ):
             writer = csv.writer(handle)
             writer.writerow(heads)
-            for time, row in zip(self.time.tolist(), self.values.tolist(), strict=True):
-                writer.writerow([repr(time), *map(repr, row)])
+            columns = [map(_cell, column.tolist()) for column in self._columns()]
+            writer.writerows(zip(map(repr, self.time.tolist()), *columns, strict=True))
         return path
 
     def write_parquet(self, path: Path | str) -> Path:
@@ -126,10 +146,10 @@ class Recording:
 
         path = Path(path)
         fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})] + [
-            pa.field(name, pa.float64(), metadata={"unit": self.units.get(name, "")})
-            for name in self.names
+            pa.field(name, pa.array(column[:1]).type, metadata={"unit": self.units.get(name, "")})
+            for name, column in zip(self.names, self._columns(), strict=True)
         ]
-        columns = [self.time, *self.values.T]
+        columns = [self.time, *self._columns()]
         schema = pa.schema(fields, metadata={_META: json.dumps(self._meta()).encode()})
         with atomic(path) as temporary:
             pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
@@ -152,6 +172,7 @@ class Recording:
 
         wanted = list(signals) if signals is not None else list(self.names)
         names = [self.names[column] for name in wanted for column in self.find(name)]
+        names = [name for name in names if self.objects.get(name, self.time).dtype != object]
         groups: dict[str, list[str]] = {}
         for name in names:
             groups.setdefault(self.units.get(name, ""), []).append(name)
@@ -176,6 +197,17 @@ class Recording:
         return figure
 
 
+def _cell(value: Any) -> str:
+    """A value in a CSV file; binaries as hexadecimal digits."""
+    return (
+        value
+        if isinstance(value, str)
+        else value.hex()
+        if isinstance(value, bytes)
+        else repr(value)
+    )
+
+
 def read_recording(path: Path | str) -> Recording:
     """Read a recording that `write_parquet` wrote.
 
@@ -189,24 +221,44 @@ def read_recording(path: Path | str) -> Recording:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
     meta = _read_meta(path, metadata[_META])
     names = tuple(name for name in table.column_names if name != "time")
-    columns = []
-    for name in ("time", *names):
-        column = table[name]
-        if str(column.type) != "double" or column.null_count:
-            raise ScenarioError(
-                f"{path}: column {name!r} is of type {column.type} with {column.null_count} gaps; "
-                "a recording has floating-point numbers only: record it again"
-            )
-        columns.append(column.to_numpy())
+    columns = [_column(path, name, table[name]) for name in names]
+    time = _column(path, "time", table["time"])
+    if time.dtype != np.float64:
+        raise ScenarioError(f"{path}: its times are no floating-point numbers; record it again")
+    objects = {
+        name: column
+        for name, column in zip(names, columns, strict=True)
+        if column.dtype != np.float64
+    }
+    numbers = [
+        np.full(len(column), np.nan) if column.dtype == object else column.astype(np.float64)
+        for column in columns
+    ]
     return Recording(
-        time=columns[0],
-        values=np.column_stack(columns[1:]) if names else np.zeros((len(columns[0]), 0)),
+        time=time,
+        values=np.column_stack(numbers) if numbers else np.zeros((len(time), 0)),
         names=names,
         units={name: unit for name, unit in meta["units"].items() if name != "time"},
         provenance=meta["provenance"],
         bond_energy=meta["bond_energy_J"],
         error=meta["error"],
+        objects=objects,
+        notes=tuple(meta.get("notes", ())),
     )
+
+
+def _column(path: Path, name: str, column: Any) -> NDArray[Any]:
+    """A column of the types that `write_parquet` writes.
+
+    Raises:
+        ScenarioError: another type, or gaps.
+    """
+    if str(column.type) not in (*_TYPES, *([] if len(column) else ["null"])) or column.null_count:
+        raise ScenarioError(
+            f"{path}: column {name!r} is of type {column.type} with {column.null_count} gaps; a "
+            f"recording has {', '.join(_TYPES)} without gaps: record it again"
+        )
+    return np.asarray(column.to_numpy())
 
 
 def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
@@ -222,9 +274,10 @@ def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
         raise ScenarioError(
             f"{path}: what it says about itself is not JSON ({error}); record it again"
         ) from error
-    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str}
+    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str, "notes": list}
     for key, kind in kinds.items():
-        if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
+        missing: Any = [] if key == "notes" else None  # older recordings have none
+        if not isinstance(meta, dict) or not isinstance(meta.get(key, missing), kind):
             raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
     if not all(isinstance(unit, str) for unit in meta["units"].values()) or not all(
         isinstance(energy, (int, float)) for energy in meta["bond_energy_J"].values()

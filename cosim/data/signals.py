@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,21 +41,33 @@ class Signal(Protocol):
 class Constant:
     """The same value at all times."""
 
-    value: float
+    value: float | str | bytes
     unit: str = ""
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.value):
+        if not isinstance(self.value, (str, bytes)) and not math.isfinite(self.value):
             raise ValueRangeError(f"constant input {self.value} is not finite")
 
     @property
     def text(self) -> str:
         """The value."""
+        if isinstance(self.value, (str, bytes)):
+            return repr(self.value)
         return f"{self.value:g} {self.unit}".strip()
 
     def at(self, times: Vector) -> Vector:
-        """The value, once per time."""
-        return np.full(times.shape, self.value)
+        """The value, once per time.
+
+        Raises:
+            ValueRangeError: it is no number.
+        """
+        if isinstance(self.value, (str, bytes)):
+            raise ValueRangeError(f"constant input {self.value!r} is not a number")
+        return np.full(times.shape, float(self.value))
+
+    def objects(self, times: Vector) -> list[Any]:
+        """The value as it is, once per time."""
+        return [self.value] * len(times)
 
 
 @dataclass(frozen=True)
@@ -99,7 +111,12 @@ class Table:
         extend: bool = False,
     ) -> None:
         self.times = np.asarray(times, dtype=np.float64)
-        self.values = np.asarray(values, dtype=np.float64)
+        self._objects = _exact(values)
+        self.values = (
+            np.full(self.times.shape, np.nan)
+            if self._objects and isinstance(self._objects[0], (str, bytes))
+            else np.asarray(values, dtype=np.float64)
+        )
         self.unit, self.interpolation, self.text, self.extend = unit, interpolation, text, extend
         if self.times.ndim != 1 or self.times.shape != self.values.shape or not self.times.size:
             raise ValueRangeError(
@@ -111,8 +128,12 @@ class Table:
         bad = np.flatnonzero(np.diff(self.times) <= 0.0)
         if bad.size:
             raise ValueRangeError(f"{text}: times do not increase at {self.times[bad[0]]:.9g} s")
+        if self._objects and interpolation == "linear":
+            raise ValueRangeError(
+                f"{text}: holds integers or texts, which cannot be interpolated; take hold"
+            )
         bad = np.flatnonzero(~(np.isfinite(self.values) & np.isfinite(self.times)))
-        if bad.size:
+        if bad.size and not self._objects:
             raise ValueRangeError(
                 f"{text}: {bad.size} of {self.values.size} values are not finite, the first "
                 f"({self.values[bad[0]]}) at t = {self.times[bad[0]]:.9g} s; an input needs a "
@@ -125,6 +146,27 @@ class Table:
         Raises:
             ValueRangeError: outside the table (without `extend`).
         """
+        clock = self._check(times)
+        found: Vector = (
+            np.interp(times, self.times, self.values)
+            if self.interpolation == "linear"
+            else self.values[self._held(times, clock)]
+        )
+        return found
+
+    def objects(self, times: Vector) -> list[Any]:
+        """Values at these times, exact integers and texts as they are."""
+        if not self._objects:
+            found: list[Any] = self.at(times).tolist()
+            return found
+        return [self._objects[i] for i in self._held(times, self._check(times)).tolist()]
+
+    def _held(self, times: Vector, clock: float) -> NDArray[np.intp]:
+        index = np.searchsorted(self.times, times + clock, side="right") - 1
+        return np.maximum(index, 0)
+
+    def _check(self, times: Vector) -> float:
+        """Refuse times outside; the distance within which two times are the same [s]."""
         intervals = np.diff(self.times)
         clock = CLOCK * float(np.median(intervals)) if intervals.size else 0.0
         if not self.extend and times.size:
@@ -135,16 +177,36 @@ class Table:
                     f"{self.text}: covers {first:.9g} s to {last:.9g} s, but the run needs "
                     f"{times[0]:.9g} s to {times[-1]:.9g} s; shorten the run or extend the table"
                 )
-        if self.interpolation == "linear":
-            return np.interp(times, self.times, self.values)
-        index = np.searchsorted(self.times, times + clock, side="right") - 1
-        return self.values[np.maximum(index, 0)]
+        return clock
 
 
-def as_signal(value: Signal | float | Callable[[Vector], ArrayLike]) -> Signal:
-    """A signal from a number or a function of time."""
-    if isinstance(value, (int, float)):
-        return Constant(float(value))
+def _exact(values: ArrayLike) -> list[Any]:
+    """Values that doubles do not carry, as they are; none if doubles do."""
+    array = np.asarray(values)
+    if array.dtype.kind in "iu" and array.size and np.max(np.abs(array.astype(object))) > 2**53:
+        return [int(item) for item in array.tolist()]
+    if array.dtype.kind in "USO" and all(isinstance(v, (str, bytes)) for v in array.tolist()):
+        return list(array.tolist())
+    return []
+
+
+@dataclass(frozen=True)
+class SignalVector:
+    """One signal per element of a vector or matrix (row by row)."""
+
+    signals: tuple[Signal, ...]
+
+
+def objects(signal: Signal, times: Vector) -> list[Any]:
+    """Values at these times for an input that takes objects: exact where the signal has them."""
+    exact = getattr(signal, "objects", None)
+    return list(exact(times) if exact is not None else signal.at(times).tolist())
+
+
+def as_signal(value: Signal | float | str | bytes | Callable[[Vector], ArrayLike]) -> Signal:
+    """A signal from a number, a text or a function of time."""
+    if isinstance(value, (int, float, str, bytes)):
+        return Constant(value)
     if hasattr(value, "at"):
         return value  # type: ignore[return-value]
     return Function(value)

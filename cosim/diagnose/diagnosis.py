@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.problem import Problem
 from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError, ScenarioError
+from ..files import atomic
 from ..system.provider import locate
 from ..system.variants import apply
 from .bursts import bursts, times
@@ -459,8 +460,8 @@ def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:
         except CosimError as error:
             result.warnings.append(str(error))
             continue
-        (out / "fmus").mkdir(parents=True, exist_ok=True)
         target = out / "fmus" / source.name
-        shutil.copyfile(source, target)
+        with atomic(target) as temporary:
+            shutil.copyfile(source, temporary)
         files.append(target)
     return files

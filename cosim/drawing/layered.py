@@ -79,7 +79,7 @@ class Way:
     track: int = 0
 
 
-class Layout:
+class Layered:
     """Positions of boxes and ways.
 
     Args:

@@ -14,8 +14,8 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from ..files import write_text
-from ..system.system import System
-from .layered import Layout, Port, Way
+from .drawable import Drawable
+from .layered import Layered, Port, Way
 from .layers import Wire, columns
 
 TITLE, SUBTITLE, LABEL, NOTE = 13.0, 10.0, 10.5, 9.5
@@ -52,7 +52,7 @@ STYLE = "".join(f".cosim-system {name} {{ {rule} }}\n" for name, rule in _RULES.
 
 
 @dataclass(frozen=True)
-class _Line:
+class _DrawnWire:
     """Connections that are drawn as one: a scalar, or the elements of a vector.
 
     Attributes:
@@ -69,12 +69,12 @@ class _Line:
     text: str
 
 
-def svg(system: System) -> str:
+def svg(system: Drawable) -> str:
     """A system as SVG."""
     return "\n".join(_Drawing(system).lines()) + "\n"
 
 
-def to_svg(system: System, path: Path | str) -> Path:
+def to_svg(system: Drawable, path: Path | str) -> Path:
     """Write a system as an SVG file."""
     path = Path(path)
     write_text(path, svg(system))
@@ -87,7 +87,7 @@ def _split(name: str) -> tuple[str, str]:
     return (base, rest.rstrip("]")) if bracket and name.endswith("]") else (name, "")
 
 
-def _lines(system: System) -> list[_Line]:
+def _lines(system: Drawable) -> list[_DrawnWire]:
     """The wires to be drawn, elements of vectors bundled."""
     efforts: set[tuple[str, str]] = set()
     flows: set[tuple[str, str]] = set()
@@ -121,7 +121,7 @@ def _lines(system: System) -> list[_Line]:
         unit = system.unit(wires[0].target)
         count = f" ({len(wires)})" if whole else ""
         found.append(
-            _Line(
+            _DrawnWire(
                 Wire(
                     source,
                     f"{output}[{len(wires)}]" if whole else names[0][0],
@@ -148,7 +148,7 @@ def _width(text: str, size: float) -> float:
 
 
 class _Drawing:
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Drawable) -> None:
         self.system, self.found = system, _lines(system)
         self.open: dict[str, list[str]] = {name: [] for name in system.members}
         for name in system.open_inputs():
@@ -160,7 +160,7 @@ class _Drawing:
         wires = [line.wire for line in self.found]
         rooms = [_width(line.note, NOTE) + 34.0 if line.note else 0.0 for line in self.found]
         names = list(system.members)
-        self.layout = Layout(names, wires, columns(names, wires), self._size, rooms)
+        self.layout = Layered(names, wires, columns(names, wires), self._size, rooms)
         self.kinds: set[str] = set()
 
     def _size(self, name: str, left: list[Port], right: list[Port]) -> tuple[float, float]:

@@ -11,10 +11,10 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
-from .. import archives
-from ..archives import DAMAGE, ArchiveError
 from ..errors import FmuFileError, InputError, PlatformError
-from ..limits import TEXT, UNPACKED, VALUES
+from ..reading import archives
+from ..reading.archives import DAMAGE, ArchiveError
+from ..reading.limits import TEXT, UNPACKED, VALUES
 from ..spec.cache import cache_folder
 from .description import Description, read_description
 

@@ -7,27 +7,29 @@ validates.
 
 from __future__ import annotations
 
+import itertools
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from .. import markup
 from ..errors import FmuFileError, UnknownNameError, listing
-from ..limits import TEXT, VALUES
-from ..spec.units import BASE, Unit
+from ..reading import markup
+from ..reading.limits import TEXT, VALUES
+from ..spec.units import Unit
+from .attributes import Start, Types, number_of, read_units, start_of, unit_of
 from .metadata import read_metadata
 
 Causality = Literal[
     "parameter", "calculatedParameter", "structuralParameter", "input", "output", "local",
     "independent",
 ]  # fmt: skip
-Start = float | bool | str | None
 
+_TRUE = ("true", "1")
 FMI2_TYPES = {
-    "Real": "Float64", "Integer": "Int32", "Enumeration": "Int32", "Boolean": "Boolean2",
+    "Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration2", "Boolean": "Boolean2",
     "String": "String",
 }  # fmt: skip
 FMI3_TYPES = (
@@ -48,7 +50,12 @@ class Variable:
         unit: None where the FMU declares none.
         start: start values, one per element.
         minimum, maximum, nominal: None where open.
-        size: number of values behind the value reference.
+        dimensions: of an array of FMI 3, () for a scalar.
+        index: of an element of an array, its position among the array's values; else None.
+        relative: a difference, so that the offset of its unit does not count (FMI 2's
+            relativeQuantity).
+        items: of an enumeration, what its values are called.
+        alias: of an alias of FMI 3, the variable whose second name it is; else "".
     """
 
     name: str
@@ -63,7 +70,16 @@ class Variable:
     maximum: float | None = None
     nominal: float | None = None
     text: str = ""
-    size: int = 1
+    dimensions: tuple[int, ...] = ()
+    index: int | None = None
+    relative: bool = False
+    items: Mapping[int, str] | None = None
+    alias: str = ""
+
+    @property
+    def size(self) -> int:
+        """Number of values behind the value reference."""
+        return math.prod(self.dimensions)
 
     @property
     def symbol(self) -> str:
@@ -71,10 +87,17 @@ class Variable:
         return self.unit.symbol if self.unit else ""
 
     def elements(self) -> tuple[str, ...]:
-        """Names of the scalar elements."""
-        if self.size == 1:
+        """Names of the scalar elements: `q[1]` of a vector, `A[2,1]` of a matrix, row by row."""
+        if not self.dimensions:
             return (self.name,)
-        return tuple(f"{self.name}[{index + 1}]" for index in range(self.size))
+        places = itertools.product(*(range(1, count + 1) for count in self.dimensions))
+        return tuple(f"{self.name}[{','.join(map(str, place))}]" for place in places)
+
+    def element(self, index: int) -> Variable:
+        """One element of an array, as a scalar variable."""
+        start = (self.start[index],) if len(self.start) == self.size else ()
+        name = self.elements()[index]
+        return replace(self, name=name, dimensions=(), index=index, start=start)
 
 
 @dataclass(frozen=True)
@@ -141,8 +164,8 @@ class Description:
         return any(self.capabilities.get(spelling) in ("true", "1") for spelling in spellings)
 
     def of(self, causality: Causality) -> list[Variable]:
-        """The variables of one causality."""
-        return [v for v in self.variables.values() if v.causality == causality]
+        """The variables of one causality, each under its first name."""
+        return [v for v in self.variables.values() if v.causality == causality and not v.alias]
 
     def find(self, name: str) -> Variable:
         """A variable by name.
@@ -157,85 +180,47 @@ class Description:
         return self.variables[name]
 
     def expand(self, name: str) -> list[Variable]:
-        """The variable `q`, or all of the vector `q[1]` ... `q[n]`.
+        """What a name means: the variable `q`, an element of an array, or scalars that count up.
+
+        FMI 2 has no arrays; there `q` means all of `q[1]`, `q[2]`, ... or `q[0]`, `q[1]`, ...
 
         Raises:
             UnknownNameError: neither exists.
         """
         if name in self.variables:
             return [self.variables[name]]
-        found: list[Variable] = []
-        while f"{name}[{len(found) + 1}]" in self.variables:
-            found.append(self.variables[f"{name}[{len(found) + 1}]"])
-        return found or [self.find(name)]
+        whole = self.variables.get(name.rpartition("[")[0])
+        if whole is not None and whole.dimensions:
+            wanted, names = name.replace(" ", ""), whole.elements()
+            if wanted not in names:
+                raise UnknownNameError(
+                    f"{self.name} has no element {name!r}: {whole.name} goes from {names[0]} to "
+                    f"{names[-1]}"
+                    if names
+                    else f"{self.name}: {whole.name} is an array without elements"
+                )
+            return [whole.element(names.index(wanted))]
+        for first in (1, 0):
+            found: list[Variable] = []
+            while f"{name}[{first + len(found)}]" in self.variables:
+                found.append(self.variables[f"{name}[{first + len(found)}]"])
+            if found:
+                if first == 1 and f"{name}[0]" in self.variables:
+                    found.insert(0, self.variables[f"{name}[0]"])
+                return found
+        return [self.find(name)]
 
-
-def _number(element: ET.Element, key: str) -> float | None:
-    text = element.get(key)
-    return None if text is None else float(text)
-
-
-def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str, Unit]:
-    """Units by name, from elements `Unit` of FMI (or of SSP, which has them in a namespace)."""
-    units = {}
-    for element in elements:
-        base = element.find(f"{namespace}BaseUnit")
-        name = element.get("name", "")
-        if base is not None:
-            factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-            if not (math.isfinite(factor) and factor and math.isfinite(offset)):
-                raise ValueError(f"unit {name!r} has factor {factor} and offset {offset}")
-            exponents = tuple(int(base.get(key, "0")) for key in BASE)
-            units[name] = Unit(name, exponents, factor, offset)
-    return units
-
-
-def _start(text: str | None, type_: str) -> tuple[Start, ...]:
-    if text is None:
-        return ()
-    if type_ in ("String", "Binary"):
-        return (text,)
-    items = text.split()
-    if type_.startswith("Boolean"):
-        return tuple(item in ("true", "1") for item in items)
-    return tuple(float(item) for item in items)
+    def whole(self, name: str) -> Variable:
+        """The variable of the FMU that holds a scalar element (`x` for `x[2]` of an array)."""
+        return self.variables.get(name) or self.find(name.rpartition("[")[0])
 
 
 class _Unsound(Exception):
     """A description that cannot be used; the text says why and the way out."""
 
 
-class _Types:
-    """Attributes that a variable inherits from the type it declares."""
-
-    def __init__(self, elements: Iterable[ET.Element]) -> None:
-        self._types = dict(_named(elements))
-
-    def get(self, element: ET.Element, key: str) -> str | None:
-        value = element.get(key)
-        if value is None:
-            declared = self._types.get(element.get("declaredType", ""))
-            value = declared.get(key) if declared is not None else None
-        return value
-
-    def number(self, element: ET.Element, key: str) -> float | None:
-        text = self.get(element, key)
-        return None if text is None else float(text)
-
-
-def _named(elements: Iterable[ET.Element]) -> Iterator[tuple[str, ET.Element]]:
-    """Pairs of the attribute `name` and the element that carries the other attributes."""
-    for element in elements:
-        inner = element[0] if element.tag == "SimpleType" and len(element) else element
-        yield element.get("name", ""), inner
-
-
-def _unit(name: str | None, units: Mapping[str, Unit]) -> Unit | None:
-    return units.get(name) if name else None
-
-
 def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
-    types = _Types(root.iterfind("TypeDefinitions/SimpleType"))
+    types = Types(root.iterfind("TypeDefinitions/SimpleType"))
     found = []
     for element in root.iterfind("ModelVariables/ScalarVariable"):
         inner = next(child for child in element if child.tag in FMI2_TYPES)
@@ -249,52 +234,60 @@ def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
                 causality=element.get("causality", "local"),
                 variability=element.get("variability", default),
                 initial=element.get("initial", ""),
-                unit=_unit(types.get(inner, "unit"), units),
-                start=_start(inner.get("start"), type_),
+                unit=unit_of(types.get(inner, "unit"), units),
+                start=start_of(inner.get("start"), type_),
                 minimum=types.number(inner, "min"),
                 maximum=types.number(inner, "max"),
                 nominal=types.number(inner, "nominal"),
                 text=element.get("description", ""),
+                relative=inner.tag == "Real" and types.get(inner, "relativeQuantity") in _TRUE,
+                items=types.items(inner) if inner.tag == "Enumeration" else None,
             )
         )
     return found
 
 
-def _size(element: ET.Element, starts: Mapping[int, Start]) -> int:
-    size = 1
-    for dimension in element.iterfind("Dimension"):
-        if "start" in dimension.attrib:
-            size *= int(dimension.attrib["start"])
-        else:
-            size *= int(starts.get(int(dimension.attrib["valueReference"])) or 1)
-    if size < 1:
-        raise _Unsound(f"variable {element.get('name')!r} has {size} elements; give it some")
-    if excess := VALUES.excess(size):
+def _dimensions(element: ET.Element, starts: Mapping[int, Start]) -> tuple[int, ...]:
+    """Numbers of elements; a structural parameter has the one of its start value."""
+    found = tuple(
+        int(
+            dimension.attrib["start"]
+            if "start" in dimension.attrib
+            else starts[int(dimension.attrib["valueReference"])] or 0
+        )
+        for dimension in element.iterfind("Dimension")
+    )
+    if found and min(found) < 0:
+        raise _Unsound(f"variable {element.get('name')!r} has {min(found)} elements")
+    if excess := VALUES.excess(math.prod(found)):
         raise _Unsound(f"variable {element.get('name')!r}: {excess}")
-    return size
+    return found
 
 
 def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
-    types = _Types(root.iterfind("TypeDefinitions/*"))
+    types = Types(root.iterfind("TypeDefinitions/*"))
     elements = [e for e in root.iterfind("ModelVariables/*") if e.tag in FMI3_TYPES]
     structural = {
-        int(e.attrib["valueReference"]): (_start(e.get("start"), "UInt64") or (None,))[0]
+        int(e.attrib["valueReference"]): (start_of(e.get("start"), "UInt64") or (None,))[0]
         for e in elements
         if e.tag == "UInt64"
     }
     found: list[Variable] = []
     total = 0
     for element in elements:
-        type_ = "Int64" if element.tag == "Enumeration" else element.tag
-        size = _size(element, structural)
-        total += size
+        type_ = element.tag
+        dimensions = _dimensions(element, structural)
+        total += math.prod(dimensions) * (1 + len(element.findall("Alias")))
         if excess := VALUES.excess(total):
             raise _Unsound(f"its variables together: {excess}")
-        inner = element.find("Start")
-        text = inner.get("value") if inner is not None else element.get("start")
-        start = _start(text, type_)
-        if size > 1 and len(start) == 1:
-            start = start * size
+        inner = element.findall("Start")  # of strings and binaries, one per element
+        start = (
+            tuple(value for item in inner for value in start_of(item.get("value"), type_))
+            if inner
+            else start_of(element.get("start"), type_)
+        )
+        if dimensions and len(start) == 1:
+            start = start * math.prod(dimensions)
         default = "continuous" if element.tag in ("Float64", "Float32") else "discrete"
         found.append(
             Variable(
@@ -304,15 +297,26 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
                 causality=element.get("causality", "local"),
                 variability=element.get("variability", default),
                 initial=element.get("initial", ""),
-                unit=_unit(types.get(element, "unit"), units),
+                unit=unit_of(types.get(element, "unit"), units),
                 start=start,
                 minimum=types.number(element, "min"),
                 maximum=types.number(element, "max"),
                 nominal=types.number(element, "nominal"),
                 text=element.get("description", ""),
-                size=size,
+                dimensions=dimensions,
+                relative=types.get(element, "relativeQuantity") in _TRUE,
+                items=types.items(element) if type_ == "Enumeration" else None,
             )
         )
+        found += [
+            replace(
+                found[-1],
+                name=alias.attrib["name"],
+                text=alias.get("description", ""),
+                alias=element.attrib["name"],
+            )
+            for alias in element.iterfind("Alias")
+        ]
     return found
 
 
@@ -322,7 +326,7 @@ def _dependencies(
     inputs: tuple[str, ...],
 ) -> tuple[dict[str, tuple[str, ...]], frozenset[str]]:
     found: dict[str, tuple[str, ...]] = {}
-    assumed = set()
+    assumed, wanted = set(), set(inputs)
     for variable, element in unknowns:
         text = element.get("dependencies")
         if text is None:
@@ -330,7 +334,7 @@ def _dependencies(
             assumed.add(variable.name)
         else:
             names = [known[int(item)].name for item in text.split() if int(item) in known]
-            found[variable.name] = tuple(name for name in names if name in inputs)
+            found[variable.name] = tuple(name for name in names if name in wanted)
     return found, frozenset(assumed)
 
 
@@ -408,7 +412,7 @@ def _assemble(
     units = read_units(root.iterfind("UnitDefinitions/Unit"))
     variables = _variables2(root, units) if fmi == 2 else _variables3(root, units)
     _check(variables, interface.get("modelIdentifier", ""))
-    inputs = tuple(v.name for v in variables if v.causality == "input")
+    inputs = tuple(v.name for v in variables if v.causality == "input" and not v.alias)
     if fmi == 2:
         indexed = {index + 1: v for index, v in enumerate(variables)}
         unknowns = [
@@ -416,13 +420,15 @@ def _assemble(
             for e in root.iterfind("ModelStructure/Outputs/Unknown")
         ]
     else:
-        indexed = {v.reference: v for v in variables}
+        indexed = {v.reference: v for v in variables if not v.alias}
         unknowns = [
             (indexed[int(e.attrib["valueReference"])], e)
             for e in root.iterfind("ModelStructure/Output")
         ]
     dependencies, assumed = _dependencies(unknowns, indexed, inputs)
     for variable in variables:
+        if variable.alias:
+            continue
         if variable.causality == "output" and variable.name not in dependencies:
             dependencies[variable.name] = inputs
             assumed |= {variable.name}
@@ -440,10 +446,10 @@ def _assemble(
         text=root.get("description", ""),
         tool=root.get("generationTool", ""),
         version=root.get("version", ""),
-        start=_number(experiment, "startTime"),
-        stop=_number(experiment, "stopTime"),
-        step=_number(experiment, "stepSize"),
-        tolerance=_number(experiment, "tolerance"),
+        start=number_of(experiment, "startTime"),
+        stop=number_of(experiment, "stopTime"),
+        step=number_of(experiment, "stepSize"),
+        tolerance=number_of(experiment, "tolerance"),
         ports=_ports(extra),
         extra=extra,
     )

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import math
+import ctypes as ct
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..errors import FmuCallError, FmuFileError, ValueRangeError
-from ..schema import shown
+from ..errors import FmuCallError, FmuFileError
 from .description import Variable
-
-if TYPE_CHECKING:
-    from .instance import Instance
+from .values import NUMBERS, OBJECTS, TYPES, fitting, refusal
 
 Vector = NDArray[np.float64]
-
-DTYPES: dict[str, Any] = {
-    "Float64": np.float64, "Float32": np.float32, "Int8": np.int8, "UInt8": np.uint8,
-    "Int16": np.int16, "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32,
-    "Int64": np.int64, "UInt64": np.uint64, "Boolean": np.bool_, "Boolean2": np.int32,
-}  # fmt: skip
-"""Numeric types and what they are in memory."""
+Objects = NDArray[np.object_]
 
 
 @dataclass(frozen=True)
@@ -37,6 +28,7 @@ class Part:
         buffer: the values as C sees them; for `Float64` a view of the block's values.
         slots: positions of these values in the block.
         arguments: what a get or set call takes after the instance.
+        sizes: of binaries.
     """
 
     type: str
@@ -44,30 +36,68 @@ class Part:
     buffer: NDArray[Any]
     slots: slice | NDArray[np.intp]
     arguments: tuple[Any, ...]
+    sizes: NDArray[np.uintp] = field(default_factory=lambda: np.zeros(0, dtype=np.uintp))
+
+
+class Caller(Protocol):
+    """What makes the calls of a block: an instance."""
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+
+    @property
+    def binding(self) -> Any:
+        """`fmi2` or `fmi3`."""
+
+    def get_part(self, part: Part) -> None:
+        """Fetch values."""
+
+    def set_part(self, part: Part) -> None:
+        """Give values."""
+
+    def refusal(self, what: str) -> FmuCallError:
+        """The error for what was not even tried."""
 
 
 class Block:
-    """Values of chosen variables in one preallocated array, and the calls that exchange them.
+    """Values of chosen variables in preallocated arrays, and the calls that exchange them.
+
+    Args:
+        instance: whose variables they are.
+        variables: whole ones, no elements of arrays.
+        values, objects: where the values are, if not in arrays of the block's own.
 
     Attributes:
         names: scalar names, in the order of `values`.
         values: numbers; integers and booleans are converted.
+        objects: of variables that travel as objects (`values.OBJECTS`); integers among them are
+            in `values`, too, as the nearest double.
         parts: one per type.
+        origins: per scalar where its value comes from, for error texts; "" where nobody said.
     """
 
     def __init__(
-        self, instance: Instance, variables: Sequence[Variable], values: Vector | None = None
+        self,
+        instance: Caller,
+        variables: Sequence[Variable],
+        values: Vector | None = None,
+        objects: Objects | None = None,
     ) -> None:
         for variable in variables:
-            if variable.type not in DTYPES:
+            if variable.type not in TYPES:
                 raise FmuFileError(
-                    f"{instance.label}: {variable.name!r} is of type {variable.type}; only numbers "
-                    "and booleans can be exchanged"
+                    f"{instance.label}: {variable.name!r} is of type {variable.type}, whose "
+                    "values cannot be exchanged"
                 )
         self._instance = instance
         self.names = tuple(name for variable in variables for name in variable.elements())
-        self.values = np.zeros(len(self.names)) if values is None else values
+        count = len(self.names)
+        self.values = np.zeros(count) if values is None else values
+        self.objects = np.full(count, None, dtype=object) if objects is None else objects
+        self.origins = [""] * count
         self.parts = tuple(self._split(variables))
+        self._kept: list[Any] = []
 
     def _split(self, variables: Sequence[Variable]) -> Iterable[Part]:
         offset = 0
@@ -79,83 +109,113 @@ class Block:
             offset += variable.size
         for type_, (references, slots) in found.items():
             whole = len(slots) == offset
-            buffer = (
-                self.values
-                if whole and type_ == "Float64"
-                else np.zeros(len(slots), dtype=DTYPES[type_])
-            )
+            dtype = NUMBERS.get(type_) or OBJECTS[type_]
+            direct = whole and type_ == "Float64"
+            buffer = self.values if direct else np.zeros(len(slots), dtype=dtype)
+            sizes = np.zeros(len(slots) if type_ == "Binary" else 0, dtype=np.uintp)
             numbers = np.array(references, dtype=np.uint32)
+            arguments = self._instance.binding.values_arguments(numbers, buffer)
+            if type_ == "Binary":
+                arguments = (*arguments[:2], sizes.ctypes.data, *arguments[2:])
             yield Part(
                 type_,
                 numbers,
                 buffer,
                 slice(0, offset) if whole else np.array(slots, dtype=np.intp),
-                self._instance.binding.values_arguments(numbers, buffer),
+                arguments,
+                sizes,
             )
 
     def get(self) -> Vector:
         """Fetch the values from the FMU."""
         for part in self.parts:
             self._instance.get_part(part)
-            if part.buffer is not self.values:
+            if part.type in OBJECTS:
+                found = _objects(part)
+                self.objects[part.slots] = found
+                if part.type in ("Int64", "UInt64"):
+                    self.values[part.slots] = [float(item) for item in found]
+            elif part.buffer is not self.values:
                 self.values[part.slots] = part.buffer
         return self.values
 
-    def set(self, values: ArrayLike | None = None) -> None:
-        """Give the values (the present ones if none are passed) to the FMU."""
+    def contents(self) -> list[Any]:
+        """The values, objects where they travel as such."""
+        numbers = self.values.tolist()
+        return [
+            number if item is None else item
+            for number, item in zip(numbers, self.objects.tolist(), strict=True)
+        ]
+
+    def set(self, values: Sequence[Any] | Vector | None = None) -> None:
+        """Give the values (the present ones if none are passed) to the FMU.
+
+        Raises:
+            FmuCallError: a value that its type cannot carry, or the FMU refused.
+        """
         if values is not None:
-            self.values[:] = values
+            self._take(values)
         for part in self.parts:
-            if part.buffer is not self.values:
+            if part.type in OBJECTS:
+                self._fill(part)
+            elif part.buffer is not self.values:
                 numbers = self.values[part.slots]
-                if part.buffer.dtype.kind in "iu" and not _fit(numbers, part.buffer.dtype).all():
+                if not fitting(part.type, numbers).all():
                     raise self.unfit(part)
-                part.buffer[:] = numbers
+                part.buffer[:] = np.rint(numbers) if part.buffer.dtype.kind in "iub" else numbers
             self._instance.set_part(part)
 
+    def _take(self, values: Sequence[Any] | Vector) -> None:
+        for part in self.parts:
+            for slot in np.arange(len(self.names))[part.slots].tolist():
+                if part.type in OBJECTS:
+                    self.objects[slot] = values[slot]
+                else:
+                    self.values[slot] = values[slot]
+
+    def _fill(self, part: Part) -> None:
+        """Put objects into the buffer of a part."""
+        items = self.objects[part.slots].tolist()
+        if part.type in ("Int64", "UInt64"):
+            limits = np.iinfo(part.buffer.dtype)
+            for slot, item in zip(
+                np.arange(len(self.names))[part.slots].tolist(), items, strict=True
+            ):
+                if not limits.min <= item <= limits.max:
+                    raise self._instance.refusal(
+                        f"setting {self.names[slot]}{self._from(slot)}: {refusal(part.type, item)}"
+                    )
+            part.buffer[:] = items
+            return
+        contents = [item.encode() if isinstance(item, str) else item or b"" for item in items]
+        self._kept = [ct.create_string_buffer(content) for content in contents]
+        part.buffer[:] = [ct.addressof(buffer) for buffer in self._kept]
+        if part.type == "Binary":
+            part.sizes[:] = [len(content) for content in contents]
+
     def unfit(self, part: Part) -> FmuCallError:
-        """The error for values that do not fit an integer type."""
+        """The error for values that do not fit the type of their variables."""
         numbers = self.values[part.slots]
-        bad = int(np.flatnonzero(~_fit(numbers, part.buffer.dtype))[0])
-        name = self.names[int(np.arange(self.values.size)[part.slots][bad])]
+        bad = int(np.flatnonzero(~fitting(part.type, numbers))[0])
+        slot = int(np.arange(self.values.size)[part.slots][bad])
         return self._instance.refusal(
-            f"setting {name}: {numbers[bad]:g} does not fit type {part.type}"
+            f"setting {self.names[slot]}{self._from(slot)}: "
+            f"{refusal(part.type, float(numbers[bad]))}"
         )
 
-
-def _fit(numbers: Vector, dtype: Any) -> NDArray[np.bool_]:
-    """Whether numbers can be cut to integers of this type."""
-    limits, cut = np.iinfo(dtype), np.trunc(numbers)
-    # float(max) of 64 bits rounds up to the first number that does not fit
-    return np.asarray((cut >= float(limits.min)) & (cut < float(limits.max) + 1.0))
+    def _from(self, slot: int) -> str:
+        return f" from {self.origins[slot]}" if self.origins[slot] else ""
 
 
-def check_values(where: str, variables: Sequence[Variable], value: Any) -> Vector:
-    """Numbers for the elements of a variable, checked against its declaration.
-
-    Raises:
-        ValueRangeError: not numbers, a wrong count, not finite, or outside the bounds.
-    """
-    count = sum(variable.size for variable in variables)
-    name = variables[0].name if len(variables) == 1 else variables[0].name.rpartition("[")[0]
-    try:
-        numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueRangeError(f"{where}: {name} = {shown(value)} is not a number") from None
-    if numbers.ndim == 0:
-        numbers = np.full(count, float(numbers))
-    if numbers.shape != (count,):
-        raise ValueRangeError(f"{where}: {name} takes {count} values, but {numbers.size} are given")
-    bounds = [variable for variable in variables for _ in range(variable.size)]
-    for variable, number in zip(bounds, numbers.tolist(), strict=True):
-        unit = f" {variable.symbol}" if variable.symbol not in ("", "1") else ""
-        if not math.isfinite(number):
-            raise ValueRangeError(f"{where}: {variable.name} = {number} is not finite")
-        low = -math.inf if variable.minimum is None else variable.minimum
-        high = math.inf if variable.maximum is None else variable.maximum
-        if not low <= number <= high:
-            raise ValueRangeError(
-                f"{where}: {variable.name} = {number:.9g}{unit} is outside its bounds "
-                f"[{low:.9g}, {high:.9g}]{unit}"
-            )
-    return numbers
+def _objects(part: Part) -> list[Any]:
+    """What a get call has put into the buffer of a part."""
+    if part.type in ("Int64", "UInt64"):
+        return [int(item) for item in part.buffer.tolist()]
+    addresses = part.buffer.tolist()
+    if part.type == "String":
+        return [ct.string_at(item).decode("utf-8", "replace") if item else "" for item in addresses]
+    sizes = part.sizes.tolist()
+    return [
+        ct.string_at(item, size) if item else b""
+        for item, size in zip(addresses, sizes, strict=True)
+    ]

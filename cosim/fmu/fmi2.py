@@ -1,10 +1,11 @@
-"""The C interface of FMI 2.0 for co-simulation, behind the names of `binding.Binding`."""
+"""The C interface of FMI 2.0 for co-simulation, with the same Python face as `fmi3`."""
 
 from __future__ import annotations
 
 import ctypes as ct
 import importlib.util
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -49,6 +50,10 @@ def _format_in_c(callbacks: _Callbacks) -> Any:
     return library
 
 
+_LAST_TIME, _TERMINATED = 2, 3
+"""Kinds of fmi2Status: fmi2LastSuccessfulTime and fmi2Terminated."""
+
+
 class Fmi2:
     """FMI 2.0 functions of one shared library."""
 
@@ -77,12 +82,15 @@ class Fmi2:
         "fmi2SerializeFMUstate": (_P, _P, _P, _Z),
         "fmi2DeSerializeFMUstate": (_P, _P, _Z, _P),
         "fmi2GetDirectionalDerivative": (_P, _P, _Z, _P, _Z, _P, _P),
+        "fmi2GetBooleanStatus": (_P, _I, _P),
+        "fmi2GetRealStatus": (_P, _I, _P),
         "fmi2SetRealInputDerivatives": (_P, _P, _Z, _P, _P),
     }
     STATE = "FMUstate"
     GET: ClassVar[dict[str, str]] = {
         "Float64": "fmi2GetReal",
         "Int32": "fmi2GetInteger",
+        "Enumeration2": "fmi2GetInteger",
         "Boolean2": "fmi2GetBoolean",
         "String": "fmi2GetString",
     }
@@ -126,19 +134,33 @@ class Fmi2:
         return (references.ctypes.data, references.size, values.ctypes.data)
 
     @staticmethod
-    def text_arguments(reference: Any, value: Any) -> tuple[Any, ...]:
-        """Arguments of a get or set call of one string, after the instance."""
-        return (ct.addressof(reference), 1, ct.addressof(value))
-
-    @staticmethod
-    def step_arguments() -> tuple[Any, ...]:
-        """Arguments of a step after the instance, time and step size."""
-        return (1,)
+    def step_arguments(final: bool) -> tuple[Any, ...]:
+        """Arguments of a step after the instance, time and step size; `final`: none goes back."""
+        return (int(final),)
 
     @staticmethod
     def stopped() -> bool:
         """Whether the last step ended the simulation (FMI 2 says so by its status)."""
         return False
+
+    @staticmethod
+    def reached() -> float | None:
+        """The time that the last step has reached, where steps say so."""
+        return None
+
+    @staticmethod
+    def terminated(functions: Mapping[str, Any], address: int) -> tuple[bool, float | None]:
+        """Whether a discarded step was a request to end, and up to when it went [s]."""
+        if "fmi2GetBooleanStatus" not in functions:
+            return False, None
+        asked, last = ct.c_int(0), ct.c_double(0.0)
+        status = functions["fmi2GetBooleanStatus"](address, _TERMINATED, ct.addressof(asked))
+        if status > 1 or not asked.value:
+            return False, None
+        if "fmi2GetRealStatus" not in functions:
+            return True, None
+        status = functions["fmi2GetRealStatus"](address, _LAST_TIME, ct.addressof(last))
+        return True, last.value if status <= 1 else None
 
     @staticmethod
     def directional_arguments(

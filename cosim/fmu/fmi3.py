@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from .archive import Fmu
@@ -28,6 +29,8 @@ class Fmi3:
         "fmi3DoStep": (_P, _D, _D, _B, _P, _P, _P, _P),
         "fmi3GetString": (_P, _P, _Z, _P, _Z),
         "fmi3SetString": (_P, _P, _Z, _P, _Z),
+        "fmi3GetBinary": (_P, _P, _Z, _P, _P, _Z),
+        "fmi3SetBinary": (_P, _P, _Z, _P, _P, _Z),
         **{f"fmi3Get{name}": (_P, _P, _Z, _P, _Z) for name in NUMERIC},
         **{f"fmi3Set{name}": (_P, _P, _Z, _P, _Z) for name in NUMERIC},
     }
@@ -41,8 +44,11 @@ class Fmi3:
         "fmi3GetDirectionalDerivative": (_P, _P, _Z, _P, _Z, _P, _Z, _P, _Z),
     }
     STATE = "FMUState"
-    GET: ClassVar[dict[str, str]] = {name: f"fmi3Get{name}" for name in (*NUMERIC, "String")}
-    SET: ClassVar[dict[str, str]] = {name: f"fmi3Set{name}" for name in (*NUMERIC, "String")}
+    GET: ClassVar[dict[str, str]] = {
+        **{name: f"fmi3Get{name}" for name in (*NUMERIC, "String", "Binary")},
+        "Enumeration": "fmi3GetInt64",
+    }
+    SET: ClassVar[dict[str, str]] = {key: name.replace("Get", "Set") for key, name in GET.items()}
 
     def __init__(self, library: Any) -> None:
         self.instantiate_ = library.fmi3InstantiateCoSimulation
@@ -80,15 +86,10 @@ class Fmi3:
         """Arguments of a get or set call, after the instance."""
         return (references.ctypes.data, references.size, values.ctypes.data, values.size)
 
-    @staticmethod
-    def text_arguments(reference: Any, value: Any) -> tuple[Any, ...]:
-        """Arguments of a get or set call of one string, after the instance."""
-        return (ct.addressof(reference), 1, ct.addressof(value), 1)
-
-    def step_arguments(self) -> tuple[Any, ...]:
-        """Arguments of a step after the instance, time and step size."""
+    def step_arguments(self, final: bool) -> tuple[Any, ...]:
+        """Arguments of a step after the instance, time and step size; `final`: none goes back."""
         return (
-            True,
+            final,
             ct.addressof(self._event),
             ct.addressof(self._stop),
             ct.addressof(self._early),
@@ -98,6 +99,15 @@ class Fmi3:
     def stopped(self) -> bool:
         """Whether the last step ended the simulation."""
         return bool(self._stop.value)
+
+    def reached(self) -> float | None:
+        """The time that the last step has reached, where steps say so."""
+        return self._last.value
+
+    @staticmethod
+    def terminated(functions: Mapping[str, Any], address: int) -> tuple[bool, float | None]:
+        """Whether a discarded step was a request to end (FMI 3 says so by a flag)."""
+        return False, None
 
     @staticmethod
     def directional_arguments(

@@ -32,15 +32,21 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FmuCallError, FmuFileError, ValueRangeError
+from ..errors import EndRequest, FmuCallError, FmuFileError, ValueRangeError
 from .archive import Fmu, open_fmu
-from .description import Variable
-from .exchange import Block, Part, check_values
+from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .messages import STATUS, forget, new_key, take
+from .values import check_values
 
 Vector = NDArray[np.float64]
+ENDED = STATUS.index("pending") + 1
+"""Beyond FMI's statuses: a step of FMI 3 that asked to end the simulation."""
+SAME = 1e-9
+"""Part of a step by which the time that an FMU has reached may differ from the end of the step."""
+WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
+"""How messages begin that are more than information."""
 
 _libraries: dict[str, Any] = {}
 _functions: dict[tuple[str, int], dict[str, Any]] = {}
@@ -133,7 +139,8 @@ class Instance:
         self.binding: Fmi2 | Fmi3
         self.binding, self._functions = _bound(fmu)
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
-        self._step_arguments = self.binding.step_arguments()
+        self._step_arguments = self.binding.step_arguments(True)
+        self._warned: dict[str, float] = {}
         self._key = new_key()
         address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
@@ -189,7 +196,7 @@ class Instance:
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(
             f"{self.label}: {what}{when} failed with status "
-            f"{STATUS[min(status, 5)]!r}" + _tail(messages),
+            f"{STATUS[status] if 0 <= status < len(STATUS) else status!r}" + _tail(messages),
             messages,
         )
 
@@ -197,10 +204,6 @@ class Instance:
         """The error for a value that is not given to the FMU at all."""
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(f"{self.label}: {what}{when}")
-
-    def take_messages(self) -> tuple[str, ...]:
-        """What the FMU logged since the last call."""
-        return take(self._key)
 
     def _call(self, what: str, name: str, *arguments: Any) -> None:
         if not self._finalizer.alive:
@@ -210,6 +213,22 @@ class Instance:
         status = self._functions[name](self.address, *arguments)
         if status > 1:
             raise self.failure(what, status)
+        if status:
+            self.warned(what)
+
+    def warned(self, what: str, time: float | None = None) -> None:
+        """Note that a call returned `warning`; a time that nobody knows is nan."""
+        self._warned.setdefault(what, self.time if time is None else time)
+
+    def warnings(self) -> list[str]:
+        """What the FMU warned of since the last call, once each."""
+        found = [f"{self.label}: {text}" for text in dict.fromkeys(take(self._key))
+                 if text.startswith(WARNINGS)]  # fmt: skip
+        for what, time in self._warned.items():
+            when = "" if math.isnan(time) else f", first at t = {time:.9g} s"
+            found.append(f"{self.label}: {what} returned status 'warning'{when}")
+        self._warned.clear()
+        return found
 
     def get_part(self, part: Part) -> None:
         """One get call for the values of a block's part."""
@@ -218,6 +237,8 @@ class Instance:
         status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
         if status > 1:
             raise self.failed_access(True, part, status)
+        if status:
+            self.warned("getting values")
 
     def set_part(self, part: Part) -> None:
         """One set call for the values of a block's part."""
@@ -226,8 +247,10 @@ class Instance:
         status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
         if status > 1:
             raise self.failed_access(False, part, status)
+        if status:
+            self.warned("setting values")
 
-    def ramp(
+    def set_input_derivatives(
         self, references: NDArray[np.uint32], orders: NDArray[np.int32], values: Vector
     ) -> None:
         """Derivatives of inputs in time, by which they move in the steps to come (FMI 2)."""
@@ -236,9 +259,9 @@ class Instance:
             values.ctypes.data,
         )  # fmt: skip
         if status > 1:
-            raise self.failed_ramp(references, status)
+            raise self.failed_derivatives(references, status)
 
-    def failed_ramp(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
+    def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
         """The error for derivatives of inputs that the FMU refused."""
         return self.failure(f"setting derivatives of {self._names(references, 'Float64')}", status)
 
@@ -258,37 +281,64 @@ class Instance:
 
     # -- values ----------------------------------------------------------------------------------
 
-    def block(self, names: Iterable[str], values: Vector | None = None) -> Block:
+    def block(
+        self, names: Iterable[str], values: Vector | None = None, objects: Objects | None = None
+    ) -> Block:
         """Preallocate an exchange of these variables; `q` means all of `q[1]` ... `q[n]`."""
-        return Block(self, [v for name in names for v in self.description.expand(name)], values)
+        variables = [v for name in names for v in self.description.expand(name)]
+        return Block(self, variables, values, objects)
 
     def get(self, *names: str) -> Vector:
-        """Values of variables (a copy)."""
-        return self.block(names).get().copy()
-
-    def set(self, values: Mapping[str, Any]) -> None:
-        """Set variables by name; a vector takes a list.
+        """Values of numeric variables (a copy), elements of arrays too.
 
         Raises:
-            ValueRangeError: outside the declared bounds, or not finite.
+            ValueRangeError: a string, a binary, or an integer that a double does not carry.
+        """
+        found = self.fetch(*names)
+        for name, value in zip(names, found, strict=False):
+            if isinstance(value, (str, bytes)) or float(value) != value:
+                raise ValueRangeError(f"{self.label}: {name} = {value!r}: take `fetch` for it")
+        return np.array(found, dtype=np.float64)
+
+    def fetch(self, *names: str) -> list[Any]:
+        """Values of any variables: floats, exact integers, strings, bytes."""
+        found: list[Any] = []
+        for name in names:
+            for variable in self.description.expand(name):
+                whole = self.description.whole(variable.name)
+                block = Block(self, [whole])
+                block.get()
+                contents = block.contents()
+                found += contents if variable.index is None else [contents[variable.index]]
+        return found
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Set variables by name; a vector takes a list, a matrix a list of rows.
+
+        Elements of an array leave the other ones as they are, or at their start values.
+
+        Raises:
+            ValueRangeError: of another type or size, not finite, not exact, or out of bounds.
             FmuCallError: the FMU refused.
         """
+        arrays: dict[str, list[Any]] = {}
         for name, value in values.items():
             variables = self.description.expand(name)
-            if variables[0].type == "String":
-                self._set_text(variables[0], str(value))
+            found = check_values(self.label, variables, value)
+            if variables[0].index is None:
+                Block(self, variables).set(found)
                 continue
-            block = Block(self, variables)
-            numbers = check_values(self.label, variables, value)
-            block.set(numbers)
-
-    def _set_text(self, variable: Variable, value: str) -> None:
-        reference, text = ct.c_uint32(variable.reference), ct.c_char_p(value.encode())
-        self._call(
-            f"setting {variable.name}",
-            self.binding.SET["String"],
-            *self.binding.text_arguments(reference, text),
-        )
+            whole = self.description.whole(name)
+            if whole.name not in arrays:
+                begun = not math.isnan(self.time)
+                arrays[whole.name] = self.fetch(whole.name) if begun else list(whole.start)
+            if len(arrays[whole.name]) != whole.size:
+                raise ValueRangeError(
+                    f"{self.label}: {whole.name} has no start values; set it as a whole"
+                )
+            arrays[whole.name][variables[0].index] = found[0]
+        for name, items in arrays.items():
+            Block(self, [self.description.find(name)]).set(items)
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -306,24 +356,48 @@ class Instance:
         self._terminable = True
 
     def step(self, time: float, size: float) -> None:
-        """Go from `time` to `time + size`."""
+        """Go from `time` to `time + size`.
+
+        Raises:
+            EndRequest: the FMU asked to end the simulation.
+            FmuCallError: it refused.
+        """
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
         status = self._step(self.address, time, size, *self._step_arguments)
         if status > 1 or self.binding.stopped():
-            raise self.failed_step(size, status)
+            raise self.failed_step(size, status, self.binding.reached())
+        if status:
+            self.warned("a step")
         self.time = time + size
 
-    def failed_step(self, size: float, status: int) -> FmuCallError:
-        """The error for a step that returned `status` or asked to end the simulation."""
-        if 1 < status < 5:
+    def returning(self, wanted: bool) -> None:
+        """Whether steps may be followed by a return to a state from before them."""
+        self._step_arguments = self.binding.step_arguments(not wanted)
+
+    def failed_step(self, size: float, status: int, reached: float | None) -> FmuCallError:
+        """The error for a step that returned `status`, or asked to end the simulation.
+
+        Args:
+            size: of the step from `time` [s].
+            status: what it returned.
+            reached: the time at which the FMU of FMI 3 says that it stands [s].
+        """
+        asked, last = status <= 1 or status == ENDED, reached
+        if status == STATUS.index("discard"):
+            asked, last = self.binding.terminated(self._functions, self.address)
+        if not asked:
             return self.failure(f"a step of {size:.9g} s", status)
+        end = self.time + size
+        at = end if last is None or not self.time <= last < end - SAME * size else last
         messages = take(self._key)
-        return FmuCallError(
-            f"{self.label}: the FMU asked to end the simulation after t = {self.time:.9g} s"
-            + _tail(messages),
+        self.time = at
+        return EndRequest(
+            f"{self.label}: asked to end the simulation at t = {at:.9g} s"
+            + ("".join(f"; {item}" for item in messages)),
             messages,
+            time=at,
         )
 
     def terminate(self) -> None:

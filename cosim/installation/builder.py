@@ -14,7 +14,6 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, VariantError
-from ..master import kernel
 from ..spec.cache import cache_folder
 from ..system.provider import FolderProvider, Provider
 from . import places
@@ -59,10 +58,12 @@ class Builder:
 
     def __init__(self, out: Path | None = None) -> None:
         self.out = out or cache_folder() / "fmus"
+        from ..master import kernel  # needs numpy, which lists of variants do not
+
         self._build = sources("packaging.build").build
         if kernel.find() is None:  # a checkout's first run: compile the executor as an FMU
             sources("packaging.kernel").build_kernel(
-                kernel.SOURCE,
+                kernel.SOURCES,
                 kernel.cache_folder() / kernel.library_name(),
                 sources("packaging.build").host_platform(),
             )

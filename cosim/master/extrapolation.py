@@ -20,9 +20,7 @@ def smooth(system: System, layout: Layout) -> NDArray[np.bool_]:
     """Per copy, whether both ends are continuous in time."""
 
     def continuous(full: str) -> bool:
-        instance, _, variable = full.partition(".")
-        known = system.members[instance].description.variables
-        found = known[variable if variable in known else variable.rpartition("[")[0]]
+        found = system.declaration(full)
         return found.type in ("Float64", "Float32") and found.variability == "continuous"
 
     ends = zip(layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True)
@@ -87,10 +85,12 @@ def interpolates(system: System, instance: str) -> bool:
     return description.fmi == 2 and description.can("canInterpolateInputs")
 
 
-def ramps(found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int) -> Rows:
+def set_derivatives(
+    found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int
+) -> Rows:
     """The operation that tells an instance how its inputs move, if it can use it."""
     first, last = spans[index]
-    return [(Op.RAMP, first, last)] if first < last and found[first].moving else []
+    return [(Op.SET_DERIVATIVES, first, last)] if first < last and found[first].moving else []
 
 
 def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int]:
@@ -138,7 +138,7 @@ def side_by_side(
         rows += [(Op.SET, index) for index in starting]
         for index in starting:
             if parts[layout.instances[index]] == 1:
-                rows += ramps(found, spans, index)
+                rows += set_derivatives(found, spans, index)
         for index in starting:
             n = parts[layout.instances[index]]
             rows.append(whole_or_part(index, n, int(instant * n)))

@@ -22,7 +22,7 @@ class Call:
         instance: position.
         references: of the inputs.
         orders: of the derivatives, one per input.
-        values: the derivatives, a part of `Ramps.slope` or `Ramps.curve`.
+        values: the derivatives, a part of `InputDerivatives.slope` or `InputDerivatives.curve`.
     """
 
     instance: int
@@ -31,13 +31,13 @@ class Call:
     values: Vector
 
 
-class Ramps:
+class InputDerivatives:
     """Derivatives of the inputs that move, at the begin of the step.
 
     Attributes:
         average: mean over the step, per mean of the plan (of bonds and of those that are held).
         slope, curve: first and second derivative, likewise.
-        calls: per RAMP operation (first, behind last mean), what is told.
+        calls: per SET_DERIVATIVES operation (first, behind last mean), what is told.
     """
 
     def __init__(self, plan: Plan, instances: Sequence[Instance]) -> None:
@@ -46,7 +46,7 @@ class Ramps:
         self.average, self.slope, self.curve = np.zeros(count), np.zeros(count), np.zeros(count)
         self.calls: dict[tuple[int, int], tuple[Call, ...]] = {}
         layout = plan.layout
-        for first, last in {(a, b) for op, a, b in plan.step.tolist() if op == Op.RAMP}:
+        for first, last in {(a, b) for op, a, b in plan.step.tolist() if op == Op.SET_DERIVATIVES}:
             means = plan.means[first:last]
             index = means[0].instance
             instance = instances[index]
@@ -72,7 +72,9 @@ class Ramps:
     def tell(self, first: int, last: int) -> None:
         """Tell an instance how its inputs move."""
         for call in self.calls[first, last]:
-            self._instances[call.instance].ramp(call.references, call.orders, call.values)
+            self._instances[call.instance].set_input_derivatives(
+                call.references, call.orders, call.values
+            )
 
 
 def bend(a: float, b: float, c: float, d: float) -> float:

@@ -10,25 +10,25 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data.recording import Recording
+from ..data.signals import Constant
 from ..errors import AlgebraicLoopError, FmuCallError, StepError
+from ..system.system import System
+from .outline import Outline
 from .plan import Op
-
-if TYPE_CHECKING:
-    from ..data.signals import Signal
-    from .master import Master
 
 Vector = NDArray[np.float64]
 INDEX, ROW, INSTANCE, OPERATION, CALLS = range(5)
@@ -41,14 +41,9 @@ LOADING = -1
 
 @dataclass(frozen=True)
 class Order:
-    """What the other process shall run."""
+    """What the other process shall run, and the folder that it shares with this one."""
 
-    master: Master
-    external_names: tuple[str, ...]
-    external: Vector
-    observed: tuple[str, ...]
-    times: Vector
-    every: int
+    outline: Outline
     folder: Path
 
 
@@ -79,36 +74,31 @@ def shared(folder: Path, rows: int, columns: int) -> tuple[NDArray[np.int64], Ve
 
 
 def run_isolated(
-    master: Master,
-    limit: float,
-    signals: Mapping[str, Signal],
-    external: Vector,
-    observed: Sequence[str],
-    times: Vector,
-    every: int,
-    progress: Callable[[float], None] | None = None,
+    outline: Outline, limit: float, progress: Callable[[float], None] | None = None
 ) -> Recording:
-    """Run a master in another process.
+    """Run in another process.
 
     Args:
-        master: system, algorithm and step.
+        outline: of the run.
         limit: longest time that one call to an FMU may take [s].
-        signals, external, observed, times, every: as prepared by `Master.run`.
         progress: told now and then which fraction is done.
 
     Raises:
         StepError: an FMU failed, crashed or did not return; carries the recording up to then.
         AlgebraicLoopError: initial values do not settle.
     """
-    count = times.size - 1
+    count, system = outline.count, outline.system
     with tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        state, rows = shared(folder, count // every + 1, len(observed))
+        state, rows = shared(folder, count // outline.every + 1, len(outline.observed))
         state[OPERATION] = LOADING
         plain = replace(
-            master, system=replace(master.system, provider=None), isolate=None, executor="python"
+            outline,
+            system=replace(system, provider=None),
+            signals=dict.fromkeys(outline.signals, Constant(0.0)),  # they are tabulated
+            executor="python",
         )
-        order = Order(plain, tuple(signals), external, tuple(observed), times, every, folder)
+        order = Order(plain, folder)
         (folder / "order").write_bytes(pickle.dumps(order))
         with open(folder / "errors", "wb") as errors:
             process = subprocess.Popen(
@@ -124,27 +114,19 @@ def run_isolated(
         last = min(int(state[INDEX]), count)
 
         def recording(error: str, outcome: Outcome | None = None) -> Recording:
-            kept = min(int(state[ROW]), rows.shape[0])
-            return Recording(
-                time=times[::every][:kept].copy(),
-                values=np.array(rows[:kept]),
-                names=tuple(observed),
-                units={item: master.system.unit(item) for item in observed},
-                provenance={
-                    **master.provenance(),
-                    "isolated": True,
-                    "inputs": {item: signal.text for item, signal in signals.items()},
-                    "fmu_steps": (outcome.steps if outcome else last) * len(master.system.members),
-                },
-                bond_energy=dict(outcome.bond_energy or {}) if outcome else {},
-                error=error,
+            steps = (outcome.steps if outcome else last) * len(system.members)
+            return outline.recording(
+                np.array(rows[: min(int(state[ROW]), rows.shape[0])]),
+                outcome.bond_energy or {} if outcome else {},
+                {"isolated": True, "fmu_steps": steps},
+                error,
             )
 
         path = folder / "outcome"
         outcome: Outcome | None = pickle.loads(path.read_bytes()) if path.exists() else None
         if outcome is not None and outcome.kind == "ok":
             return recording("", outcome)
-        when = float(times[last])
+        when = float(outline.times[last])
         if outcome is not None and outcome.kind == "loop":
             raise AlgebraicLoopError(outcome.text)
         if outcome is not None and outcome.kind == "call":
@@ -154,7 +136,7 @@ def run_isolated(
         else:
             said = (folder / "errors").read_bytes()[-2000:].decode(errors="replace").strip()
             messages = tuple(said.splitlines()[-5:])
-            text = f"run stopped at t = {when:.9g} s: {_blame(master, state)} "
+            text = f"run stopped at t = {when:.9g} s: {_blame(system, state)} "
             text += (
                 f"did not return within {limit:g} s and was ended"
                 if hung
@@ -193,8 +175,8 @@ def _wait(
                 return True
 
 
-def _blame(master: Master, state: NDArray[np.int64]) -> str:
-    members = list(master.system.members.values())
+def _blame(system: System, state: NDArray[np.int64]) -> str:
+    members = list(system.members.values())
     member = members[min(max(int(state[INSTANCE]), 0), len(members) - 1)]
     operation = int(state[OPERATION])
     what = "being created" if operation == LOADING else WHAT.get(Op(operation), "a call")
@@ -204,8 +186,6 @@ def _blame(master: Master, state: NDArray[np.int64]) -> str:
 def _reason(code: int) -> str:
     if code >= 0:
         return f"its process ended with code {code}"
-    import signal
-
     try:
         return f"signal {signal.Signals(-code).name}"
     except ValueError:

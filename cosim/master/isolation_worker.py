@@ -10,53 +10,53 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from ..data.signals import Constant
 from ..errors import AlgebraicLoopError, FmuCallError, StepError
 from .execution import Execution
+from .interpreter import Interpreter
 from .isolation import CALLS, INDEX, INSTANCE, OPERATION, ROW, Order, Outcome, shared
+from .outline import Outline
 from .plan import Op
 
 WATCH = 0.2
 """Time between two looks whether the ordering process is still there [s]."""
 
 
-class _Told(Execution):
-    """A run that says what it is about to do."""
+class _Told(Interpreter):
+    """An interpreter that says what it is about to do."""
 
-    def watch(self, order: Order) -> None:
-        rows = (order.times.size - 1) // order.every + 1
-        self.state, self.rows = shared(order.folder, rows, len(order.observed))
+    def __init__(self, outline: Outline, stack: ExitStack, folder: Path) -> None:
+        super().__init__(outline, stack)
+        self.state, self.rows = shared(folder, *self.rows.shape)
 
     def do(self, op: Op, a: int, b: int) -> None:
-        self.state[INDEX], self.state[ROW] = self.index, self.row
+        self.tell()
         if op in (Op.SET, Op.GET, Op.STEP, Op.SUBSTEP):
             self.state[INSTANCE], self.state[OPERATION] = a, op
         self.state[CALLS] += 1
         super().do(op, a, b)
 
+    def tell(self) -> None:
+        """Say where the run stands."""
+        self.state[INDEX], self.state[ROW] = self.index, self.row
+
 
 def execute(order: Order) -> Outcome:
     """Run what was ordered."""
-    master = order.master
-    plan = master.compile(order.external_names, order.observed)
-    signals = {name: Constant(0.0) for name in order.external_names}
     with ExitStack() as stack:
         try:
-            run = _Told(
-                master, plan, order.observed, order.external, order.times, order.every, signals,
-                stack,
-            )  # fmt: skip
-            run.watch(order)
-            recording = run.execute(order.times.size - 1, None)
-            run.state[INDEX], run.state[ROW] = run.index, run.row
+            told = _Told(order.outline, stack, order.folder)
+            execution = Execution(order.outline, stack, lambda *_: told)
+            try:
+                recording = execution.execute()
+            finally:
+                told.tell()
         except StepError as error:
-            run.state[INDEX], run.state[ROW] = run.index, run.row
             return Outcome("step", str(error), error.messages)
         except FmuCallError as error:
             return Outcome("call", str(error), error.messages)
         except AlgebraicLoopError as error:
             return Outcome("loop", str(error))
-    return Outcome("ok", bond_energy=recording.bond_energy, steps=run.steps())
+    return Outcome("ok", bond_energy=recording.bond_energy, steps=execution.steps())
 
 
 def orphaned() -> None:

@@ -7,50 +7,28 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..data.recording import Recording
-from ..data.signals import Signal, as_signal
-from ..errors import GraphError, UnitError, UnknownNameError, ValueRangeError, listing
-from ..fmu.exchange import DTYPES
+from ..data.signals import Signal, objects
+from ..errors import GraphError, UnitError, ValueRangeError
+from ..fmu.values import OBJECTS, TYPES, check_values
 from ..spec.units import conversion, parse
+from ..system.inputs import Driver, spread
 from ..system.system import System
 from .algorithms import compile_plan
 from .execution import Execution
 from .isolation import run_isolated
+from .outline import Outline
 from .plan import Plan
 
 Vector = NDArray[np.float64]
-Driver = Signal | float | Callable[[Vector], ArrayLike]
-
-
-@dataclass(frozen=True)
-class Outline:
-    """A run, checked and outline out.
-
-    Attributes:
-        count: communication steps.
-        observed: full scalar names of what is recorded.
-        signals: scalar input -> what drives it.
-        plan: of the algorithm.
-        times: communication points [s].
-        external: values of the driven inputs, one row per communication point.
-    """
-
-    count: int
-    observed: list[str]
-    signals: dict[str, Signal]
-    plan: Plan
-    times: Vector
-    external: Vector
 
 
 @dataclass(frozen=True)
@@ -108,16 +86,9 @@ class Master:
         if self.isolate is not None:
             if not self.isolate > 0.0:
                 raise ValueRangeError(f"time limit {self.isolate} s is not positive")
-            return run_isolated(
-                self, self.isolate, outline.signals, outline.external, outline.observed,
-                outline.times, every, progress,
-            )  # fmt: skip
+            return run_isolated(outline, self.isolate, progress)
         with ExitStack() as stack:
-            run = Execution(
-                self, outline.plan, outline.observed, outline.external, outline.times, every,
-                outline.signals, stack,
-            )  # fmt: skip
-            return run.execute(outline.count, progress)
+            return Execution(outline, stack).execute(progress)
 
     def outline(
         self,
@@ -135,11 +106,25 @@ class Master:
         """
         count = self._count(duration, every)
         wanted = self.system.signals() if record is None else record
-        observed = list(dict.fromkeys(n for name in wanted for n in self._observable(name)))
-        signals = self._signals(inputs or {})
-        plan = self.compile(list(signals), observed)
+        observed = tuple(dict.fromkeys(n for name in wanted for n in self._observable(name)))
+        signals = spread(self.system, inputs or {})
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
-        return Outline(count, observed, signals, plan, times, self._external(signals, times))
+        times[-1] = start + duration
+        return Outline(
+            system=self.system,
+            scenario=self.scenario,
+            options=self.options,
+            step=self.step,
+            tolerance=self.tolerance,
+            executor=self.executor,
+            plan=self.compile(list(signals), observed),
+            times=times,
+            observed=observed,
+            every=every,
+            signals=signals,
+            external=self._external(signals, times),
+            objects=self._objects(signals, times),
+        )
 
     def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
         """The plan of the algorithm with its options."""
@@ -165,37 +150,23 @@ class Master:
 
     def _observable(self, name: str) -> list[str]:
         _, variables = self.system.variables(name)
-        if variables[0].type not in DTYPES:
+        if variables[0].type not in TYPES:
             raise GraphError(f"{name} is of type {variables[0].type} and cannot be recorded")
         return self.system.elements(name)
-
-    def _signals(self, inputs: Mapping[str, Driver]) -> dict[str, Signal]:
-        signals: dict[str, Signal] = {}
-        for name, driver in inputs.items():
-            _, variables = self.system.variables(name)
-            if variables[0].causality != "input":
-                raise UnknownNameError(
-                    f"{name} is not an input but a variable of causality "
-                    f"{variables[0].causality!r}; {listing(self.system.open_inputs(), name)}"
-                )
-            for element in self.system.elements(name):
-                source = self.system.driver(element)
-                if source is not None:
-                    raise GraphError(
-                        f"input {element} is already driven by {source}; drop the connection or "
-                        "the signal"
-                    )
-                signals[element] = as_signal(driver)
-        return signals
 
     def _external(self, signals: Mapping[str, Signal], times: Vector) -> Vector:
         table = np.empty((times.size, len(signals)))
         for column, (name, signal) in enumerate(signals.items()):
+            if self.system.declaration(name).type in OBJECTS:
+                table[:, column] = 0.0
+                continue
             values = np.asarray(signal.at(times), dtype=np.float64)
             unit = self.system.unit(name)
             if signal.unit and unit:
                 try:
-                    gain, offset = conversion(parse(signal.unit), self._declared_unit(name))
+                    declared = self.system.declaration(name)
+                    gain, offset = conversion(parse(signal.unit), declared.unit or parse(unit))
+                    offset = 0.0 if declared.relative else offset
                 except UnitError as error:
                     raise UnitError(f"input {name} from {signal.text}: unit {error}") from error
                 values = values * gain + offset
@@ -208,43 +179,14 @@ class Master:
             table[:, column] = values
         return table
 
-    def _declared_unit(self, name: str) -> Any:
-        instance, _, variable = name.partition(".")
-        found = self.system.members[instance].description.variables
-        return found[variable if variable in found else variable.rpartition("[")[0]].unit
-
-    def provenance(self) -> dict[str, Any]:
-        """Where results of this master come from."""
-        return {
-            "system": self.system.name,
-            "scenario": self.scenario,
-            "algorithm": self.algorithm,
-            "options": {key: _plain(value) for key, value in self.options.items()},
-            "step_s": self.step,
-            "instances": {
-                member.name: {
-                    "reference": member.reference,
-                    "model": member.description.name,
-                    "fmi": member.description.fmi,
-                    "file": member.fmu.path.name,
-                    "sha256": member.fmu.digest,
-                    "tool": member.description.tool,
-                    "parameters": dict(member.parameters),
-                }
-                for member in self.system.members.values()
-            },
-            "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
-            "versions": {name: _version(name) for name in ("cosim", "numpy")},
-        }
-
-
-def _plain(value: Any) -> Any:
-    return dict(value) if isinstance(value, Mapping) else value
-
-
-@lru_cache
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"
+    def _objects(self, signals: Mapping[str, Signal], times: Vector) -> dict[int, list[Any]]:
+        """Values of the driven inputs that travel as objects, by their column."""
+        found = {}
+        for column, (name, signal) in enumerate(signals.items()):
+            declared = self.system.declaration(name)
+            if declared.type in OBJECTS:
+                given = objects(signal, times)
+                where = f"input {name} from {signal.text}"
+                scalar = replace(declared, dimensions=())
+                found[column] = [check_values(where, [scalar], item)[0] for item in given]
+        return found

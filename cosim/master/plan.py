@@ -2,19 +2,21 @@
 
 Every exchanged variable has a slot in `values`: first, instance by instance, the outputs that are
 fetched, then the inputs that are given. An algorithm is the order of operations of one
-communication step; it is executed by `master` (Python) and can be executed by compiled code, since
-all there is are arrays of numbers.
+communication step; it is executed by `interpreter` and can be executed by compiled code, since all
+there is are arrays of numbers. Algorithms whose steps are more than such a list bring a `Stepper`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fmu.values import OBJECTS
 from ..system.system import Bond, System
 
 Integers = NDArray[np.int64]
@@ -36,8 +38,9 @@ class Op(IntEnum):
     EXTRAPOLATE = 9  # means a <= i < b: values[target] = mean over the step (begin, if moving)
     SUBSTEP = 10  # instance a goes part `b % PARTS` of `b // PARTS` of a communication step
     HOLD = 11  # remember the inputs of bonds, before others are set at the end of the step
-    ITERATE = 12  # all instances step, again and again, until inputs fit outputs (Python only)
-    RAMP = 13  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    SET_DERIVATIVES = (
+        12  # tell an instance how its inputs move: means a <= i < b, all of them its own
+    )
 
 
 PARTS = 1 << 16
@@ -56,6 +59,8 @@ class Layout:
         copies: per instance (first, behind last) of the copies into it.
         external: slots of the external inputs.
         record_source, record_gain, record_offset: where observed signals come from.
+        objects: per slot, whether it carries an object beside its number (64-bit integers, strings,
+            binaries), which the interpreter alone passes on.
         bonds: power bonds.
         bond_index, bond_output, bond_input, bond_sign: their terms.
     """
@@ -75,6 +80,7 @@ class Layout:
     record_source: Integers
     record_gain: Vector
     record_offset: Vector
+    objects: NDArray[np.bool_]
     bonds: tuple[Bond, ...]
     bond_index: Integers
     bond_output: Integers
@@ -123,24 +129,20 @@ class Mean:
     bonded: bool
 
 
-@dataclass(frozen=True)
-class Iteration:
-    """Settings of the algorithms that repeat steps.
+class Stepper(Protocol):
+    """What makes the communication steps of a run."""
 
-    Attributes:
-        tolerance: relative change of exchanged values at which they count as settled; of step
-            control, the error of one step.
-        smooth: per copy, whether its values are continuous in time.
-        energy: step control: energy that the coupling may invent, relative to what it passes on.
-        longest: step control: longest step [s].
-        adaptive: whether steps are controlled.
-    """
+    def advance(self, last: int) -> None:
+        """Go on up to a communication point."""
 
-    tolerance: float
-    smooth: NDArray[np.bool_]
-    energy: float = np.inf
-    longest: float | None = None
-    adaptive: bool = False
+    def restart(self) -> None:
+        """Begin anew, at the first communication point."""
+
+    def steps(self) -> int:
+        """Steps of the whole system that were made, repeated ones too."""
+
+    def report(self) -> Mapping[str, Any]:
+        """What the provenance of the recording says of it."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,9 @@ class Plan:
         loops: what SOLVE solves.
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
-        means: what EXTRAPOLATE and RAMP set.
-        iteration: what ITERATE and step control need.
+        means: what EXTRAPOLATE and SET_DERIVATIVES set.
+        stepper: for algorithms that repeat steps, what makes a stepper of an
+            `interpreter.Interpreter`; None if the operations of `step` are all there is.
     """
 
     algorithm: str
@@ -168,7 +171,7 @@ class Plan:
     loops: tuple[Loop, ...] = ()
     solving: Integers = field(default_factory=lambda: operations(()))
     means: tuple[Mean, ...] = ()
-    iteration: Iteration | None = None
+    stepper: Callable[[Any], Stepper] | None = None
 
 
 def operations(items: Iterable[Sequence[int]]) -> Integers:
@@ -177,11 +180,9 @@ def operations(items: Iterable[Sequence[int]]) -> Integers:
     return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
 
-def _whole(system: System, name: str) -> str:
-    """The FMU's variable that holds a scalar element (`x` for an element of an FMI 3 array)."""
-    instance, _, variable = name.partition(".")
-    known = system.members[instance].description.variables
-    return variable if variable in known else variable.rpartition("[")[0]
+def decoded(rows: Integers) -> list[tuple[Op, int, int]]:
+    """The operations in these rows, as the interpreter takes them."""
+    return [(Op(op), a, b) for op, a, b in rows.tolist()]
 
 
 def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) -> Layout:
@@ -198,7 +199,7 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
     given: dict[str, dict[str, None]] = {name: {} for name in instances}
 
     def add(table: dict[str, dict[str, None]], full: str) -> None:
-        table[full.partition(".")[0]][_whole(system, full)] = None
+        table[full.partition(".")[0]][system.declaration(full).name] = None
 
     for connection in system.connections:
         add(fetched, connection.source)
@@ -253,6 +254,7 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
         record_source=np.array([item[0] for item in record], dtype=np.int64),
         record_gain=np.array([item[1] for item in record], dtype=np.float64),
         record_offset=np.array([item[2] for item in record], dtype=np.float64),
+        objects=np.array([system.declaration(name).type in OBJECTS for name in names], np.bool_),
         bonds=bonds,
         bond_index=np.array([term[0] for term in terms], dtype=np.int64),
         bond_output=np.array([term[1] for term in terms], dtype=np.int64),

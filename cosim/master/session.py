@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -21,12 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.recording import Recording
-from ..errors import AlgebraicLoopError, FmuCallError, StepError, ValueRangeError
-from ..fmu.exchange import Block, check_values
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
+from ..fmu.exchange import Block
+from ..fmu.values import check_values
+from ..system.inputs import Driver
 from . import kernel
 from .execution import Execution
-from .master import Driver, Master
-from .startup import find_past
+from .initialization import initialize
+from .kernel.stepper import Compiled
+from .master import Master
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
@@ -62,16 +65,14 @@ class Session:
         targets: Sequence[str] = (),
     ) -> None:
         outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
-        self.master, self.names, self.count = master, tuple(outline.observed), outline.count
+        self.master, self.names, self.count = master, outline.observed, outline.count
         self.times = outline.times[::every].copy()
         self.targets = tuple(targets)
         self._stack = ExitStack()
         try:
-            self._run = Execution(
-                master, outline.plan, outline.observed, outline.external, outline.times, every,
-                outline.signals, self._stack,
-            )  # fmt: skip
-            self._advance = self._run.executor()
+            self._execution = Execution(outline, self._stack)
+            self._run = self._execution.run
+            self._stepper = self._execution.prepare()
             self._blocks = {name: self._block(name) for name in self.targets}
         except BaseException:
             self._stack.close()
@@ -80,7 +81,16 @@ class Session:
     def _block(self, name: str) -> tuple[Block, Any]:
         member, variables = self.master.system.variables(name)
         position = list(self.master.system.members).index(member.name)
-        return Block(self._run.instances[position], variables), variables
+        whole = [member.description.whole(v.name) for v in variables]
+        return Block(self._run.instances[position], whole), variables
+
+    def _begin(self, name: str) -> list[Any]:
+        """Values of an array as the system has them."""
+        member, (variable,) = self.master.system.variables(name)
+        given = member.parameters.get(variable.name, variable.start)
+        if len(given) != variable.size:
+            raise ValueRangeError(f"{name} has no start values; set it as a whole")
+        return check_values(name, [variable], list(given))
 
     def run(
         self, values: Mapping[str, float] | Vector | None = None, *, limit: float = math.inf
@@ -105,34 +115,42 @@ class Session:
                 raise ValueRangeError(f"{len(values)} values for {len(self.targets)} targets")
             values = dict(zip(self.targets, np.asarray(values).tolist(), strict=True))
         run = self._run
-        run.restart()
+        self._execution.restart()
+        arrays: dict[str, tuple[Block, list[Any]]] = {}
         for name, value in values.items():
             if name not in self._blocks:
                 self._blocks[name] = self._block(name)
             block, variables = self._blocks[name]
-            block.set(check_values(name, variables, value))
-        run.initialize()
+            found = check_values(name, variables, value)
+            if variables[0].index is None:
+                block.set(found)
+            else:  # an element: FMI sets arrays as a whole
+                whole = name.rpartition("[")[0]
+                arrays.setdefault(whole, (block, self._begin(whole)))[1][variables[0].index] = (
+                    found[0]
+                )
+        for block, items in arrays.values():
+            block.set(items)
+        initialize(run)
         try:
-            find_past(run)
-            self._advance_within(limit)
-            run.finish()
+            self._execution.begin()
+            with suppress(EndRequest):  # an end that an FMU asks for is one
+                self._advance_within(limit)
+            self._execution.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
-            at = float(run.times[min(run.index, self.count)])
-            text = f"run stopped at t = {at:.9g} s: {error}"
-            messages = error.messages if isinstance(error, FmuCallError) else ()
-            raise StepError(text, messages, time=at) from error
-        return self.times, run.rows[: run.row].copy()
+            raise self._execution.stopped(error, keep=False) from error
+        return self.times[: run.row], run.rows[: run.row].copy()
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):
-            self._advance(self.count)
-        elif self._run.bound is not None:
-            status = self._run.advance_within(self.count, limit, RUNAWAY)
+            self._stepper.advance(self.count)
+        elif isinstance(self._stepper, Compiled):
+            status = self._stepper.advance_within(self.count, limit, RUNAWAY)
             self._stopped(limit, status == kernel.TOO_LONG, status == kernel.TOO_LARGE)
         else:
             begun = time.thread_time()
             for last in [*range(LOOK, self.count, LOOK), self.count]:
-                self._advance(last)
+                self._stepper.advance(last)
                 late = time.thread_time() - begun > limit
                 self._stopped(limit, late, last % CHECK == 0 and self._largest()[1] > RUNAWAY)
 
@@ -164,8 +182,8 @@ class Session:
             AlgebraicLoopError: initial values do not settle.
             StepError: an FMU failed; carries the recording up to then.
         """
-        self._run.restart()
-        return self._run.execute(self.count, progress)
+        self._execution.restart()
+        return self._execution.execute(progress)
 
     def close(self) -> None:
         """Free the instances."""

@@ -14,19 +14,16 @@ that cannot return to a saved state, start with held inputs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from .iteration import restore, saved
-from .plan import Op
-
-if TYPE_CHECKING:
-    from .execution import Execution
+from ..errors import EndRequest
+from .interpreter import Interpreter
+from .plan import Op, decoded
+from .rollback import restore, saved
 
 TRIALS = 2
 """The first trial begins with held inputs, which the second corrects; a third changes nothing."""
 
 
-def find_past(run: Execution) -> None:
+def find_past(run: Interpreter) -> None:
     """Fill the history of the extrapolated inputs before the first step.
 
     Raises:
@@ -36,24 +33,26 @@ def find_past(run: Execution) -> None:
     able = all(item.description.can("canGetAndSetFMUState") for item in run.instances)
     if not means or not able or run.times.size < 3:
         return
-    step = [(Op(int(op)), int(a), int(b)) for op, a, b in run.plan.step]
+    step = decoded(run.plan.step)
     sources = [mean.source for mean in means]
-    values = run.values.copy()
-    with saved(run) as states:
+    with saved(run) as before:
         for _ in range(TRIALS):
             seen = []
-            for run.index in range(2):
-                for op, a, b in step:
-                    if op not in (Op.RECORD, Op.ENERGY):
-                        run.do(op, a, b)
-                seen.append(run.history[:, 0].copy())
-            seen.append(run.values[sources])
-            run.history[:, 0] = 3.0 * seen[0] - 3.0 * seen[1] + seen[2]
-            run.history[:, 1] = 6.0 * seen[0] - 8.0 * seen[1] + 3.0 * seen[2]
-            run.history[:, 2] = 10.0 * seen[0] - 15.0 * seen[1] + 6.0 * seen[2]
-            run.past[0] = 3
-            restore(run, states)
-            run.values[:] = values
+            try:
+                for run.index in range(2):
+                    for op, a, b in step:
+                        if op not in (Op.RECORD, Op.ENERGY):
+                            run.do(op, a, b)
+                    seen.append(run.history[:, 0].copy())
+                seen.append(run.values[sources])
+            except EndRequest:  # the run itself will end there
+                run.past[0] = 0
+            else:
+                run.history[:, 0] = 3.0 * seen[0] - 3.0 * seen[1] + seen[2]
+                run.history[:, 1] = 6.0 * seen[0] - 8.0 * seen[1] + 3.0 * seen[2]
+                run.history[:, 2] = 10.0 * seen[0] - 15.0 * seen[1] + 6.0 * seen[2]
+                run.past[0] = 3
+            restore(run, before)
             run.index = 0
             for instance in run.instances:
                 instance.time = float(run.times[0])

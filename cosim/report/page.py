@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..diagnose.bursts import written
+from ..files import write_text
 from .chart import COLOURS, Line, lines
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ small,.note{color:#6b7280}.wide{overflow-x:auto}@media(max-width:800px){.grid{gr
 
 def write_page(result: Diagnosis, path: Path) -> None:
     """Write the report."""
-    path.write_text(page(result), encoding="utf-8")
+    write_text(path, page(result))
 
 
 def page(result: Diagnosis) -> str:
@@ -73,7 +74,7 @@ def page(result: Diagnosis) -> str:
         _residuals(result),
         _located(result),
         _candidates(result),
-        _next(result, table),
+        _next(table),
         _power(table["power"]),
         "</body></html>",
     ]
@@ -379,7 +380,7 @@ def _candidates(result: Diagnosis) -> str:
     )
 
 
-def _next(result: Diagnosis, table: dict[str, Any]) -> str:
+def _next(table: dict[str, Any]) -> str:
     proposal = table["proposed_experiment"]
     if not proposal:
         return ""

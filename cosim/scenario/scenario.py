@@ -16,14 +16,14 @@ import numpy as np
 
 from ..data.comparison import Reference, circle
 from ..data.logs import Log, read_data_set, read_log
-from ..data.signals import Constant, Signal, Table
+from ..data.signals import Constant, Signal, SignalVector, Table
 from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import flatten, read_toml
 from ..installation import places
-from ..limits import DATA
+from ..reading.limits import DATA
 from ..system.toml import SystemFile, read_system
+from .axes import Axes, read_axes
 from .checks import CHECK_KEYS, Check, read_check
-from .plots import Axes, read_axes
 from .run_table import fill, table_runs
 from .shape import check_inside, check_outside
 
@@ -75,7 +75,7 @@ class Scenario:
     tolerance: float | None
     variants: Mapping[str, str]
     parameters: Mapping[str, Any]
-    inputs: Mapping[str, Signal]
+    inputs: Mapping[str, Signal | SignalVector]
     record: tuple[str, ...] | None
     period: float | None
     references: Mapping[str, Reference]
@@ -226,9 +226,9 @@ class _Reader:
         check_inside(table, self.where)
         record = table.get("record", {})
         _only(self.file.path, record, {"signals", "period"}, "[record]")
-        inputs: dict[str, Signal] = {}
+        inputs: dict[str, Signal | SignalVector] = {}
         for name, entry in table.get("inputs", {}).items():
-            inputs.update(self.signals(name, entry))
+            inputs[name] = self.signal(name, entry)
         references = {
             name: self.reference(name, entry) for name, entry in table.get("compare", {}).items()
         }
@@ -329,30 +329,29 @@ class _Reader:
         text = f"{log.name}:{column}"
         return log[str(entry.get("time", "time"))], log[column], unit, text
 
-    def signals(self, name: str, entry: Any) -> dict[str, Signal]:
+    def signal(self, name: str, entry: Any) -> Signal | SignalVector:
         """The signal of an input, or those of all elements of a vector input."""
-        if isinstance(entry, (int, float, list)):
+        if isinstance(entry, (int, float, str, list)):
             entry = {"constant": entry}
         if not isinstance(entry, dict):
-            raise self.fail(f"input {name}: {entry!r} is neither a number nor a table")
+            raise self.fail(f"input {name}: {entry!r} is neither a value nor a table")
         _only(self.file.path, entry, _SOURCE_KEYS, f"input {name}")
         if "constant" in entry:
             value, unit = entry["constant"], str(entry.get("unit", ""))
-            try:
-                if isinstance(value, list):
-                    return {f"{name}[{i + 1}]": Constant(float(item), unit)
-                            for i, item in enumerate(value)}  # fmt: skip
-                return {name: Constant(float(value), unit)}
-            except (TypeError, ValueError):
-                raise self.fail(f"input {name}: {value!r} is not a number") from None
+            rows = value if isinstance(value, list) else [value]
+            items = [item for row in rows for item in (row if isinstance(row, list) else [row])]
+            for item in items:
+                if not isinstance(item, (int, float, str)):
+                    raise self.fail(f"input {name}: {item!r} is neither a number nor a text")
+            constants = tuple(Constant(item, unit) for item in items)
+            return SignalVector(constants) if isinstance(value, list) else constants[0]
         hold = entry.get("interpolation", "hold")
         columns = entry.get("columns")
         if columns is None:
-            return {name: self.table_signal(f"input {name}", entry, str(entry.get("column")), hold)}
-        return {
-            f"{name}[{i + 1}]": self.table_signal(f"input {name}", entry, column, hold)
-            for i, column in enumerate(columns)
-        }
+            return self.table_signal(f"input {name}", entry, str(entry.get("column")), hold)
+        return SignalVector(
+            tuple(self.table_signal(f"input {name}", entry, column, hold) for column in columns)
+        )
 
     def table_signal(self, what: str, entry: Any, column: str, hold: Any) -> Table:
         times, values, unit, text = self.samples(what, entry, column)

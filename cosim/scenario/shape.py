@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..schema import (
+from ..reading.schema import (
     Check,
     anything,
     either,

@@ -31,12 +31,14 @@ class Name:
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
-        device = f".{self.device}" if self.device else ""
         slots = ",".join(f"{slot}={fidelity}" for slot, fidelity in self.slots)
         effects = "".join(f"+{name}" + (f"@{at}" if at else "") for name, at in self.effects)
-        return (
-            f"{self.component}{device}/{self.fidelity}" + (f"[{slots}]" if slots else "") + effects
-        )
+        return f"{self.model}/{self.fidelity}" + (f"[{slots}]" if slots else "") + effects
+
+    @property
+    def model(self) -> str:
+        """What all fidelities of a thing share: component and device."""
+        return f"{self.component}.{self.device}" if self.device else self.component
 
     @property
     def identifier(self) -> str:

@@ -6,8 +6,8 @@ system = ssp.read("bench.ssp")
 scenario = ssp.read_scenario("from_elsewhere.ssp", step=1e-3)
 """
 
-from ..scenario.ssp_experiment import export, read_scenario
 from .document import open_package
+from .experiment import export, read_scenario
 from .read import Experiment, Package, Terminal, read, read_package
 from .write import PARAMETER_SET, write
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import markup
 from ..data.signals import Signal
 from ..errors import listing
 from ..fmu.archive import Fmu
+from ..reading import markup
 from ..system.system import System
-from ..system.toml import SystemFile, Wire
+from ..system.toml import DeclaredConnection, SystemFile
 from . import flatten
 from .document import File, Structure, open_package, read_structure
 from .flatten import Net, shown
@@ -150,7 +150,7 @@ class _Flat:
 
     # -- connections -------------------------------------------------------------------------------
 
-    def wires(self) -> tuple[list[Wire], dict[str, Terminal]]:
+    def wires(self) -> tuple[list[DeclaredConnection], dict[str, Terminal]]:
         """Connections between FMUs, in the order of the file, and outputs of the root system."""
         found: dict[tuple[str, str], list[tuple[int, int, float, float]]] = {}
         order: dict[tuple[str, str], int] = {}
@@ -169,7 +169,9 @@ class _Flat:
         sequence = sorted(found, key=order.__getitem__)
         return [self.wire(*ends, found[ends]) for ends in sequence], outputs
 
-    def wire(self, source: str, target: str, ways: list[tuple[int, int, float, float]]) -> Wire:
+    def wire(
+        self, source: str, target: str, ways: list[tuple[int, int, float, float]]
+    ) -> DeclaredConnection:
         """One wire for a scalar, or for an array that is joined as a whole."""
         size = self.sizes[source]
         order = sorted((start, end) for start, end, _, _ in ways)
@@ -179,7 +181,7 @@ class _Flat:
                 f"connection {source} - {target} joins single elements of arrays; only whole "
                 "arrays can be connected"
             )
-        return Wire(source, target, *changes.pop(), False)
+        return DeclaredConnection(source, target, *changes.pop(), False)
 
     def inputs(self, outputs: Mapping[str, Terminal]) -> dict[str, tuple[Terminal, ...]]:
         """Inputs of the root system."""

@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ..data.signals import Constant, Signal, as_signal
+from ..data.signals import Constant, Signal
 from ..errors import GraphError, InputError, UnitError
 from ..files import atomic
 from ..fmu.archive import Fmu
 from ..fmu.description import Variable
-from ..fmu.exchange import DTYPES
+from ..fmu.values import TYPES, check_values
 from ..spec.units import conversion, parse
+from ..system.inputs import Driver, spread
 from ..system.system import Connection, Member, System
 from .document import FMU, SSC, SSD, SSV
 from .read import Experiment
@@ -44,7 +45,7 @@ def write(
     *,
     version: str = "1.0",
     experiment: Experiment | None = None,
-    inputs: Mapping[str, Signal | float] | None = None,
+    inputs: Mapping[str, Driver] | None = None,
 ) -> Path:
     """Write a system as an SSP archive; the same system gives the same bytes.
 
@@ -72,7 +73,7 @@ class _Writer:
         system: System,
         version: str,
         experiment: Experiment,
-        inputs: Mapping[str, Signal | float],
+        inputs: Mapping[str, Driver],
     ) -> None:
         self.system, self.version, self.experiment = system, version, experiment
         self.signals: dict[str, Signal] = {}
@@ -82,34 +83,26 @@ class _Writer:
         for member in system.members.values():
             for key, value in member.parameters.items():
                 self.give(f"{member.name}.{key}", value)
-        for name, driver in inputs.items():
-            self.drive(name, as_signal(driver))
+        for name, signal in spread(system, inputs).items():
+            self.drive(name, signal)
 
     # -- values ------------------------------------------------------------------------------------
 
     def give(self, name: str, value: Any) -> None:
         """Note a parameter or start value, element by element."""
         member, variables = self.system.variables(name)
-        sizes = [variable.size for variable in variables]
-        string = variables[0].type == "String"
-        items = [value] if string or np.ndim(value) == 0 else list(value)
-        if len(items) == 1:
-            items = items * sum(sizes)
-        for variable, size in zip(variables, sizes, strict=True):
-            self.values[member.name][variable.name] = items[:size]
-            items = items[size:]
+        items = check_values(name, variables, value)
+        for variable in variables:
+            self.values[member.name][variable.name] = items[: variable.size]
+            items = items[variable.size :]
 
-    def drive(self, name: str, signal: Signal) -> None:
+    def drive(self, element: str, signal: Signal) -> None:
         """Note an input: numbers as start values, the rest as a table as well."""
         start = np.array([self.experiment.start or 0.0], dtype=np.float64)
-        for element in self.system.elements(name):
-            source = self.system.driver(element)
-            if source is not None:
-                raise GraphError(f"input {element} is already driven by {source}")
-            gain, offset = self.conversion(element, signal)
-            self.give(element, gain * float(np.asarray(signal.at(start))[0]) + offset)
-            if not isinstance(signal, Constant):
-                self.signals[element] = signal
+        gain, offset = self.conversion(element, signal)
+        self.give(element, gain * float(np.asarray(signal.at(start))[0]) + offset)
+        if not isinstance(signal, Constant):
+            self.signals[element] = signal
 
     def conversion(self, element: str, signal: Signal) -> tuple[float, float]:
         """From the unit of a signal to that of the input that it drives."""
@@ -224,13 +217,14 @@ class _Writer:
         """
         found = []
         for variable in member.description.variables.values():
-            if variable.type not in DTYPES or variable.causality not in ("input", "output"):
+            carried = variable.type in TYPES and variable.type not in ("String", "Binary")
+            if not carried or variable.causality not in ("input", "output"):
                 continue
             full = [f"{member.name}.{element}" for element in variable.elements()]
             wired = any(self.system.driver(name) is not None for name in full)
             if variable.causality == "input" and not wired:
                 continue
-            if variable.size > 1 and self.version == "1.0":
+            if variable.dimensions and self.version == "1.0":
                 if wired or any(c.source in full for c in self.system.connections):
                     raise GraphError(
                         f"{member.name}.{variable.name} is an array, which SSP 1.0 cannot connect; "
@@ -242,7 +236,8 @@ class _Writer:
 
     def type(self, variable: Variable, member: Member) -> str:
         """The type of a variable in this version of SSP."""
-        name = "Boolean" if variable.type == "Boolean2" else variable.type
+        plain = {"Boolean2": "Boolean", "Enumeration2": "Int32", "Enumeration": "Int64"}
+        name = plain.get(variable.type, variable.type)
         if self.version == "2.0" and member.description.fmi == 3:
             return name
         if name.startswith("Float"):
@@ -254,7 +249,7 @@ class _Writer:
         type_ = self.type(variable, member)
         dimension = (
             [f"            <ssc:Dimension{attributes(size=variable.size)}/>"]
-            if variable.size > 1
+            if variable.dimensions
             else []
         )
         return [
@@ -338,7 +333,7 @@ class _Writer:
         units, lines = Units(), []
         for name, items in self.values[member.name].items():
             variable = member.description.variables[name]
-            if variable.size > 1 and self.version == "1.0":
+            if variable.dimensions and self.version == "1.0":
                 raise GraphError(
                     f"{member.name}.{name} is an array, which SSP 1.0 cannot set; write version 2.0"
                 )
@@ -357,7 +352,7 @@ class _Writer:
                 f"    <ssv:Parameter{attributes(name=name)}>",
                 f"      <ssv:{type_}{attributes(value=values, unit=unit)}/>",
             ]
-            if variable.size > 1:
+            if variable.dimensions:
                 lines.append(f"      <ssc:Dimension{attributes(size=variable.size)}/>")
             lines.append("    </ssv:Parameter>")
         return encode(

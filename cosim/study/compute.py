@@ -13,7 +13,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..errors import CosimError, StepError
 from ..master.session import Session
-from ..scenario.runner import RunResult
+from ..running.runner import RunResult
 from ..system.provider import Provider
 from .planning import Group, Task
 
@@ -22,7 +22,7 @@ class StudyChangedError(CosimError):
     """An FMU, a data file or the program is not what it was when the study was planned."""
 
 
-class Line:
+class GroupRunner:
     """What makes the runs of a group, one after the other.
 
     Args:
@@ -78,94 +78,98 @@ class Line:
             self._session = None
 
 
-class Pool:
-    """Lines for several threads; not more than `limit` at a time have instances.
+class RunnerPool:
+    """Runners of groups for several threads; not more than `limit` at a time have instances.
 
     Args:
         provider: where FMUs are.
         limit: number of threads.
-        isolate: as of `Line`.
+        isolate: as of `GroupRunner`.
     """
 
     def __init__(self, provider: Provider | None, limit: int, isolate: float | None = None) -> None:
         self.provider, self.limit, self.isolate = provider, limit, isolate
         self._lock = threading.Lock()
-        self._idle: list[Line] = []
+        self._idle: list[GroupRunner] = []
         self._busy = 0
 
-    def take(self, group: Group) -> Line:
-        """A line of the group that nobody else uses; give it back or drop it."""
+    def take(self, group: Group) -> GroupRunner:
+        """A runner of the group that nobody else uses; give it back or drop it."""
         closing = []
         with self._lock:
             self._busy += 1
-            for line in reversed(self._idle):
-                if line.group.digest == group.digest:
-                    self._idle.remove(line)
-                    return line
+            for runner in reversed(self._idle):
+                if runner.group.digest == group.digest:
+                    self._idle.remove(runner)
+                    return runner
             while self._idle and len(self._idle) + self._busy > self.limit:
                 closing.append(self._idle.pop(0))
         try:
-            for line in closing:
-                line.close()
-            return Line(group, self.provider, self.isolate)
+            for runner in closing:
+                runner.close()
+            return GroupRunner(group, self.provider, self.isolate)
         except BaseException:
             with self._lock:
                 self._busy -= 1
             raise
 
-    def give_back(self, line: Line, usable: bool) -> None:
-        """Keep a line for the next run, unless its FMUs have failed."""
+    def give_back(self, runner: GroupRunner, usable: bool) -> None:
+        """Keep a runner for the next run, unless its FMUs have failed."""
         with self._lock:
             self._busy -= 1
             if usable:
-                self._idle.append(line)
+                self._idle.append(runner)
                 return
-        line.close()
+        runner.close()
 
     def close(self) -> None:
         """Free all instances that nobody uses."""
         with self._lock:
             idle, self._idle = self._idle, []
-        for line in idle:
-            line.close()
+        for runner in idle:
+            runner.close()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TaskResult:
     """A run's result as it is kept, and its recording if signals are kept."""
 
     result: dict[str, Any]
     recording: Recording | None
 
 
-def compute(task: Task, pool: Pool, progress: Callable[[float], None] | None = None) -> Outcome:
+def compute(
+    task: Task, pool: RunnerPool, progress: Callable[[float], None] | None = None
+) -> TaskResult:
     """Make a run; what goes wrong in it is its result.
 
     Raises:
         StudyChangedError: see there.
     """
-    line, usable = pool.take(task.group), False
+    runner, usable = pool.take(task.group), False
     try:
-        outcome = _compute(task, line, progress)
+        outcome = _compute(task, runner, progress)
         usable = outcome.result["status"] == "ok"
         return outcome
     finally:
-        pool.give_back(line, usable)
+        pool.give_back(runner, usable)
 
 
-def _compute(task: Task, line: Line, progress: Callable[[float], None] | None) -> Outcome:
+def _compute(
+    task: Task, runner: GroupRunner, progress: Callable[[float], None] | None
+) -> TaskResult:
     walls, cpus, notes = [], [], list(task.notes)
     first: RunResult | None = None
     started, error, recording = time.perf_counter(), None, None
     try:
-        line.ready()
+        runner.ready()
         for _ in range(task.group.repeats):
             cpu, started = time.thread_time(), time.perf_counter()
-            recording = line.run(task.point.parameters, progress)
+            recording = runner.run(task.point.parameters, progress)
             walls.append(time.perf_counter() - started)
             cpus.append(time.thread_time() - cpu)
             if first is None:
-                first = line.prepared.conclude(recording, walls[0])
+                first = runner.prepared.conclude(recording, walls[0])
             elif not np.array_equal(first.recording.values, recording.values, equal_nan=True):
                 notes.append(
                     "a repetition gave other numbers: an FMU does not return to its start on "
@@ -177,9 +181,9 @@ def _compute(task: Task, line: Line, progress: Callable[[float], None] | None) -
         error = failure
         recording = failure.recording if isinstance(failure, StepError) else recording
         walls.append(time.perf_counter() - started)
-    isolated = line.prepared.master.isolate is not None
+    isolated = runner.prepared.master.isolate is not None
     result = {
-        **_made_with(task, line.prepared.variants),
+        **_made_with(task, runner.prepared.variants),
         "status": "ok" if error is None else "failed",
         "error": None if error is None else _described(error),
         "wall_s": min(walls),
@@ -190,17 +194,17 @@ def _compute(task: Task, line: Line, progress: Callable[[float], None] | None) -
         **_measured(first if error is None else None, recording),
     }
     kept = None
-    if recording is not None and line.channels:
+    if recording is not None and runner.channels:
         kept = replace(
             recording,
-            names=line.channels,
-            values=recording.values[:, [recording.names.index(name) for name in line.channels]],
-            units={name: recording.units[name] for name in line.channels},
+            names=runner.channels,
+            values=recording.values[:, [recording.names.index(name) for name in runner.channels]],
+            units={name: recording.units[name] for name in runner.channels},
         )
-    return Outcome(result, kept)
+    return TaskResult(result, kept)
 
 
-def lost(task: Task, text: str) -> Outcome:
+def lost(task: Task, text: str) -> TaskResult:
     """The outcome of a run whose process has died."""
     result = {
         **_made_with(task, {}),
@@ -212,7 +216,7 @@ def lost(task: Task, text: str) -> Outcome:
         "channels": None,
         **_measured(None, None),
     }
-    return Outcome(result, None)
+    return TaskResult(result, None)
 
 
 def _made_with(task: Task, variants: Mapping[str, str]) -> dict[str, Any]:

@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CosimError, InputError
-from .compute import Outcome, Pool, compute, lost
+from .compute import RunnerPool, TaskResult, compute, lost
 from .planning import Found, Group, Task
 
 if TYPE_CHECKING:
     from distributed import Client
 
-Keep = Callable[[Task, Outcome], None]
+Keep = Callable[[Task, TaskResult], None]
 Told = Callable[[str], None]
 ANSWER = 10.0
 """Time within which a scheduler must answer [s]."""
@@ -29,7 +29,9 @@ class _Stopped(Exception):
     """The study ends while this run is under way."""
 
 
-def in_threads(tasks: Iterable[Task], pool: Pool, workers: int, keep: Keep, told: Told) -> None:
+def in_threads(
+    tasks: Iterable[Task], pool: RunnerPool, workers: int, keep: Keep, told: Told
+) -> None:
     """Make runs in threads.
 
     The compiled executor releases the interpreter lock, so runs of FMUs take as many cores as there
@@ -99,24 +101,24 @@ def in_threads(tasks: Iterable[Task], pool: Pool, workers: int, keep: Keep, told
 
 # -- dask ------------------------------------------------------------------------------------------
 
-_pools: dict[tuple[str, float | None], Pool] = {}
+_pools: dict[tuple[str, float | None], RunnerPool] = {}
 _pools_lock = threading.Lock()
 
 
-def _pool(study: str, provider: Found, isolate: float | None) -> Pool:
+def _pool(study: str, provider: Found, isolate: float | None) -> RunnerPool:
     """The pool of a worker process; that of an earlier study is freed."""
     with _pools_lock:
         if (study, isolate) not in _pools:
             for pool in _pools.values():
                 pool.close()
             _pools.clear()
-            _pools[study, isolate] = Pool(provider, os.cpu_count() or 1, isolate)
+            _pools[study, isolate] = RunnerPool(provider, os.cpu_count() or 1, isolate)
         return _pools[study, isolate]
 
 
 def _remote(
     study: str, group: Group, provider: Found, isolate: float | None, task: dict[str, Any]
-) -> Outcome:
+) -> TaskResult:
     """One run on a worker."""
     return compute(Task(group=group, **task), _pool(study, provider, isolate))
 
@@ -142,7 +144,7 @@ def on_scheduler(
         tasks: what to run.
         address: of the scheduler, e.g. `tcp://host:8786`.
         provider: where the FMUs are.
-        isolate: as of `Line`.
+        isolate: as of `GroupRunner`.
         study: a text that no other study has.
         keep: called with each result.
         told: called after that, with what the run was made with.
@@ -214,7 +216,7 @@ def _on_client(
             outcome = future.result()
         except KilledWorker as error:
             outcome = lost(task, f"the workers that made this run died, the last on {error}")
-        if not isinstance(outcome, Outcome):
+        if not isinstance(outcome, TaskResult):
             raise CosimError(f"{task.label}: a worker gave {outcome!r}; is it of this version?")
         keep(task, outcome)
         told(task.label)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
-from ..scenario.runner import Prepared, adjusted, find_runs, prepare
+from ..running.runner import Prepared, adjusted, find_runs, prepare
 from ..scenario.scenario import Scenario
 from ..system.provider import Provider
 from .definition import Study
@@ -165,7 +165,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudyPlan:
     """What a study runs.
 
     Attributes:
@@ -185,7 +185,7 @@ class Plan:
     single: tuple[str, ...] = ()
 
 
-def make_plan(study: Study, provider: Provider | None) -> Plan:
+def plan_study(study: Study, provider: Provider | None) -> StudyPlan:
     """Find the FMUs of a study (building those that are missing), check it, list its runs.
 
     Raises:
@@ -208,7 +208,7 @@ def make_plan(study: Study, provider: Provider | None) -> Plan:
         reference = keys[len(asked) + index] if designed and compared else ""
         point = replace(everything[index], parameters=parameters)
         tasks[key] = Task(key, group, point, reference, designed, notes)
-    return Plan(study, tasks, signals, found, len(asked), tuple(single))
+    return StudyPlan(study, tasks, signals, found, len(asked), tuple(single))
 
 
 def _scenarios(study: Study) -> dict[str, Scenario]:

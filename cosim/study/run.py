@@ -16,11 +16,11 @@ from ..errors import UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
 from ..system.provider import Provider
-from .compute import Outcome, Pool
+from .compute import RunnerPool, TaskResult
 from .definition import Study, read_study
 from .parallel import in_threads, on_scheduler
 from .picture import plot
-from .planning import Plan, Task, make_plan
+from .planning import StudyPlan, Task, plan_study
 from .store import Store
 from .table import StudyTable, tabulate
 
@@ -152,7 +152,7 @@ def run_study(
         provider = builder.default_provider()
     if workers is not None and workers < 1:
         raise ValueRangeError(f"{workers} workers: at least 1 is needed")
-    plan = make_plan(study, provider)
+    plan = plan_study(study, provider)
     folder = Path(out) if out is not None else Path("out") / study.name
     store = Store(folder / "runs", warn)
     store.tidy()
@@ -161,7 +161,7 @@ def run_study(
         plan.provider.pin(folder / "fmus")
     done, kept = len(plan.tasks) - len(missing), list[bool]()
 
-    def keep(_: Task, outcome: Outcome) -> None:
+    def keep(_: Task, outcome: TaskResult) -> None:
         store.write(outcome.result, outcome.recording)
         kept.append(outcome.result["status"] != "ok")
 
@@ -184,7 +184,7 @@ def run_study(
                     "process; --isolate gives each run a process of its own"
                 )
                 count = 1
-            in_threads(missing, Pool(plan.provider, count, isolate), count, keep, report)
+            in_threads(missing, RunnerPool(plan.provider, count, isolate), count, keep, report)
     except KeyboardInterrupt:
         report()  # runs may have been kept since the last report
         raise
@@ -203,7 +203,7 @@ def run_study(
     )
 
 
-def _missing(plan: Plan, store: Store, retry: bool) -> tuple[list[Task], int]:
+def _missing(plan: StudyPlan, store: Store, retry: bool) -> tuple[list[Task], int]:
     """Runs to be made, those that share instances one after the other, and failures kept."""
     groups: dict[str, list[Task]] = {}
     failed = 0
@@ -216,7 +216,7 @@ def _missing(plan: Plan, store: Store, retry: bool) -> tuple[list[Task], int]:
     return [task for tasks in groups.values() for task in tasks], failed
 
 
-def _notes(plan: Plan) -> list[str]:
+def _notes(plan: StudyPlan) -> list[str]:
     notes = list(dict.fromkeys(note for task in plan.tasks.values() for note in task.notes))
     same = plan.points - sum(task.designed for task in plan.tasks.values())
     if same:

@@ -18,7 +18,7 @@ from ..data.comparison import Reference, compare
 from ..data.recording import Recording
 from ..errors import UnknownNameError
 from ..files import atomic
-from .planning import Plan, Task
+from .planning import StudyPlan, Task
 from .store import Store
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _key(value: Any) -> Any:
     return repr(value) if isinstance(value, (list, dict)) else value
 
 
-def tabulate(plan: Plan, store: Store) -> StudyTable:
+def tabulate(plan: StudyPlan, store: Store) -> StudyTable:
     """The table of the runs that are there; recordings are read one by one."""
     table = StudyTable([], dict(_UNITS))
     by_reference: dict[str, list[int]] = {}

@@ -18,10 +18,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..drawing import svg as drawing
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
 from ..fmu.description import Description, PowerPort, Variable
-from ..fmu.exchange import DTYPES, check_values
+from ..fmu.values import TYPES, boolean, check_values
 from ..spec.units import conversion
 from . import feedthrough
 from .provider import Provider, locate
@@ -152,9 +153,24 @@ class System:
             )
         if variables[0].variability == "constant":
             raise GraphError(f"{self.name}: {name} is constant and cannot be given a value")
-        if variables[0].type != "String":
-            check_values(f"{self.name}: {member.name}", variables, value)
-        member.parameters[name.partition(".")[2]] = value
+        if first.causality == "structuralParameter":
+            raise GraphError(
+                f"{self.name}: {name} is a structural parameter; arrays have the sizes that its "
+                f"start value {first.start[:1]} gives, so it cannot be set"
+            )
+        found = check_values(f"{self.name}: {member.name}", variables, value)
+        if first.index is None:
+            plain = isinstance(value, (bool, int, float)) and not variables[0].items
+            member.parameters[name.partition(".")[2]] = value if plain else _given(value, found)
+            return
+        whole = member.description.whole(first.name)
+        items = list(member.parameters.get(whole.name, whole.start))
+        if len(items) != whole.size:
+            raise GraphError(
+                f"{self.name}: {member.name}.{whole.name} has no start values; set it as a whole"
+            )
+        items[first.index] = found[0]
+        member.parameters[whole.name] = items
 
     def connect(
         self,
@@ -220,15 +236,20 @@ class System:
                 "takes one source"
             )
         for variable, name in (source, target):
-            if variable.type not in DTYPES:
+            if variable.type not in TYPES:
                 raise ConnectError(
-                    f"{what}: {name} is of type {variable.type}; only numbers and booleans can be "
+                    f"{what}: {name} is of type {variable.type}; values of this type cannot be "
                     "connected"
                 )
         out, into = source[0], target[0]
-        if out.type.startswith("Boolean") != into.type.startswith("Boolean"):
+        if _family(out) != _family(into):
             raise ConnectError(f"{what}: types {out.type} and {into.type} do not fit")
         factor, offset = transformation
+        if (factor, offset) != (1.0, 0.0) and _family(out) in ("String", "Binary"):
+            raise ConnectError(
+                f"{what}: a value of type {out.type} takes no factor {factor:g} or offset "
+                f"{offset:g}"
+            )
         if not (math.isfinite(factor) and math.isfinite(offset)):
             raise ConnectError(f"{what}: factor {factor} and offset {offset} must be finite")
         if convert and out.unit is not None and into.unit is not None:
@@ -236,6 +257,8 @@ class System:
                 gain, shift = conversion(out.unit, into.unit)
             except UnitError as error:
                 raise UnitError(f"{what}: unit {error}") from error
+            if out.relative or into.relative:  # a difference of temperatures has no offset
+                shift = 0.0
             factor, offset = factor * gain, factor * shift + offset
         return Connection(source[1], target[1], factor, offset)
 
@@ -265,23 +288,23 @@ class System:
         return [f"{member.name}.{element}" for v in variables for element in v.elements()]
 
     def signals(self) -> list[str]:
-        """Full scalar names of all numeric outputs, in order."""
+        """Full scalar names of all outputs (but clocks), in order."""
         return [
             f"{member.name}.{element}"
             for member in self.members.values()
             for variable in member.description.of("output")
-            if variable.type in DTYPES
+            if variable.type in TYPES
             for element in variable.elements()
         ]
 
     def unit(self, name: str) -> str:
         """Unit of a variable, "" where the FMU declares none."""
+        return self.declaration(name).symbol
+
+    def declaration(self, name: str) -> Variable:
+        """The FMU's variable that is, or holds, the one of a full scalar name."""
         instance, _, variable = name.partition(".")
-        found = self.members[instance].description.variables
-        for spelling in (variable, variable.rpartition("[")[0]):
-            if spelling in found:
-                return found[spelling].symbol
-        return ""
+        return self.members[instance].description.whole(variable)
 
     def open_inputs(self) -> list[str]:
         """Full scalar names of the inputs that nothing drives, with their FMU's start value."""
@@ -385,15 +408,11 @@ class System:
 
     def svg(self) -> str:
         """The system as a drawing (SVG)."""
-        from ..drawing.svg import svg
-
-        return svg(self)
+        return drawing.svg(self)
 
     def to_svg(self, path: Path | str) -> Path:
         """Write the drawing to a file."""
-        from ..drawing.svg import to_svg
-
-        return to_svg(self, path)
+        return drawing.to_svg(self, path)
 
     def __str__(self) -> str:
         lines = [f"System {self.name!r}" + (f": {self.text}" if self.text else "")]
@@ -419,6 +438,18 @@ class System:
         for loop in self.algebraic_loops():
             lines += ["algebraic loop", self.explain_loop(loop)]
         return "\n".join(lines)
+
+
+def _family(variable: Variable) -> str:
+    """What may be connected to each other."""
+    if variable.type in ("String", "Binary"):
+        return variable.type
+    return "truth" if boolean(variable.type) else "number"
+
+
+def _given(value: Any, found: list[Any]) -> Any:
+    """A checked value as it is kept: one for all elements as one, lists as they were given."""
+    return value if isinstance(value, (list, tuple)) else found[0] if len(found) == 1 else value
 
 
 def _article(causality: str) -> str:

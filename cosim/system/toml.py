@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from ..errors import ScenarioError, within
 from ..files import flatten, read_toml
-from ..schema import Check, anything, keyed, list_of, table, text
+from ..reading.schema import Check, anything, keyed, list_of, table, text
 from .provider import Provider
 from .system import System
 
 
-class Wire(NamedTuple):
+class DeclaredConnection(NamedTuple):
     """A connection as `System.connect` takes it."""
 
     source: str
@@ -42,7 +42,7 @@ class SystemFile:
     text: str
     instances: dict[str, str]
     parameters: dict[str, Any]
-    connections: tuple[Wire, ...]
+    connections: tuple[DeclaredConnection, ...]
     shown: str = ""
 
     def build(
@@ -115,10 +115,10 @@ def read_system(path: Path | str) -> SystemFile:
     )
 
 
-def _arrow(path: Path, line: Any) -> Wire:
+def _arrow(path: Path, line: Any) -> DeclaredConnection:
     parts = [part.strip() for part in line.split("->")] if isinstance(line, str) else []
     if len(parts) != 2 or not all(parts):
         raise ScenarioError(
             f'{path}: {line!r} is not a connection; write "instance.output -> instance.input"'
         )
-    return Wire(parts[0], parts[1])
+    return DeclaredConnection(parts[0], parts[1])

@@ -11,28 +11,28 @@ The name is that of an instance, of a component (then all its instances change),
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import UnknownNameError, VariantError, listing
 from ..fmu.archive import open_fmu
+from ..spec.variant import Name, parse_name
 from .provider import Provider, locate
 
-_VARIANT = re.compile(
-    r"(?P<head>(?P<component>\w+)(?:\.\w+)?)/(?P<fidelity>\w+)(?:\[(?P<slots>[^\]]*)\])?"
-    r"(?P<effects>(?:\+[\w@.]+)*)"
-)
 
-
-def _parse(reference: str) -> re.Match[str] | None:
-    return None if reference.endswith(".fmu") else _VARIANT.fullmatch(reference)
+def _parse(reference: str) -> Name | None:
+    """The parsed name, None for what is no name: the path of a file."""
+    try:
+        return parse_name(reference)
+    except VariantError:
+        return None
 
 
 def component(reference: str) -> str:
     """Component of a variant, "" for the path of an .fmu."""
-    match = _parse(reference)
-    return match["component"] if match else ""
+    name = _parse(reference)
+    return name.component if name else ""
 
 
 def change(reference: str, wanted: str) -> str:
@@ -43,31 +43,27 @@ def change(reference: str, wanted: str) -> str:
     """
     if "/" in wanted or wanted.endswith(".fmu"):
         return wanted
-    match = _parse(reference)
-    if match is None:
+    name = _parse(reference)
+    if name is None:
         raise VariantError(
             f"{wanted!r} cannot change {reference!r}, which is a file; give a whole variant such "
             "as gearbox/elastic"
         )
     if wanted.startswith("+"):
         return reference + wanted
-    return f"{match['head']}/{wanted}"
+    return f"{name.model}/{wanted}"
 
 
 def _with_slot(reference: str, slot: str, fidelity: str) -> str:
-    match = _parse(reference)
-    assert match is not None  # only variants are asked for their slots
-    slots = dict(item.split("=", 1) for item in (match["slots"] or "").split(",") if "=" in item)
-    slots[slot] = fidelity
-    inside = ",".join(f"{name}={value}" for name, value in slots.items())
-    return f"{match['head']}/{match['fidelity']}[{inside}]{match['effects']}"
+    name = parse_name(reference)
+    return str(replace(name, slots=tuple({**dict(name.slots), slot: fidelity}.items())))
 
 
 def _has_slot(reference: str, slot: str, provider: Provider | None) -> bool:
-    match = _parse(reference)
-    if match is None:
+    name = _parse(reference)
+    if name is None:
         return False
-    if f"{slot}=" in (match["slots"] or ""):
+    if slot in dict(name.slots):
         return True
     fmu = open_fmu(locate(reference, provider))
     return slot in fmu.description.extra.get("slots", {})

@@ -9,20 +9,19 @@ Source: Leonhard, Control of Electrical Drives, 2001, ch. 5.
 
 from __future__ import annotations
 
-from ..component import Solver
+from .. import bare_motor as qs
+from ..component import Fidelity, Solver
 from ..dc_motor import CURRENT, W
 from ..dc_motor.machine import machine
 from ..model import Model
-from . import U_SET
 
-LEVEL = 0
 # L-stable: the winding's time constant may be below the step.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, speed = m.input(U_SET), m.input(W)
-    command = command + m.balance("command", "signal", unit="V", value=command).effort
-    current = m.state(CURRENT)
-    machine(m, current, current, command, speed)
+    u = m.inputs(qs.U_SET, W)
+    x = m.states(CURRENT)
+    u_set = u.u_set + m.balance("command", "signal", unit="V", value=u.u_set).effort
+    machine(m, x.current, x.current, u_set, u.w)

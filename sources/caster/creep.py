@@ -12,15 +12,14 @@ Source: digital twin paper, block CasterWheel; Johnson, Contact Mechanics, 1985,
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import contact
 from ..laws.floor import MU, REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .fork import fork
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 C_H = Quantity(
     "c_h",
     "m/(N.s)",
@@ -36,17 +35,16 @@ C_N = Quantity(
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    mu, c_h, c_n = m.parameter(MU), m.parameter(C_H), m.parameter(C_N)
-    rest, v_creep = m.parameter(REST), m.parameter(V_CREEP)
+    p = m.parameters(MU, C_H, C_N, REST, V_CREEP)
 
     def friction(s_h: SX, s_n: SX, load: SX, rolling: SX, x: SX, y: SX) -> tuple[SX, SX]:
-        patch = m.balance("mu", "coefficient", unit="1", value=mu, x=x, y=y)
+        patch = m.balance("mu", "coefficient", unit="1", value=p.mu, x=x, y=y)
         return contact.creep(
             s_h,
             s_n,
-            contact.creep_coefficient(c_h, rest, rolling, v_creep),
-            contact.creep_coefficient(c_n, rest, rolling, v_creep),
-            (mu + patch.effort) * load,
+            contact.creep_coefficient(p.c_h, p.rest, rolling, p.v_creep),
+            contact.creep_coefficient(p.c_n, p.rest, rolling, p.v_creep),
+            (p.mu + patch.effort) * load,
         )
 
     fork(m, friction)

@@ -26,33 +26,10 @@ from collections.abc import Callable
 
 import casadi as ca
 
+from .. import caster as qs
 from ..laws.contact import SMALL, rolling_resistance
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import (
-    F_N,
-    F_X,
-    F_Y,
-    F_Z,
-    FORK,
-    M_F,
-    M_W,
-    M_Z,
-    MASS,
-    PIVOT_X,
-    PIVOT_Y,
-    PSI,
-    RELIEF,
-    TAU_F,
-    V_X,
-    V_Y,
-    W_F,
-    W_Z,
-    X_W,
-    Y_W,
-    YAW,
-    W,
-)
 
 TRAIL = Quantity("trail", "m", "wheel axis behind the swivel axis", start=0.0382, minimum=1e-4)
 R = Quantity("r", "m", "rolling radius", start=0.0625, minimum=1e-3)
@@ -92,7 +69,7 @@ class Swing:
     """
 
     def __init__(self, read: Callable[[Quantity], SX]) -> None:
-        fork_mass, wheel_mass, self.trail = read(M_F), read(M_W), read(TRAIL)
+        fork_mass, wheel_mass, self.trail = read(qs.M_F), read(qs.M_W), read(TRAIL)
         behind = read(X_F) * self.trail
         self.mass = fork_mass + wheel_mass
         self.moment = wheel_mass * self.trail + fork_mass * behind
@@ -105,60 +82,59 @@ class Swing:
 
 def fork(m: Model, friction: Friction) -> None:
     """Collect the equations of a swivelling caster with the given friction."""
-    v_x, v_y, w_z, load = m.input(V_X), m.input(V_Y), m.input(W_Z), m.input(F_N)
-    x_w, y_w, lean = m.input(X_W), m.input(Y_W), m.input(TAU_F)
-    swing, radius, spin_inertia = Swing(m.parameter), m.parameter(R), m.parameter(J_C)
+    u = m.inputs(qs.V_X, qs.V_Y, qs.W_Z, qs.F_N, qs.X_W, qs.Y_W, qs.TAU_F)
+    swing = Swing(m.parameter)
+    p = m.parameters(R, J_C, B_S, B_W, C_RR, W_RR)
+    x = m.states(SPIN, SWIVEL_ANGLE, MOMENTUM)
+    w, psi = x.spin, x.swivel_angle
     trail, mass, moment, inertia = swing.trail, swing.mass, swing.moment, swing.inertia
-    swivel_damping, drag = m.parameter(B_S), m.parameter(B_W)
-    c_rr, w_rr = m.parameter(C_RR), m.parameter(W_RR)
-    spin, angle, momentum = m.state(SPIN), m.state(SWIVEL_ANGLE), m.state(MOMENTUM)
 
     ratio = moment / inertia
-    h_x, h_y = ca.cos(angle), ca.sin(angle)
-    ahead, aside = h_x * v_x + h_y * v_y, h_x * v_y - h_y * v_x
-    rate = swing.rate(momentum, aside)
-    turning = rate - w_z
+    h_x, h_y = ca.cos(psi), ca.sin(psi)
+    ahead, aside = h_x * u.v_x + h_y * u.v_y, h_x * u.v_y - h_y * u.v_x
+    rate = swing.rate(x.momentum, aside)
+    turning = rate - u.w_z
 
-    s_h, s_n = ahead - radius * spin, aside - trail * rate
-    f_h, f_n = friction(s_h, s_n, load, radius * spin, x_w, y_w)
+    s_h, s_n = ahead - p.r * w, aside - trail * rate
+    f_h, f_n = friction(s_h, s_n, u.f_n, p.r * w, u.x_w, u.y_w)
     m.loss("slip", -(f_h * s_h + f_n * s_n))
-    resistance = rolling_resistance(c_rr, load, radius, spin, w_rr)
-    m.loss("rolling", resistance * spin)
-    m.loss("swivel", swivel_damping * turning**2)
-    m.loss("bearing", drag * spin**2)
+    resistance = rolling_resistance(p.c_rr, u.f_n, p.r, w, p.w_rr)
+    m.loss("rolling", resistance * w)
+    m.loss("swivel", p.b_s * turning**2)
+    m.loss("bearing", p.b_w * w**2)
 
-    swivel = m.balance("swivel", "rotation", velocity=turning, angle=angle, normal=load)
-    axle = m.balance("axle", "rotation", velocity=spin, normal=load, radius=radius)
+    swivel = m.balance("swivel", "rotation", velocity=turning, angle=psi, normal=u.f_n)
+    axle = m.balance("axle", "rotation", velocity=w, normal=u.f_n, radius=p.r)
     floor = m.balance(
         "floor",
         "pivot",
         spin=rate,
-        rolling=ca.sqrt((radius * spin) ** 2 + SMALL),
-        normal=load,
+        rolling=ca.sqrt((p.r * w) ** 2 + SMALL),
+        normal=u.f_n,
     )
-    hinge = swivel.effort - swivel_damping * turning
-    torque = hinge + floor.effort + lean - trail * f_n
-    m.derivative(spin, (axle.effort - radius * f_h - drag * spin - resistance) / spin_inertia)
-    m.derivative(angle, turning)
-    m.derivative(momentum, torque + moment * rate * ahead)
+    hinge = swivel.effort - p.b_s * turning
+    torque = hinge + floor.effort + u.tau_f - trail * f_n
+    m.derivative(w, (axle.effort - p.r * f_h - p.b_w * w - resistance) / p.J_c)
+    m.derivative(psi, turning)
+    m.derivative(x.momentum, torque + moment * rate * ahead)
 
     relief = ratio * moment
     along = f_h - moment * rate**2
-    across = f_n + ratio * torque + relief * w_z * ahead
-    f_x = m.output(F_X, along * h_x - across * h_y)
-    f_y = m.output(F_Y, along * h_y + across * h_x)
-    m.output(F_Z, load)
-    m_z = m.output(M_Z, -hinge)
-    m.output(PSI, angle)
-    m.output(W, spin)
-    m.output(W_F, rate)
-    m.output(MASS, mass)
-    m.output(RELIEF, ca.vertcat(relief * h_y * h_y, -relief * h_x * h_y, relief * h_x * h_x))
+    across = f_n + ratio * torque + relief * u.w_z * ahead
+    f_x = m.output(qs.F_X, along * h_x - across * h_y)
+    f_y = m.output(qs.F_Y, along * h_y + across * h_x)
+    m.output(qs.F_Z, u.f_n)
+    m_z = m.output(qs.M_Z, -hinge)
+    m.output(qs.PSI, psi)
+    m.output(qs.W, w)
+    m.output(qs.W_F, rate)
+    m.output(qs.MASS, mass)
+    m.output(qs.RELIEF, ca.vertcat(relief * h_y * h_y, -relief * h_x * h_y, relief * h_x * h_x))
     m.stored_energy(
-        (mass * (v_x**2 + v_y**2) - relief * aside**2 + momentum**2 / inertia) / 2
-        + spin_inertia * spin**2 / 2
+        (mass * (u.v_x**2 + u.v_y**2) - relief * aside**2 + x.momentum**2 / inertia) / 2
+        + p.J_c * w**2 / 2
     )
-    m.port(PIVOT_X, f_x, v_x)
-    m.port(PIVOT_Y, f_y, v_y)
-    m.port(YAW, m_z, w_z)
-    m.port(FORK, lean, rate)
+    m.port(qs.PIVOT_X, f_x, u.v_x)
+    m.port(qs.PIVOT_Y, f_y, u.v_y)
+    m.port(qs.YAW, m_z, u.w_z)
+    m.port(qs.FORK, u.tau_f, rate)

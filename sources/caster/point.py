@@ -11,50 +11,26 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import caster as qs
+from ..component import Fidelity
 from ..model import Model
-from . import (
-    F_N,
-    F_X,
-    F_Y,
-    F_Z,
-    FORK,
-    M_F,
-    M_W,
-    M_Z,
-    MASS,
-    PIVOT_X,
-    PIVOT_Y,
-    PSI,
-    RELIEF,
-    TAU_F,
-    V_X,
-    V_Y,
-    W_F,
-    W_Z,
-    X_W,
-    Y_W,
-    YAW,
-    W,
-)
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    v_x, v_y, w_z, f_n = m.input(V_X), m.input(V_Y), m.input(W_Z), m.input(F_N)
-    m.input(X_W)
-    m.input(Y_W)
-    tau_f = m.input(TAU_F)
-    mass = m.output(MASS, m.parameter(M_F) + m.parameter(M_W))
-    m.output(RELIEF, ca.SX.zeros(3))
-    for quantity in (F_X, F_Y, PSI, W):
+    u = m.inputs(qs.V_X, qs.V_Y, qs.W_Z, qs.F_N, qs.X_W, qs.Y_W, qs.TAU_F)
+    p = m.parameters(qs.M_F, qs.M_W)
+    mass = m.output(qs.MASS, p.m_f + p.m_w)
+    m.output(qs.RELIEF, ca.SX.zeros(3))
+    for quantity in (qs.F_X, qs.F_Y, qs.PSI, qs.W):
         m.output(quantity, 0)
-    m.output(F_Z, f_n)
-    m.output(M_Z, tau_f)
-    m.output(W_F, w_z)
-    m.stored_energy(mass * (v_x**2 + v_y**2) / 2)
-    m.port(PIVOT_X, 0, v_x)
-    m.port(PIVOT_Y, 0, v_y)
-    m.port(YAW, tau_f, w_z)
-    m.port(FORK, tau_f, w_z)
+    m.output(qs.F_Z, u.f_n)
+    m.output(qs.M_Z, u.tau_f)
+    m.output(qs.W_F, u.w_z)
+    m.stored_energy(mass * (u.v_x**2 + u.v_y**2) / 2)
+    m.port(qs.PIVOT_X, 0, u.v_x)
+    m.port(qs.PIVOT_Y, 0, u.v_y)
+    m.port(qs.YAW, u.tau_f, u.w_z)
+    m.port(qs.FORK, u.tau_f, u.w_z)

@@ -10,13 +10,12 @@ Source: digital twin paper, block CasterWheel; the masses of fork and wheel are 
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import floor
 from ..model import SX, Model
 from .fork import fork
 
-LEVEL = 1
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 
 
 def equations(m: Model) -> None:

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
 from . import commands, deliver
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2)
 SAMPLES = 64
 T_D = Quantity("t_d", "s", "delay", 0.03, minimum=0.0, maximum=100.0, variability="fixed")
 PERIOD = Quantity(
@@ -34,7 +35,7 @@ PERIOD = Quantity(
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    t_d = m.parameter(T_D)
-    grid = ca.fmax(m.parameter(PERIOD), t_d / (SAMPLES - 2))
+    p = m.parameters(T_D, PERIOD)
+    grid = ca.fmax(p.period, p.t_d / (SAMPLES - 2))
     past = History(m, "command", commands(m), unit="1", period=grid, slots=SAMPLES)
-    deliver(m, past.at(t_d))
+    deliver(m, past.at(p.t_d))

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
 from . import commands, deliver
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 T = Quantity("T", "s", "period of the commands", 0.01, minimum=1e-6, variability="fixed")
 HELD = Quantity("held", "1", "command v_d, w_d, xd_d, yd_d, phi_d (SI) at the last tick", size=5)
 STARTED = Quantity("started", "1", "1 once the first command is read")
@@ -24,8 +25,9 @@ STARTED = Quantity("started", "1", "1 once the first command is read")
 def equations(m: Model) -> None:
     """Collect the equations."""
     now = commands(m)
-    clock = m.clock("command", m.parameter(T))
-    held, started = m.discrete(HELD), m.discrete(STARTED)
-    m.update(clock, held, now)
-    m.update(clock, started, ca.SX(1.0))
-    deliver(m, ca.if_else(started > 0.5, held, now))
+    p = m.parameters(T)
+    z = m.discretes(HELD, STARTED)
+    clock = m.clock("command", p.T)
+    m.update(clock, z.held, now)
+    m.update(clock, z.started, ca.SX(1.0))
+    deliver(m, ca.if_else(z.started > 0.5, z.held, now))

@@ -9,10 +9,11 @@ Source: definition.
 
 from __future__ import annotations
 
+from ..component import Fidelity
 from ..model import Model
 from . import commands, deliver
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:

@@ -6,30 +6,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import crawler as qs
 from ..laws.planar_frame import rotated
 from ..model import SX, Model
-from . import (
-    BETA,
-    E2,
-    E3,
-    L_SX,
-    L_SY,
-    POSE_BETA,
-    POSE_X,
-    POSE_Y,
-    SPROCKET_LEFT,
-    SPROCKET_RIGHT,
-    TAU2,
-    TAU3,
-    W2,
-    W3,
-    W_Z,
-    X_S,
-    Y_S,
-    V,
-    X,
-    Y,
-)
 
 YAW_RATE_FLOOR = 1e-5
 """Yaw rate [rad/s] below which e2, e3 (infinite for straight driving with slip) fade to 0."""
@@ -46,10 +25,10 @@ class Speeds(NamedTuple):
 
 def track_speeds(m: Model) -> Speeds:
     """Declare the inputs and let effects change the speed at which each track runs."""
-    w2, w3 = m.input(W2), m.input(W3)
-    left = m.balance("speed_left", "signal", unit="rad/s", value=w3)
-    right = m.balance("speed_right", "signal", unit="rad/s", value=w2)
-    return Speeds(w2, w3, w2 + right.effort, w3 + left.effort)
+    u = m.inputs(qs.W2, qs.W3)
+    left = m.balance("speed_left", "signal", unit="rad/s", value=u.w3)
+    right = m.balance("speed_right", "signal", unit="rad/s", value=u.w2)
+    return Speeds(u.w2, u.w3, u.w2 + right.effort, u.w3 + left.effort)
 
 
 class Pose(NamedTuple):
@@ -62,7 +41,8 @@ class Pose(NamedTuple):
 
 def pose_states(m: Model) -> Pose:
     """Declare the pose; its start values are the initial pose."""
-    return Pose(m.state(POSE_X), m.state(POSE_Y), m.state(POSE_BETA))
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_BETA)
+    return Pose(x.pose_x, x.pose_y, x.pose_beta)
 
 
 def integrate_pose(m: Model, pose: Pose, v_x: SX, v_y: SX, w_z: SX) -> None:
@@ -71,19 +51,19 @@ def integrate_pose(m: Model, pose: Pose, v_x: SX, v_y: SX, w_z: SX) -> None:
     x' = v_x cos beta - v_y sin beta,  y' = v_x sin beta + v_y cos beta,  beta' = w_z
     x_S = x - l_Sx cos beta + l_Sy sin beta,  y_S = y - l_Sx sin beta - l_Sy cos beta
     """
-    l_x, l_y = m.parameter(L_SX), m.parameter(L_SY)
+    p = m.parameters(qs.L_SX, qs.L_SY)
     x_dot, y_dot = rotated(pose.beta, v_x, v_y)
-    s_x, s_y = rotated(pose.beta, -l_x, -l_y)
+    s_x, s_y = rotated(pose.beta, -p.l_Sx, -p.l_Sy)
     m.derivative(pose.x, x_dot)
     m.derivative(pose.y, y_dot)
     m.derivative(pose.beta, w_z)
-    m.output(X, pose.x)
-    m.output(Y, pose.y)
-    m.output(BETA, pose.beta)
-    m.output(V, v_x)
-    m.output(W_Z, w_z)
-    m.output(X_S, pose.x + s_x)
-    m.output(Y_S, pose.y + s_y)
+    m.output(qs.X, pose.x)
+    m.output(qs.Y, pose.y)
+    m.output(qs.BETA, pose.beta)
+    m.output(qs.V, v_x)
+    m.output(qs.W_Z, w_z)
+    m.output(qs.X_S, pose.x + s_x)
+    m.output(qs.Y_S, pose.y + s_y)
 
 
 def virtual_wheels(r: SX, track: SX, speeds: Speeds, v_x: SX, w_z: SX) -> tuple[SX, SX]:
@@ -107,8 +87,8 @@ def two_wheel_motion(r: SX, track: SX, e2: SX, e3: SX, speeds: Speeds) -> tuple[
 
 def output_kinematic(m: Model, speeds: Speeds, e2: SX, e3: SX) -> None:
     """Output e2, e3 and the ports of a fidelity without forces: torques and powers are 0."""
-    m.output(E2, e2)
-    m.output(E3, e3)
+    m.output(qs.E2, e2)
+    m.output(qs.E3, e3)
     zero = ca.SX(0)
-    m.port(SPROCKET_RIGHT, m.output(TAU2, zero), speeds.w2_in)
-    m.port(SPROCKET_LEFT, m.output(TAU3, zero), speeds.w3_in)
+    m.port(qs.SPROCKET_RIGHT, m.output(qs.TAU2, zero), speeds.w2_in)
+    m.port(qs.SPROCKET_LEFT, m.output(qs.TAU3, zero), speeds.w3_in)

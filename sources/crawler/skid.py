@@ -20,14 +20,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import crawler as qs
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, virtual_wheels
 
-LEVEL = 0
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 2e-3))
 
 I_RIGHT = Quantity(
     "i_right",
@@ -61,9 +60,9 @@ def skid_factor(i: SX) -> SX:
 def equations(m: Model) -> None:
     """Collect the equations."""
     speeds = track_speeds(m)
-    r, track, alpha = m.parameter(R), m.parameter(B), m.parameter(ALPHA)
-    right = skid_factor(m.parameter(I_RIGHT)) * r * speeds.w2
-    left = skid_factor(m.parameter(I_LEFT)) * r * speeds.w3
-    v, w_z = (right + left) / 2, (right - left) / track
-    integrate_pose(m, pose_states(m), v, -v * ca.tan(alpha), w_z)
-    output_kinematic(m, speeds, *virtual_wheels(r, track, speeds, v, w_z))
+    p = m.parameters(qs.R, qs.B, ALPHA, I_RIGHT, I_LEFT)
+    right = skid_factor(p.i_right) * p.r * speeds.w2
+    left = skid_factor(p.i_left) * p.r * speeds.w3
+    v, w_z = (right + left) / 2, (right - left) / p.B
+    integrate_pose(m, pose_states(m), v, -v * ca.tan(p.alpha), w_z)
+    output_kinematic(m, speeds, *virtual_wheels(p.r, p.B, speeds, v, w_z))

@@ -26,14 +26,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import crawler as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import X_V, B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, two_wheel_motion
 
-LEVEL = 1
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 2e-3))
 
 SLIP_A = Quantity(
     "slip_a", "m", "shift of the outer virtual wheel at equal speeds", start=0.0280, nominal=0.01
@@ -94,25 +93,35 @@ SPEED_FLOOR = 1e-6
 def equations(m: Model) -> None:
     """Collect the equations."""
     speeds = track_speeds(m)
-    r, track, x_v = m.parameter(R), m.parameter(B), m.parameter(X_V)
-    slip_a, slip_b, slip_c = m.parameter(SLIP_A), m.parameter(SLIP_B), m.parameter(SLIP_C)
-    e_inner, exchange = m.parameter(E_INNER), m.parameter(EXCHANGE)
-    outer_locked, inner_locked = m.parameter(E_OUTER_LOCKED), m.parameter(E_INNER_LOCKED)
-    w_lock, w_even = m.parameter(W_LOCK), m.parameter(W_EVEN)
+    p = m.parameters(
+        qs.R,
+        qs.B,
+        qs.X_V,
+        SLIP_A,
+        SLIP_B,
+        SLIP_C,
+        E_INNER,
+        EXCHANGE,
+        E_OUTER_LOCKED,
+        E_INNER_LOCKED,
+        W_LOCK,
+        W_EVEN,
+    )
 
     right, left, difference = (
         ca.sqrt(w**2 + SPEED_FLOOR**2) for w in (speeds.w2, speeds.w3, speeds.w2 - speeds.w3)
     )
-    side = ca.tanh((right - left) / w_even)
+    side = ca.tanh((right - left) / p.w_even)
     w_inner = (right + left) / 2 - side * (right - left) / 2
-    locked = ca.exp(-((w_inner / w_lock) ** 2))
-    growth = slip_b * difference + slip_c * w_inner
-    turning = ca.fmax(slip_a + growth, E_MINIMUM)
-    outer = (1 - locked) * turning + locked * outer_locked
-    inner = (1 - locked) * ca.fmax(e_inner - exchange * growth, E_MINIMUM) + locked * inner_locked
+    locked = ca.exp(-((w_inner / p.w_lock) ** 2))
+    growth = p.slip_b * difference + p.slip_c * w_inner
+    turning = ca.fmax(p.slip_a + growth, E_MINIMUM)
+    outer = (1 - locked) * turning + locked * p.e_outer_locked
+    given = ca.fmax(p.e_inner - p.exchange * growth, E_MINIMUM)
+    inner = (1 - locked) * given + locked * p.e_inner_locked
     e2 = (outer + inner) / 2 + side * (outer - inner) / 2
     e3 = (outer + inner) / 2 - side * (outer - inner) / 2
 
-    v, w_z = two_wheel_motion(r, track, e2, e3, speeds)
-    integrate_pose(m, pose_states(m), v, -x_v * w_z, w_z)
+    v, w_z = two_wheel_motion(p.r, p.B, e2, e3, speeds)
+    integrate_pose(m, pose_states(m), v, -p.x_V * w_z, w_z)
     output_kinematic(m, speeds, e2, e3)

@@ -30,12 +30,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import crawler as qs
+from ..component import Fidelity, Solver
 from ..laws import planar_body
 from ..laws.planar_frame import rotated
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import E2, E3, SPROCKET_LEFT, SPROCKET_RIGHT, TAU2, TAU3, B, R
 from .pose import (
     YAW_RATE_FLOOR,
     Pose,
@@ -45,8 +45,7 @@ from .pose import (
     virtual_wheels,
 )
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 0.02, 1e-6)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 0.02, 1e-6))
 """Friction at rest decays within 0.2 ms; only the error-controlled solver steps over it cheaply."""
 
 A = Quantity(
@@ -80,43 +79,40 @@ def equations(m: Model) -> None:
     """Collect the equations."""
     speeds = track_speeds(m)
     pose = pose_states(m)
-    v_x, v_y, w_z = m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE)
-    r, track, half_length = m.parameter(R), m.parameter(B), m.parameter(A)
-    mass, inertia, mu = m.parameter(MASS), m.parameter(YAW_INERTIA), m.parameter(MU)
-    x_g, y_g, z_g = m.parameter(X_G), m.parameter(Y_G), m.parameter(Z_G)
-    gravity, resistance = m.parameter(GRAVITY), m.parameter(F_R)
-    u_0, v_r = m.parameter(U_0), m.parameter(V_R)
+    p = m.parameters(qs.R, qs.B, A, MASS, YAW_INERTIA, MU, X_G, Y_G, Z_G, GRAVITY, F_R, U_0, V_R)
+    x = m.states(VEL_X, VEL_Y, YAW_RATE)
+    v_x, v_y, w_z = x.vel_x, x.vel_y, x.yaw_rate
     count = int(m.constant("road_wheels"))
 
     # Road wheels: the right track's first, then the left track's.
     spacing = ca.DM([2 * i / (count - 1) - 1 for i in range(count)])
-    along = ca.vertcat(spacing, spacing) * half_length
+    along = ca.vertcat(spacing, spacing) * p.a
     side = ca.vertcat(-ca.DM.ones(count), ca.DM.ones(count))
-    across = side * track / 2
-    belt = r * ca.vertcat(ca.repmat(speeds.w2, count), ca.repmat(speeds.w3, count))
+    across = side * p.B / 2
+    belt = p.r * ca.vertcat(ca.repmat(speeds.w2, count), ca.repmat(speeds.w3, count))
 
-    load = m.balance("load", "position", value=ca.vertcat(x_g, y_g, z_g))
-    centre = ca.vertcat(x_g, y_g, z_g) + load.effort
+    load = m.balance("load", "position", value=ca.vertcat(p.x_G, p.y_G, p.z_G))
+    centre = ca.vertcat(p.x_G, p.y_G, p.z_G) + load.effort
     cos, sin = ca.cos(pose.beta), ca.sin(pose.beta)
     body = m.balance(
         "body",
         "body",
         velocity=ca.vertcat(v_x, v_y, 0),
         rate=ca.vertcat(0, 0, w_z),
-        gravity=ca.vertcat(0, 0, -gravity),
+        gravity=ca.vertcat(0, 0, -p.gravity),
         position=ca.vertcat(pose.x, pose.y, 0),
         rotation=ca.vertcat(ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)),
-        mass=mass,
-        first_moment=mass * centre,
+        mass=p.mass,
+        first_moment=p.mass * centre,
     )
-    total = mass + body.mass
-    first = mass * centre + body.first_moment
-    about_origin = inertia + mass * (centre[0] ** 2 + centre[1] ** 2) + body.inertia[2, 2]
+    total = p.mass + body.mass
+    first = p.mass * centre + body.first_moment
+    about_origin = p.yaw_inertia + p.mass * (centre[0] ** 2 + centre[1] ** 2) + body.inertia[2, 2]
 
     normal = _loads(
-        gravity * total - body.effort[2],
-        gravity * first[0] + body.effort[4],
-        gravity * first[1] - body.effort[3],
+        p.gravity * total - body.effort[2],
+        p.gravity * first[0] + body.effort[4],
+        p.gravity * first[1] - body.effort[3],
         along,
         across,
         count,
@@ -124,10 +120,10 @@ def equations(m: Model) -> None:
     forward = v_x - across * w_z
     slide_x, slide_y = forward - belt, v_y + along * w_z
     sliding = ca.sqrt(slide_x**2 + slide_y**2 + 1e-24)  # the floor keeps the slope at rest
-    mu_long, mu_lat = _friction(m, mu, side, pose, along, across, sliding)
-    scale = normal / ca.fmax(sliding, u_0)
+    mu_long, mu_lat = _friction(m, p.mu, side, pose, along, across, sliding)
+    scale = normal / ca.fmax(sliding, p.u_0)
     f_x, f_y = -mu_long * scale * slide_x, -mu_lat * scale * slide_y
-    rolling = -resistance * normal * ca.tanh(forward / v_r)
+    rolling = -p.f_r * normal * ca.tanh(forward / p.v_r)
     pivot = m.balance(
         "pivot", "pivot", spin=w_z, rolling=ca.sqrt(v_x**2 + 1e-12), normal=ca.sum1(normal)
     )
@@ -146,17 +142,17 @@ def equations(m: Model) -> None:
     m.derivative(v_y, a_y - w_z * v_x)
     m.derivative(w_z, w_dot)
     integrate_pose(m, pose, v_x, v_y, w_z)
-    e2, e3 = virtual_wheels(r, track, speeds, v_x, w_z)
-    m.output(E2, e2)
-    m.output(E3, e3)
+    e2, e3 = virtual_wheels(p.r, p.B, speeds, v_x, w_z)
+    m.output(qs.E2, e2)
+    m.output(qs.E3, e3)
     m.output(V_Y, v_y)
     m.output(X_AXIS, -v_y * w_z / (w_z**2 + YAW_RATE_FLOOR**2))
 
-    pull2, pull3 = r * ca.sum1(f_x[:count]), r * ca.sum1(f_x[count:])
+    pull2, pull3 = p.r * ca.sum1(f_x[:count]), p.r * ca.sum1(f_x[count:])
     right = m.balance("sprocket_right", "rotation", velocity=speeds.w2_in, load=pull2)
     left = m.balance("sprocket_left", "rotation", velocity=speeds.w3_in, load=pull3)
-    m.port(SPROCKET_RIGHT, m.output(TAU2, pull2 - right.effort), speeds.w2_in)
-    m.port(SPROCKET_LEFT, m.output(TAU3, pull3 - left.effort), speeds.w3_in)
+    m.port(qs.SPROCKET_RIGHT, m.output(qs.TAU2, pull2 - right.effort), speeds.w2_in)
+    m.port(qs.SPROCKET_LEFT, m.output(qs.TAU3, pull3 - left.effort), speeds.w3_in)
     # A track that an effect makes run at another speed than its drive takes the difference in
     # power from where the effect comes from.
     m.supply(pull2 * (speeds.w2 - speeds.w2_in) + pull3 * (speeds.w3 - speeds.w3_in))

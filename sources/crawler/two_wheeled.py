@@ -15,14 +15,13 @@ Source: crawler paper, Eq 18, 19 and 29 (sign corrected, see README).
 
 from __future__ import annotations
 
-from ..component import Solver
+from .. import crawler as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import X_V, B, R
 from .pose import integrate_pose, output_kinematic, pose_states, track_speeds, two_wheel_motion
 
-LEVEL = 0
-SOLVER = Solver("rk4", 2e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 2e-3))
 
 E_RIGHT = Quantity(
     "e_right",
@@ -40,8 +39,8 @@ E_LEFT = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     speeds = track_speeds(m)
-    r, track, x_v = m.parameter(R), m.parameter(B), m.parameter(X_V)
-    e2, e3 = m.parameter(E_RIGHT), m.parameter(E_LEFT)
-    v, w_z = two_wheel_motion(r, track, e2, e3, speeds)
-    integrate_pose(m, pose_states(m), v, -x_v * w_z, w_z)
+    p = m.parameters(qs.R, qs.B, qs.X_V, E_RIGHT, E_LEFT)
+    e2, e3 = p.e_right, p.e_left
+    v, w_z = two_wheel_motion(p.r, p.B, e2, e3, speeds)
+    integrate_pose(m, pose_states(m), v, -p.x_V * w_z, w_z)
     output_kinematic(m, speeds, e2, e3)

@@ -28,6 +28,7 @@ SOLVER = Solver("rodas3", step=1e-3)
 
 def low_pass(m: Model, current: SX) -> SX:
     """The current behind a first-order low pass."""
-    filtered = m.state(I_F)
-    m.derivative(filtered, 2.0 * math.pi * m.parameter(BANDWIDTH) * (current - filtered))
-    return filtered
+    p = m.parameters(BANDWIDTH)
+    x = m.states(I_F)
+    m.derivative(x.i_f, 2.0 * math.pi * p.bandwidth * (current - x.i_f))
+    return x.i_f

@@ -13,26 +13,29 @@ Source: rig sheet mobile_manipulator: bandwidth 2 kHz, mean over the last 10 ms.
 
 from __future__ import annotations
 
+from .. import current_sensor as qs
+from ..component import Fidelity
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
-from . import I_MEAS, SOLVER, I, low_pass
+from . import SOLVER, low_pass
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2, solver=SOLVER)
 SAMPLES = 10  # of the charge per window
 WINDOW = Quantity("window", "s", "duration T of the mean", 0.01, minimum=1e-6, variability="fixed")
 Q = Quantity("Q", "C", "charge: integral of the filtered current")
-__all__ = ["SOLVER", "equations"]
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    current = low_pass(m, m.input(I))
-    window, charge = m.parameter(WINDOW), m.state(Q)
-    m.derivative(charge, current)
+    u = m.inputs(qs.I)
+    current = low_pass(m, u.i)
+    p = m.parameters(WINDOW)
+    x = m.states(Q)
+    m.derivative(x.Q, current)
     past = History(
-        m, "charge", charge, unit="C", period=window / SAMPLES, slots=SAMPLES + 2, slope=current
+        m, "charge", x.Q, unit="C", period=p.window / SAMPLES, slots=SAMPLES + 2, slope=current
     )
-    mean = (charge - past.at(window)) / window
+    mean = (x.Q - past.at(p.window)) / p.window
     mean += m.balance("current", "signal", unit="A", value=mean).effort
-    m.output(I_MEAS, mean)
+    m.output(qs.I_MEAS, mean)

@@ -11,15 +11,17 @@ Source: digital twin paper, current sensor block.
 
 from __future__ import annotations
 
+from .. import current_sensor as qs
+from ..component import Fidelity
 from ..model import Model
-from . import I_MEAS, SOLVER, I, low_pass
+from . import SOLVER, low_pass
 
-LEVEL = 1
-__all__ = ["SOLVER", "equations"]
+FIDELITY = Fidelity(level=1, solver=SOLVER)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    current = low_pass(m, m.input(I))
+    u = m.inputs(qs.I)
+    current = low_pass(m, u.i)
     current += m.balance("current", "signal", unit="A", value=current).effort
-    m.output(I_MEAS, current)
+    m.output(qs.I_MEAS, current)

@@ -9,14 +9,15 @@ Source: definition.
 
 from __future__ import annotations
 
+from .. import current_sensor as qs
+from ..component import Fidelity
 from ..model import Model
-from . import I_MEAS, I
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    current = m.input(I)
-    current += m.balance("current", "signal", unit="A", value=current).effort
-    m.output(I_MEAS, current)
+    u = m.inputs(qs.I)
+    current = u.i + m.balance("current", "signal", unit="A", value=u.i).effort
+    m.output(qs.I_MEAS, current)

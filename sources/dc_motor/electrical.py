@@ -20,53 +20,48 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import dc_motor as qs
+from ..component import Fidelity, Solver
 from ..model import SX, Model
-from . import (
-    ACC_MAX,
-    CURRENT,
-    CURRENT_FILTER,
-    CURRENT_INTEGRAL,
-    I_MAX,
-    I_SET,
-    KD_I,
-    KD_V,
-    KI_I,
-    KI_V,
-    KP_I,
-    KP_V,
-    SET_SPEED,
-    SPEED_FILTER,
-    SPEED_INTEGRAL,
-    T_FI,
-    T_FV,
-    T_REF,
-    U_MAX,
-    W_REF,
-    W,
-)
 from .machine import machine, sensors
 
-LEVEL = 1
 # Current loops of some 1000 rad/s; effects on the winding (brushes) can be much faster than that.
 # The limits make kinks; a fixed step would miss them, or be short all the time.
-SOLVER = Solver("rodas3_adaptive", 1e-3, 3e-5)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3_adaptive", 1e-3, 3e-5))
 BAND = 0.02
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, speed = m.input(W_REF), m.input(W)
-    current = m.state(CURRENT)
-    current_integral, current_filter = m.state(CURRENT_INTEGRAL), m.state(CURRENT_FILTER)
-    speed_integral, speed_filter = m.state(SPEED_INTEGRAL), m.state(SPEED_FILTER)
-    set_speed = m.state(SET_SPEED)
-    sensed_current, sensed_speed, command = sensors(m, current, speed, command)
+    u = m.inputs(qs.W_REF, qs.W)
+    p = m.parameters(
+        qs.ACC_MAX,
+        qs.T_REF,
+        qs.KP_V,
+        qs.KI_V,
+        qs.KD_V,
+        qs.T_FV,
+        qs.I_MAX,
+        qs.KP_I,
+        qs.KI_I,
+        qs.KD_I,
+        qs.T_FI,
+        qs.U_MAX,
+    )
+    x = m.states(
+        qs.CURRENT,
+        qs.CURRENT_INTEGRAL,
+        qs.CURRENT_FILTER,
+        qs.SPEED_INTEGRAL,
+        qs.SPEED_FILTER,
+        qs.SET_SPEED,
+    )
+    w_set = x.set_speed
+    i, w, w_ref = sensors(m, x.current, u.w, u.w_ref)
 
-    acc_max = m.parameter(ACC_MAX)
     m.derivative(
-        set_speed,
-        ca.fmax(-acc_max, ca.fmin((command - set_speed) / m.parameter(T_REF), acc_max)),
+        w_set,
+        ca.fmax(-p.acc_max, ca.fmin((w_ref - w_set) / p.T_ref, p.acc_max)),
     )
 
     def loop(error: SX, integral: SX, filtered: SX, gains: tuple[SX, SX, SX, SX], limit: SX) -> SX:
@@ -78,11 +73,11 @@ def equations(m: Model) -> None:
         m.derivative(filtered, rate)
         return ca.fmax(-limit, ca.fmin(wanted, limit))
 
-    gains = (m.parameter(KP_V), m.parameter(KI_V), m.parameter(KD_V), m.parameter(T_FV))
-    error = set_speed - sensed_speed
-    i_set = loop(error, speed_integral, speed_filter, gains, m.parameter(I_MAX))
-    gains = (m.parameter(KP_I), m.parameter(KI_I), m.parameter(KD_I), m.parameter(T_FI))
-    error = i_set - sensed_current
-    voltage = loop(error, current_integral, current_filter, gains, m.parameter(U_MAX))
-    m.output(I_SET, i_set)
-    machine(m, current, sensed_current, voltage, speed)
+    gains = (p.Kp_v, p.Ki_v, p.Kd_v, p.T_fv)
+    e_v = w_set - w
+    i_set = loop(e_v, x.speed_integral, x.speed_filter, gains, p.i_max)
+    gains = (p.Kp_i, p.Ki_i, p.Kd_i, p.T_fi)
+    e_i = i_set - i
+    u_a = loop(e_i, x.current_integral, x.current_filter, gains, p.u_max)
+    m.output(qs.I_SET, i_set)
+    machine(m, x.current, i, u_a, u.w)

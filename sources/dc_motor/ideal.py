@@ -18,58 +18,40 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import dc_motor as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import (
-    ACC_MAX,
-    B_M,
-    I_MAX,
-    I_MEASURED,
-    I_SET,
-    K_T,
-    R_A,
-    SET_SPEED,
-    SHAFT,
-    T_REF,
-    TAU,
-    W_REF,
-    I,
-    U,
-    W,
-)
 
-LEVEL = 0
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 K_W = Quantity("k_w", "N.m.s/rad", "stiffness of the servo", start=1.0, minimum=1e-9)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, speed = m.input(W_REF), m.input(W)
-    stiffness, constant, friction = m.parameter(K_W), m.parameter(K_T), m.parameter(B_M)
-    resistance, i_max = m.parameter(R_A), m.parameter(I_MAX)
-    acc_max, settle = m.parameter(ACC_MAX), m.parameter(T_REF)
+    u = m.inputs(qs.W_REF, qs.W)
+    p = m.parameters(K_W, qs.K_T, qs.B_M, qs.R_A, qs.I_MAX, qs.ACC_MAX, qs.T_REF)
+    x = m.states(qs.SET_SPEED)
+    w_set = x.set_speed
 
-    set_speed = m.state(SET_SPEED)
-    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=speed)
-    link = m.balance("command", "signal", unit="rad/s", value=command)
+    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=u.w)
+    link = m.balance("command", "signal", unit="rad/s", value=u.w_ref)
     m.derivative(
-        set_speed,
-        ca.fmax(-acc_max, ca.fmin((command + link.effort - set_speed) / settle, acc_max)),
+        w_set,
+        ca.fmax(-p.acc_max, ca.fmin((u.w_ref + link.effort - w_set) / p.T_ref, p.acc_max)),
     )
-    limit = constant * i_max
-    servo = ca.fmax(-limit, ca.fmin(stiffness * (set_speed - speed - sensor.effort), limit))
-    shaft = m.balance("shaft", "rotation", velocity=speed, load=servo)
-    torque = servo - friction * speed + shaft.effort
-    current = servo / constant
-    voltage = resistance * current + constant * speed
-    m.output(TAU, torque)
-    m.output(I, current)
-    m.output(U, voltage)
-    m.output(I_SET, current)
-    m.output(I_MEASURED, current)
-    m.port(SHAFT, torque, speed)
-    m.supply(voltage * current)
-    m.loss("winding", resistance * current**2)
-    m.loss("bearings", friction * speed**2)
+    limit = p.K_t * p.i_max
+    tau_e = ca.fmax(-limit, ca.fmin(p.k_w * (w_set - u.w - sensor.effort), limit))
+    shaft = m.balance("shaft", "rotation", velocity=u.w, load=tau_e)
+    tau = tau_e - p.b_m * u.w + shaft.effort
+    i = tau_e / p.K_t
+    voltage = p.R_a * i + p.K_t * u.w
+    m.output(qs.TAU, tau)
+    m.output(qs.I, i)
+    m.output(qs.U, voltage)
+    m.output(qs.I_SET, i)
+    m.output(qs.I_MEASURED, i)
+    m.port(qs.SHAFT, tau, u.w)
+    m.supply(voltage * i)
+    m.loss("winding", p.R_a * i**2)
+    m.loss("bearings", p.b_m * u.w**2)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from .. import dc_motor as qs
 from ..model import SX, Model
-from . import B_M, I_MEASURED, K_T, L_A, R_A, SHAFT, TAU, I, U
 
 
 def sensors(m: Model, current: SX, speed: SX, command: SX) -> tuple[SX, SX, SX]:
@@ -14,44 +14,43 @@ def sensors(m: Model, current: SX, speed: SX, command: SX) -> tuple[SX, SX, SX]:
     return sensed_current, sensed_speed, command
 
 
-def machine(m: Model, current: SX, measured: SX, voltage: SX, speed: SX) -> None:
+def machine(m: Model, i: SX, measured: SX, voltage: SX, w: SX) -> None:
     """Winding, torque, outputs and energy of the machine for a given terminal voltage.
 
     L di/dt = u - R i - K w,   tau = K i - b_m w
     """
-    resistance, inductance = m.parameter(R_A), m.parameter(L_A)
-    constant, friction = m.parameter(K_T), m.parameter(B_M)
+    p = m.parameters(qs.R_A, qs.L_A, qs.K_T, qs.B_M)
     # One constant for torque and back-EMF, whatever an effect does to it: their powers cancel.
     ripple = m.balance(
         "torque_constant",
         "coefficient",
         unit="N.m/A",
-        value=constant,
-        current=current,
-        speed=speed,
+        value=p.K_t,
+        current=i,
+        speed=w,
     )
-    constant = constant + ripple.effort
+    k_t = p.K_t + ripple.effort
     winding = m.balance(
         "winding",
         "winding",
-        current=current,
-        speed=speed,
+        current=i,
+        speed=w,
         voltage=voltage,
-        resistance=resistance,
-        emf_constant=constant,
+        resistance=p.R_a,
+        emf_constant=k_t,
     )
     m.derivative(
-        current,
-        (voltage - resistance * current - constant * speed + winding.effort) / inductance,
+        i,
+        (voltage - p.R_a * i - k_t * w + winding.effort) / p.L_a,
     )
-    shaft = m.balance("shaft", "rotation", velocity=speed, load=constant * current)
-    torque = constant * current - friction * speed + shaft.effort
-    m.output(TAU, torque)
-    m.output(I, current)
-    m.output(U, voltage)
-    m.output(I_MEASURED, measured)
-    m.port(SHAFT, torque, speed)
-    m.supply(voltage * current)
-    m.stored_energy(inductance * current**2 / 2)
-    m.loss("winding", resistance * current**2)
-    m.loss("bearings", friction * speed**2)
+    shaft = m.balance("shaft", "rotation", velocity=w, load=k_t * i)
+    tau = k_t * i - p.b_m * w + shaft.effort
+    m.output(qs.TAU, tau)
+    m.output(qs.I, i)
+    m.output(qs.U, voltage)
+    m.output(qs.I_MEASURED, measured)
+    m.port(qs.SHAFT, tau, w)
+    m.supply(voltage * i)
+    m.stored_energy(p.L_a * i**2 / 2)
+    m.loss("winding", p.R_a * i**2)
+    m.loss("bearings", p.b_m * w**2)

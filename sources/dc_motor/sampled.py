@@ -21,36 +21,14 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import dc_motor as qs
+from ..component import Fidelity, Solver
 from ..model import SX, Clock, Model
 from ..quantity import Quantity
-from . import (
-    ACC_MAX,
-    CURRENT,
-    CURRENT_FILTER,
-    CURRENT_INTEGRAL,
-    I_MAX,
-    I_SET,
-    KD_I,
-    KD_V,
-    KI_I,
-    KI_V,
-    KP_I,
-    KP_V,
-    SET_SPEED,
-    SPEED_FILTER,
-    SPEED_INTEGRAL,
-    T_FI,
-    T_FV,
-    U_MAX,
-    W_REF,
-    W,
-)
 from .machine import machine, sensors
 
-LEVEL = 2
 # One step per tick of the current loop; L-stable, because effects on the winding can be stiff.
-SOLVER = Solver("rodas3", 5e-5)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3", 5e-5))
 T_SPEED = Quantity(
     "T_speed", "s", "period of the speed loop", start=5e-4, minimum=1e-6, variability="fixed"
 )
@@ -63,15 +41,35 @@ SET_VOLTAGE = Quantity("set_voltage", "V", "terminal voltage, held by the curren
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, speed = m.input(W_REF), m.input(W)
-    current = m.state(CURRENT)
-    sensed_current, sensed_speed, command = sensors(m, current, speed, command)
-    t_speed, t_current = m.parameter(T_SPEED), m.parameter(T_CURRENT)
-    speed_tick, current_tick = m.clock("speed_loop", t_speed), m.clock("current_loop", t_current)
-    set_speed, set_current = m.discrete(SET_SPEED), m.discrete(SET_CURRENT)
-    speed_integral, speed_filter = m.discrete(SPEED_INTEGRAL), m.discrete(SPEED_FILTER)
-    voltage = m.discrete(SET_VOLTAGE)
-    current_integral, current_filter = m.discrete(CURRENT_INTEGRAL), m.discrete(CURRENT_FILTER)
+    u = m.inputs(qs.W_REF, qs.W)
+    p = m.parameters(
+        T_SPEED,
+        T_CURRENT,
+        qs.ACC_MAX,
+        qs.KP_V,
+        qs.KI_V,
+        qs.KD_V,
+        qs.T_FV,
+        qs.I_MAX,
+        qs.KP_I,
+        qs.KI_I,
+        qs.KD_I,
+        qs.T_FI,
+        qs.U_MAX,
+    )
+    x = m.states(qs.CURRENT)
+    z = m.discretes(
+        qs.SET_SPEED,
+        SET_CURRENT,
+        qs.SPEED_INTEGRAL,
+        qs.SPEED_FILTER,
+        SET_VOLTAGE,
+        qs.CURRENT_INTEGRAL,
+        qs.CURRENT_FILTER,
+    )
+    i, w, w_ref = sensors(m, x.current, u.w, u.w_ref)
+    speed_tick = m.clock("speed_loop", p.T_speed)
+    current_tick = m.clock("current_loop", p.T_current)
 
     def loop(
         tick: Clock,
@@ -91,16 +89,14 @@ def equations(m: Model) -> None:
         m.update(tick, integral, ca.if_else(free, integral + ki * error * period, integral))
         m.update(tick, filtered, filtered + period * rate)
 
-    change = m.parameter(ACC_MAX) * t_speed
-    limited = set_speed + ca.fmax(-change, ca.fmin(command - set_speed, change))
-    m.update(speed_tick, set_speed, limited)
-    gains = (m.parameter(KP_V), m.parameter(KI_V), m.parameter(KD_V), m.parameter(T_FV))
-    error = limited - sensed_speed
-    limit = m.parameter(I_MAX)
-    loop(speed_tick, t_speed, error, speed_integral, speed_filter, gains, limit, set_current)
-    gains = (m.parameter(KP_I), m.parameter(KI_I), m.parameter(KD_I), m.parameter(T_FI))
-    error = set_current - sensed_current
-    limit = m.parameter(U_MAX)
-    loop(current_tick, t_current, error, current_integral, current_filter, gains, limit, voltage)
-    m.output(I_SET, set_current)
-    machine(m, current, sensed_current, voltage, speed)
+    change = p.acc_max * p.T_speed
+    w_set = z.set_speed + ca.fmax(-change, ca.fmin(w_ref - z.set_speed, change))
+    m.update(speed_tick, z.set_speed, w_set)
+    gains = (p.Kp_v, p.Ki_v, p.Kd_v, p.T_fv)
+    e_v, i_v, f_v = w_set - w, z.speed_integral, z.speed_filter
+    loop(speed_tick, p.T_speed, e_v, i_v, f_v, gains, p.i_max, z.set_current)
+    gains = (p.Kp_i, p.Ki_i, p.Kd_i, p.T_fi)
+    e_i, i_i, f_i = z.set_current - i, z.current_integral, z.current_filter
+    loop(current_tick, p.T_current, e_i, i_i, f_i, gains, p.u_max, z.set_voltage)
+    m.output(qs.I_SET, z.set_current)
+    machine(m, x.current, i, z.set_voltage, u.w)

@@ -12,26 +12,31 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import diff_drive as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import PHI, POSE_PHI, POSE_X, POSE_Y, TRACK, W_L, W_R, W_Z, R, V, X, Y
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    w_l, w_r = m.input(W_L), m.input(W_R)
-    w_l += m.balance("speed_left", "signal", unit="rad/s", value=w_l).effort
-    w_r += m.balance("speed_right", "signal", unit="rad/s", value=w_r).effort
-    r, track = m.parameter(R), m.parameter(TRACK)
-    v, w_z = r * (w_r + w_l) / 2, r * (w_r - w_l) / track
+    u = m.inputs(qs.W_L, qs.W_R)
+    p = m.parameters(qs.R, qs.TRACK)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
+    w_l = u.w_l + m.balance("speed_left", "signal", unit="rad/s", value=u.w_l).effort
+    w_r = u.w_r + m.balance("speed_right", "signal", unit="rad/s", value=u.w_r).effort
+    v, w_z = p.r * (w_r + w_l) / 2, p.r * (w_r - w_l) / p.track
     v += m.balance("forward", "signal", unit="m/s", value=v).effort
     w_z += m.balance("turn", "signal", unit="rad/s", value=w_z).effort
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    m.derivative(x, v * ca.cos(phi))
-    m.derivative(y, v * ca.sin(phi))
-    m.derivative(phi, w_z)
-    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V, v), (W_Z, w_z)):
+    m.derivative(x.pose_x, v * ca.cos(x.pose_phi))
+    m.derivative(x.pose_y, v * ca.sin(x.pose_phi))
+    m.derivative(x.pose_phi, w_z)
+    for quantity, value in (
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.V, v),
+        (qs.W_Z, w_z),
+    ):
         m.output(quantity, value)

@@ -27,7 +27,7 @@ TAU_C = Quantity(
     minimum=0.0,
     strength=True,
 )
-ASYMMETRY = Quantity(
+A = Quantity(
     "a",
     "1",
     "half the difference of the directions over the mean, positive: more forward",
@@ -49,8 +49,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity = e.signal("velocity")
-    sides = 1 + e.parameter(ASYMMETRY) * ca.sign(velocity)
-    torque = -e.parameter(TAU_C) * sides * ca.tanh(velocity / e.parameter(W_0))
-    e.add(torque)
-    e.loss(-torque * velocity)
+    p, v = e.parameters(a=A, f_c=TAU_C, v_0=W_0), e.signal("velocity")
+    f = -p.f_c * (1 + p.a * ca.sign(v)) * ca.tanh(v / p.v_0)
+    e.add(f)
+    e.loss(-f * v)

@@ -20,7 +20,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-DIFFERENCE = Quantity(
+B_D = Quantity(
     "b_d",
     "N.m.s/rad",
     "half the viscous friction backward less that forward, 0 = absent",
@@ -32,15 +32,14 @@ EFFECT = Effect(
     "asymmetric_viscous",
     "Viscous friction of a shaft that depends on the direction.",
     ("rotation",),
-    DIFFERENCE,
+    B_D,
     source="Janot 2019",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity = e.signal("velocity")
-    difference = e.parameter(DIFFERENCE)
-    torque = difference * ca.fabs(velocity) - ca.fabs(difference) * velocity
-    e.add(torque)
-    e.loss(-torque * velocity)
+    b_d, v = e.parameter(B_D), e.signal("velocity")
+    f = b_d * ca.fabs(v) - ca.fabs(b_d) * v
+    e.add(f)
+    e.loss(-f * v)

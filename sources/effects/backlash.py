@@ -39,15 +39,16 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add what the spring and its damper do not transmit."""
-    twist, half, stiffness = e.signal("deflection"), e.parameter(GAP) / 2, e.signal("stiffness")
+    x, half, k = e.signal("deflection"), e.parameter(GAP) / 2, e.signal("stiffness")
     # strict: without a gap the derivative at rest is the spring's, too
-    within = ca.fabs(twist) < half
-    inside = ca.if_else(within, twist, half * ca.sign(twist))
-    e.add(stiffness * inside)
-    e.stored_energy(-stiffness * inside * (2 * twist - inside) / 2)
+    within = ca.fabs(x) < half
+    sat = ca.if_else(within, x, half * ca.sign(x))
+    e.add(k * sat)
+    e.stored_energy(-k * sat * (2 * x - sat) / 2)
     if not e.offers("damping"):
         e.loss(0)
         return
-    idle = within * (1 - e.parameter(GREASE)) * e.signal("damping") * e.signal("rate")
+    grease, s = e.parameter(GREASE), e.signals(d="damping", x_dot="rate")
+    idle = within * (1 - grease) * s.d * s.x_dot
     e.add(idle)
-    e.loss(-idle * e.signal("rate"))
+    e.loss(-idle * s.x_dot)

@@ -31,7 +31,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Turn gravity."""
-    tilt, heading, gravity = e.parameter(TILT), e.parameter(HEADING), e.signal("value")
-    axis = ca.vertcat(ca.cos(heading), ca.sin(heading), 0)
-    across = gravity - axis * ca.dot(axis, gravity)
-    e.add(-ca.cross(axis, gravity) * ca.sin(tilt) - across * (1 - ca.cos(tilt)))
+    p, g_0 = e.parameters(TILT, HEADING), e.signal("value")
+    axis = ca.vertcat(ca.cos(p.heading), ca.sin(p.heading), 0)
+    across = g_0 - axis * ca.dot(axis, g_0)
+    e.add(-ca.cross(axis, g_0) * ca.sin(p.tilt) - across * (1 - ca.cos(p.tilt)))

@@ -38,8 +38,9 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the missing voltage."""
-    current, duty = e.signal("current"), e.signal("voltage") / e.parameter(U_0)
-    drawn = duty * current
-    sag = e.parameter(R_B) * drawn
+    p, s = e.parameters(U_0=U_0, r_b=R_B), e.signals(i="current", u="voltage")
+    duty = s.u / p.U_0
+    i_b = duty * s.i
+    sag = p.r_b * i_b
     e.add(-duty * sag)
-    e.loss(sag * drawn)
+    e.loss(sag * i_b)

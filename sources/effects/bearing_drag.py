@@ -18,7 +18,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-TORQUE = Quantity(
+TAU_REF = Quantity(
     "tau_ref", "N.m", "drag torque at w_ref, 0 = absent", start=0.05, minimum=0.0, strength=True
 )
 W_REF = Quantity("w_ref", "rad/s", "reference speed", start=10.0, minimum=1e-3)
@@ -27,14 +27,14 @@ U_0 = Quantity(
 )
 
 EFFECT = Effect(
-    "bearing_drag", "Grease drag of a bearing.", ("rotation",), TORQUE, source="Palmgren 1959"
+    "bearing_drag", "Grease drag of a bearing.", ("rotation",), TAU_REF, source="Palmgren 1959"
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the drag."""
-    speed = e.signal("velocity")
-    u = speed / e.parameter(W_REF)
-    torque = -e.parameter(TORQUE) * u * (u**2 + e.parameter(U_0) ** 2) ** (-1 / 6)
-    e.add(torque)
-    e.loss(-ca.dot(torque, speed))
+    p, w = e.parameters(W_REF, TAU_REF, U_0), e.signal("velocity")
+    u = w / p.w_ref
+    tau = -p.tau_ref * u * (u**2 + p.u_0**2) ** (-1 / 6)
+    e.add(tau)
+    e.loss(-ca.dot(tau, w))

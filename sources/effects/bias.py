@@ -23,4 +23,5 @@ EFFECT = Effect("bias", "Constant error of a signal.", ("signal", "point"), BIAS
 
 def law(e: EffectModel) -> None:
     """Add the constant."""
-    e.add(e.parameter(in_unit(e, BIAS)) * share(e))
+    b = e.parameter(in_unit(e, BIAS))
+    e.add(b * share(e))

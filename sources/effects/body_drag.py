@@ -17,16 +17,16 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-DRAG = Quantity(
+C = Quantity(
     "c", "N.s/m", "drag force per velocity, 0 = absent", start=10.0, minimum=0.0, strength=True
 )
 
-EFFECT = Effect("body_drag", "Viscous drag on a body.", ("body",), DRAG, source="linear damping")
+EFFECT = Effect("body_drag", "Viscous drag on a body.", ("body",), C, source="linear damping")
 
 
 def law(e: EffectModel) -> None:
     """Add the drag."""
-    velocity = e.signal("velocity")
-    force = -e.parameter(DRAG) * velocity
-    e.add(ca.vertcat(force, ca.SX.zeros(3)))
-    e.loss(-ca.dot(force, velocity))
+    c, v = e.parameter(C), e.signal("velocity")
+    F = -c * v
+    e.add(ca.vertcat(F, ca.SX.zeros(3)))
+    e.loss(-ca.dot(F, v))

@@ -26,14 +26,14 @@ from ..quantity import Quantity
 TAU_C = Quantity(
     "tau_c", "N.m", "sliding friction torque, 0 = absent", start=0.5, minimum=0.0, strength=True
 )
-EXCESS = Quantity("r", "1", "breakaway torque over the sliding one, less 1", start=0.3, minimum=0.0)
+R = Quantity("r", "1", "breakaway torque over the sliding one, less 1", start=0.3, minimum=0.0)
 W_S = Quantity("w_s", "rad/s", "speed over which that excess decays", start=0.1, minimum=1e-6)
 # No encoder sees less than the least length, and a solver's steps shrink with it.
-LENGTH = Quantity("x_0", "rad", "deflection at the sliding torque", start=5e-4, minimum=1e-6)
-DAMPING = Quantity(
+X_0 = Quantity("x_0", "rad", "deflection at the sliding torque", start=5e-4, minimum=1e-6)
+T_D = Quantity(
     "t_d", "s", "damping of the stuck bristle over its stiffness", start=2e-3, minimum=0.0
 )
-DEFLECTION = Quantity("z", "1", "deflection of the bristle over x_0")
+Z = Quantity("z", "1", "deflection of the bristle over x_0")
 
 EFFECT = Effect(
     "bristle",
@@ -46,12 +46,12 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity, tau_c, length = e.signal("velocity"), e.parameter(TAU_C), e.parameter(LENGTH)
-    height = 1 + e.parameter(EXCESS) * ca.exp(-((velocity / e.parameter(W_S)) ** 2))
-    z = e.state(sized(e, DEFLECTION))
-    rate, slides = bristle(velocity, z, height, length)
-    e.derivative(z, rate)
-    damping = e.parameter(DAMPING) * (1 - slides) * velocity / length
-    e.add(-tau_c * (z + damping))
-    e.stored_energy(tau_c * length * z**2 / 2)
-    e.loss(tau_c * (slides * z**2 * ca.fabs(velocity) / height + damping * velocity))
+    p = e.parameters(f_c=TAU_C, x_0=X_0, r=R, v_s=W_S, t_d=T_D)
+    v, z = e.signal("velocity"), e.state(sized(e, Z))
+    h = 1 + p.r * ca.exp(-((v / p.v_s) ** 2))
+    z_dot, a = bristle(v, z, h, p.x_0)
+    e.derivative(z, z_dot)
+    damping = p.t_d * (1 - a) * v / p.x_0
+    e.add(-p.f_c * (z + damping))
+    e.stored_energy(p.f_c * p.x_0 * z**2 / 2)
+    e.loss(p.f_c * (a * z**2 * ca.fabs(v) / h + damping * v))

@@ -33,7 +33,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the voltage drop."""
-    current = e.signal("current")
-    drop = e.parameter(U_B) * ca.tanh(current / e.parameter(I_0))
+    p, i = e.parameters(U_B, I_0), e.signal("current")
+    drop = p.u_b * ca.tanh(i / p.i_0)
     e.add(-drop)
-    e.loss(drop * current)
+    e.loss(drop * i)

@@ -20,7 +20,7 @@ ANCHOR = Quantity("anchor", "m", "world position of the anchor", start=(-1.0, 1.
 POINT = Quantity(
     "point", "m", "where the cable is fixed, from the reference point in body axes", size=3
 )
-LENGTH = Quantity(
+D_0 = Quantity(
     "d_0",
     "m",
     "distance below which the pull fades, so that it stays smooth",
@@ -40,11 +40,11 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the pull."""
-    tension, point = e.parameter(TENSION), e.parameter(POINT)
-    rotation = e.signal("rotation")
-    way = e.parameter(ANCHOR) - e.signal("position") - rotation @ point
-    length = ca.sqrt(ca.dot(way, way) + e.parameter(LENGTH) ** 2)
-    force = rotation.T @ (tension / length * way)
-    e.add(ca.vertcat(force, ca.cross(point, force)))
-    e.stored_energy(tension * length)
+    p = e.parameters(T=TENSION, point=POINT, anchor=ANCHOR, d_0=D_0)
+    s = e.signals(x="position", R="rotation")
+    d = p.anchor - s.x - s.R @ p.point
+    L = ca.sqrt(ca.dot(d, d) + p.d_0**2)
+    F = s.R.T @ (p.T / L * d)
+    e.add(ca.vertcat(F, ca.cross(p.point, F)))
+    e.stored_energy(p.T * L)
     e.loss(0)

@@ -51,9 +51,8 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Replace the signal by an ever older value."""
-    skew, horizon, period = e.parameter(SKEW), e.parameter(HORIZON), e.parameter(PERIOD)
-    value = e.signal("value")
-    grid = ca.if_else(skew > 0, ca.fmax(period, skew * horizon / (SAMPLES - 2)), NEVER)
-    past = History(e, "past", value, unit=e.unit, period=grid, slots=SAMPLES)
-    lost = skew * ca.fmin(ca.fmax(e.t, 0.0), horizon)
-    e.add(ca.if_else(skew > 0, past.at(lost) - value, 0.0))
+    p, v = e.parameters(s=SKEW, horizon=HORIZON, period=PERIOD), e.signal("value")
+    grid = ca.if_else(p.s > 0, ca.fmax(p.period, p.s * p.horizon / (SAMPLES - 2)), NEVER)
+    past = History(e, "past", v, unit=e.unit, period=grid, slots=SAMPLES)
+    lost = p.s * ca.fmin(ca.fmax(e.t, 0.0), p.horizon)
+    e.add(ca.if_else(p.s > 0, past.at(lost) - v, 0.0))

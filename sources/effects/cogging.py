@@ -21,19 +21,15 @@ from ..laws.angle import shaft_angle
 from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
-AMPLITUDE = Quantity(
-    "tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True
-)
-CYCLES = Quantity(
-    "n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1, tries=ORDERS
-)
-PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+TAU_C = Quantity("tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True)
+N = Quantity("n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1, tries=ORDERS)
+PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "cogging",
     "Torque of a shaft that repeats with its angle.",
     ("rotation",),
-    AMPLITUDE,
+    TAU_C,
     unless=("normal", "radius"),
     source="Hanselman 2006",
 )
@@ -41,8 +37,8 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    amplitude, cycles, phase = e.parameter(AMPLITUDE), e.parameter(CYCLES), e.parameter(PHASE)
-    argument = cycles * shaft_angle(e, "velocity") + phase
-    e.add(-amplitude * ca.sin(argument))
-    e.stored_energy(amplitude * (1 - ca.cos(argument)) / cycles)
+    p, theta = e.parameters(f_c=TAU_C, n=N, psi=PSI), shaft_angle(e, "velocity")
+    argument = p.n * theta + p.psi
+    e.add(-p.f_c * ca.sin(argument))
+    e.stored_energy(p.f_c * (1 - ca.cos(argument)) / p.n)
     e.loss(0)

@@ -27,5 +27,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Take away what falls into the zone."""
-    width = e.parameter(in_unit(e, WIDTH))
-    e.add(-ca.fmax(-width, ca.fmin(width, e.signal("value"))))
+    c, v = e.parameter(in_unit(e, WIDTH)), e.signal("value")
+    e.add(-ca.fmax(-c, ca.fmin(c, v)))

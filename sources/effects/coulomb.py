@@ -31,8 +31,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    tau_c, w_0 = e.parameter(TAU_C), e.parameter(W_0)
-    velocity = e.signal("velocity")
-    torque = -tau_c * ca.tanh(velocity / w_0)
-    e.add(torque)
-    e.loss(-torque * velocity)
+    p, v = e.parameters(f_c=TAU_C, v_0=W_0), e.signal("velocity")
+    f = -p.f_c * ca.tanh(v / p.v_0)
+    e.add(f)
+    e.loss(-f * v)

@@ -41,5 +41,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Soften the contact."""
-    v_0 = e.parameter(V_0)
-    e.add(e.parameter(KAPPA) * (ca.sqrt(e.signal("speed") ** 2 + v_0**2) - v_0))
+    p, v = e.parameters(V_0, KAPPA), e.signal("speed")
+    e.add(p.kappa * (ca.sqrt(v**2 + p.v_0**2) - p.v_0))

@@ -14,7 +14,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-CUBIC = Quantity(
+K_3 = Quantity(
     "k_3", "N.m/rad3", "torque per deflection cubed, 0 = absent", start=1e8, strength=True
 )
 
@@ -22,14 +22,14 @@ EFFECT = Effect(
     "cubic_stiffness",
     "Spring that stiffens with deflection.",
     ("compliance",),
-    CUBIC,
+    K_3,
     source="Tuttle and Seering 1996",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    twist, cubic = e.signal("deflection"), e.parameter(CUBIC)
-    e.add(-cubic * twist**3)
-    e.stored_energy(cubic * twist**4 / 4)
+    k_3, x = e.parameter(K_3), e.signal("deflection")
+    e.add(-k_3 * x**3)
+    e.stored_energy(k_3 * x**4 / 4)
     e.loss(0)

@@ -13,13 +13,13 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-GAIN = Quantity("g", "1", "relative error of the scale, 0 = absent", start=0.02, strength=True)
+G = Quantity("g", "1", "relative error of the scale, 0 = absent", start=0.02, strength=True)
 
 EFFECT = Effect(
     "current_gain",
     "Scale error of a current sensor.",
     ("signal",),
-    GAIN,
+    G,
     source="Bolton 2021",
     unit="A",
     general="gain",
@@ -28,4 +28,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the error."""
-    e.add(e.parameter(GAIN) * e.signal("value"))
+    g, i = e.parameter(G), e.signal("value")
+    e.add(g * i)

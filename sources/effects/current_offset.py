@@ -13,13 +13,13 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-OFFSET = Quantity("i_off", "A", "offset of the sensor, 0 = absent", start=0.2, strength=True)
+I_OFF = Quantity("i_off", "A", "offset of the sensor, 0 = absent", start=0.2, strength=True)
 
 EFFECT = Effect(
     "current_offset",
     "Offset of a current sensor.",
     ("signal",),
-    OFFSET,
+    I_OFF,
     source="Bolton 2021",
     unit="A",
     general="bias",
@@ -28,4 +28,4 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the error."""
-    e.add(e.parameter(OFFSET))
+    e.add(e.parameter(I_OFF))

@@ -46,8 +46,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Replace the signal by its past."""
-    t_d, period = e.parameter(T_D), e.parameter(PERIOD)
-    value = e.signal("value")
-    grid = ca.if_else(t_d > 0, ca.fmax(period, t_d / (SAMPLES - 2)), NEVER)
-    past = History(e, "past", value, unit=e.unit, period=grid, slots=SAMPLES)
-    e.add(ca.if_else(t_d > 0, past.at(t_d) - value, 0.0))
+    p, v = e.parameters(T_D, PERIOD), e.signal("value")
+    grid = ca.if_else(p.t_d > 0, ca.fmax(p.period, p.t_d / (SAMPLES - 2)), NEVER)
+    past = History(e, "past", v, unit=e.unit, period=grid, slots=SAMPLES)
+    e.add(ca.if_else(p.t_d > 0, past.at(p.t_d) - v, 0.0))

@@ -31,4 +31,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the error."""
-    e.add(e.parameter(OFFSET) * share(e))
+    offset = e.parameter(OFFSET)
+    e.add(offset * share(e))

@@ -45,14 +45,13 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Replace the signal by its lagged copy."""
-    t_lag = e.parameter(T_LAG)
-    value = e.signal("value")
+    t_lag, v = e.parameter(T_LAG), e.signal("value")
     change = e.state(in_unit(e, sized(e, CHANGE)))
     origin = e.discrete(in_unit(e, sized(e, ORIGIN)))
     started = e.discrete(STARTED)
     clock = e.clock("start", ca.if_else(t_lag > 0, 1.0, NEVER))
-    e.update(clock, origin, ca.if_else(started > 0.5, origin, value))
+    e.update(clock, origin, ca.if_else(started > 0.5, origin, v))
     e.update(clock, started, ca.SX(1.0))
-    rate = started * (value - origin - change) / ca.if_else(t_lag > 0, t_lag, 1.0)
-    e.derivative(change, ca.if_else(t_lag > 0, rate, 0.0))
-    e.add(ca.if_else(t_lag > 0, started * (origin + change - value), 0.0))
+    y_dot = started * (v - origin - change) / ca.if_else(t_lag > 0, t_lag, 1.0)
+    e.derivative(change, ca.if_else(t_lag > 0, y_dot, 0.0))
+    e.add(ca.if_else(t_lag > 0, started * (origin + change - v), 0.0))

@@ -35,15 +35,16 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the wrench of the leaning gravity."""
-    slope, heading = e.parameter(SLOPE), e.parameter(HEADING)
-    rotation = e.signal("rotation")
-    size = -(rotation @ e.signal("gravity"))[2]
-    lean = size * ca.vertcat(
-        -ca.sin(slope) * ca.cos(heading), -ca.sin(slope) * ca.sin(heading), 1 - ca.cos(slope)
+    p, s = e.parameters(SLOPE, HEADING), e.signals("mass", "first_moment", R="rotation")
+    g_0 = -(s.R @ e.signal("gravity"))[2]
+    lean = g_0 * ca.vertcat(
+        -ca.sin(p.slope) * ca.cos(p.heading),
+        -ca.sin(p.slope) * ca.sin(p.heading),
+        1 - ca.cos(p.slope),
     )
-    change = rotation.T @ lean
-    force = e.signal("mass") * change
-    moment = ca.cross(e.signal("first_moment"), change)
+    change = s.R.T @ lean
+    force = s.mass * change
+    moment = ca.cross(s.first_moment, change)
     e.add(ca.vertcat(force, moment))
     e.supply(ca.dot(force, e.signal("velocity")) + ca.dot(moment, e.signal("rate")))
     e.loss(0)

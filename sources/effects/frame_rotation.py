@@ -38,8 +38,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Turn the position, and the heading where there is one."""
-    angle = e.parameter(ANGLE)
-    value = e.signal("value")
-    x, y = rotated(angle, value[0], value[1])
-    third = angle if e.kind == "pose" else ca.SX(0.0)
+    a, value = e.parameter(ANGLE), e.signal("value")
+    x, y = rotated(a, value[0], value[1])
+    third = a if e.kind == "pose" else ca.SX(0.0)
     e.add(ca.vertcat(x - value[0], y - value[1], *([third] * (e.size - 2))))

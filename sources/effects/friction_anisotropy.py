@@ -39,4 +39,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Change the coefficient across the track."""
-    e.add(e.parameter(EXCESS) * e.signal("longitudinal"))
+    k, mu_along = e.parameter(EXCESS), e.signal("longitudinal")
+    e.add(k * mu_along)

@@ -35,4 +35,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Raise the coefficient on the left and lower it on the right."""
-    e.add(e.parameter(DIFFERENCE) / 2 * e.signal("side") * e.signal("value"))
+    d, s = e.parameter(DIFFERENCE), e.signals("side", mu="value")
+    e.add(d / 2 * s.side * s.mu)

@@ -25,4 +25,5 @@ EFFECT = Effect("gain", "Gain error of a signal.", ("signal", "point"), ERROR, s
 
 def law(e: EffectModel) -> None:
     """Add a part of the signal."""
-    e.add(e.parameter(ERROR) * share(e) * e.signal("value"))
+    p, v = e.parameters(e=ERROR), e.signal("value")
+    e.add(p.e * share(e) * v)

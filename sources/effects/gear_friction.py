@@ -31,13 +31,13 @@ MU = Quantity(
     minimum=0.0,
     strength=True,
 )
-RATIO = Quantity(
+R = Quantity(
     "r", "1", "weight of the output's torque, that of the motor's being 1", start=0.5, minimum=0.0
 )
-EXCESS = Quantity(
+E = Quantity(
     "e", "1", "friction close to standstill over the sliding one, less 1", start=0.2, minimum=0.0
 )
-GROWTH = Quantity(
+G = Quantity(
     "g", "1/(N.m)", "growth of the friction coefficient with the torque on the teeth", minimum=0.0
 )
 W_S = Quantity("w_s", "rad/s", "speed over which that excess decays", start=0.5, minimum=1e-6)
@@ -55,10 +55,11 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity = e.signal("velocity")
-    load = ca.fabs(e.signal("load") - e.parameter(RATIO) * e.signal("reaction"))
-    low = 1 + e.parameter(EXCESS) * ca.exp(-((velocity / e.parameter(W_S)) ** 2))
-    load = load * (1 + e.parameter(GROWTH) * load)
-    torque = -e.parameter(MU) * load * low * ca.tanh(velocity / e.parameter(W_0))
-    e.add(torque)
-    e.loss(-torque * velocity)
+    k = e.parameters(r=R, e=E, v_s=W_S, g=G, mu=MU, v_0=W_0)  # p is the torque on the teeth
+    v, tau_m, tau_e = e.signal("velocity"), e.signal("load"), e.signal("reaction")
+    p = ca.fabs(tau_m - k.r * tau_e)
+    low = 1 + k.e * ca.exp(-((v / k.v_s) ** 2))
+    pressed = p * (1 + k.g * p)
+    f = -k.mu * pressed * low * ca.tanh(v / k.v_0)
+    e.add(f)
+    e.loss(-f * v)

@@ -20,25 +20,26 @@ from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
 from ..quantity import Quantity
 
-AMPLITUDE = Quantity(
+A = Quantity(
     "a", "N.m", "amplitude on the joint, 0 = absent", start=1.0, nominal=1.0, strength=True
 )
-RATIO = Quantity("N", "1", "ratio of the gear", start=101.0, minimum=0.1)
-PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+N = Quantity("N", "1", "ratio of the gear", start=101.0, minimum=0.1)
+PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "harmonic_ripple",
     "Torque ripple of a strain-wave gear.",
     ("rotation",),
-    AMPLITUDE,
+    A,
     source="Taghirad and Bélanger 1998",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    amplitude, cycles = e.parameter(AMPLITUDE), 2 * e.parameter(RATIO)
-    argument = cycles * shaft_angle(e, "velocity") + e.parameter(PHASE)
-    e.add(-amplitude * ca.sin(argument))
-    e.stored_energy(amplitude * (1 - ca.cos(argument)) / cycles)
+    p, theta = e.parameters(A, N, PSI), shaft_angle(e, "velocity")
+    cycles = 2 * p.N
+    argument = cycles * theta + p.psi
+    e.add(-p.a * ca.sin(argument))
+    e.stored_energy(p.a * (1 - ca.cos(argument)) / cycles)
     e.loss(0)

@@ -14,24 +14,24 @@ from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
 from ..quantity import Quantity
 
-STIFFNESS = Quantity(
+K = Quantity(
     "k", "N.m/rad", "stiffness, 0 = absent", start=2.0, minimum=0.0, nominal=1.0, strength=True
 )
-REST = Quantity("theta_0", "rad", "angle at which the hose hangs free", mix="shift")
+THETA_0 = Quantity("theta_0", "rad", "angle at which the hose hangs free", mix="shift")
 
 EFFECT = Effect(
     "hose_spring",
     "Hose that pulls a joint back.",
     ("rotation",),
-    STIFFNESS,
+    K,
     source="Hooke's law",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    stiffness = e.parameter(STIFFNESS)
-    stretch = shaft_angle(e, "velocity") - e.parameter(REST)
-    e.add(-stiffness * stretch)
-    e.stored_energy(stiffness * stretch**2 / 2)
+    p, theta = e.parameters(K, THETA_0), shaft_angle(e, "velocity")
+    stretch = theta - p.theta_0
+    e.add(-p.k * stretch)
+    e.stored_energy(p.k * stretch**2 / 2)
     e.loss(0)

@@ -24,8 +24,8 @@ from ..quantity import Quantity
 TAU_H = Quantity(
     "tau_h", "N.m", "half width of the loop, 0 = absent", start=0.5, minimum=0.0, strength=True
 )
-LENGTH = Quantity("x_h", "rad", "deflection over which the loop turns", start=5e-4, minimum=1e-9)
-DEFLECTION = Quantity("z", "1", "state of the inner friction, -1 to 1")
+X_H = Quantity("x_h", "rad", "deflection over which the loop turns", start=5e-4, minimum=1e-9)
+Z = Quantity("z", "1", "state of the inner friction, -1 to 1")
 
 EFFECT = Effect(
     "hysteresis",
@@ -38,10 +38,10 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    rate, width, length = e.signal("rate"), e.parameter(TAU_H), e.parameter(LENGTH)
-    z = e.state(sized(e, DEFLECTION))
-    change, slides = bristle(rate, z, ca.SX(1), length)
-    e.derivative(z, change)
-    e.add(-width * z)
-    e.stored_energy(width * length * z**2 / 2)
-    e.loss(width * slides * z**2 * ca.fabs(rate))
+    p, x_dot = e.parameters(t_h=TAU_H, x_h=X_H), e.signal("rate")
+    z = e.state(sized(e, Z))
+    z_dot, a = bristle(x_dot, z, ca.SX(1), p.x_h)
+    e.derivative(z, z_dot)
+    e.add(-p.t_h * z)
+    e.stored_energy(p.t_h * p.x_h * z**2 / 2)
+    e.loss(p.t_h * a * z**2 * ca.fabs(x_dot))

@@ -41,7 +41,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity, load = e.signal("velocity"), e.signal("load")
-    torque = -e.parameter(MU) * ca.fabs(load) * ca.tanh(velocity / e.parameter(W_0))
-    e.add(torque)
-    e.loss(-torque * velocity)
+    p, s = e.parameters(mu=MU, v_0=W_0), e.signals(v="velocity", tau="load")
+    f = -p.mu * ca.fabs(s.tau) * ca.tanh(s.v / p.v_0)
+    e.add(f)
+    e.loss(-f * s.v)

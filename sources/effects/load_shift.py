@@ -39,5 +39,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Move the mass centre."""
-    shift, direction = e.parameter(SHIFT), e.parameter(DIRECTION)
-    e.add(ca.vertcat(shift * ca.cos(direction), shift * ca.sin(direction), 0))
+    d, gamma = e.parameter(SHIFT), e.parameter(DIRECTION)
+    e.add(ca.vertcat(d * ca.cos(gamma), d * ca.sin(gamma), 0))

@@ -40,6 +40,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Lower the coefficient."""
-    square = (e.signal("x") - e.parameter(X_P)) ** 2 + (e.signal("y") - e.parameter(Y_P)) ** 2
-    inside = ca.exp(-((square / e.parameter(RADIUS) ** 2) ** 2))
-    e.add(-e.parameter(REDUCTION) * inside * e.signal("value"))
+    p, s = e.parameters(X_P, Y_P, RADIUS, REDUCTION), e.signals("x", "y", mu="value")
+    d_squared = (s.x - p.x_p) ** 2 + (s.y - p.y_p) ** 2
+    inside = ca.exp(-((d_squared / p.radius**2) ** 2))
+    e.add(-p.reduction * inside * s.mu)

@@ -36,6 +36,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Shift the measured point."""
-    distance, direction = e.parameter(DISTANCE), e.parameter(DIRECTION)
-    angle = e.signal("value")[2] + direction
-    e.add(distance * ca.vertcat(ca.cos(angle), ca.sin(angle), 0.0))
+    d, g, yaw = e.parameter(DISTANCE), e.parameter(DIRECTION), e.signal("value")[2]
+    angle = yaw + g
+    e.add(d * ca.vertcat(ca.cos(angle), ca.sin(angle), 0.0))

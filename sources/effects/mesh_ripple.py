@@ -22,23 +22,21 @@ from ..laws.angle import shaft_angle
 from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
-ERROR = Quantity(
+EPS = Quantity(
     "eps",
     "rad",
     "amplitude of the transmission error at the output, 0 = absent",
     start=2e-4,
     strength=True,
 )
-CYCLES = Quantity(
-    "n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1, tries=ORDERS
-)
-PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+N = Quantity("n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1, tries=ORDERS)
+PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "mesh_ripple",
     "Transmission error of a gear that repeats with the angle of the output.",
     ("coefficient",),
-    ERROR,
+    EPS,
     needs=("speed",),
     source="Taghirad and Bélanger 1998",
     unit="1",
@@ -47,6 +45,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the variation of the ratio."""
-    cycles = e.parameter(CYCLES)
-    argument = cycles * shaft_angle(e, "speed") + e.parameter(PHASE)
-    e.add(e.signal("value") * cycles * e.parameter(ERROR) * ca.cos(argument))
+    p, ratio = e.parameters(N, PSI, EPS), e.signal("value")
+    theta_b = shaft_angle(e, "speed")
+    e.add(ratio * p.n * p.eps * ca.cos(p.n * theta_b + p.psi))

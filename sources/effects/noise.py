@@ -35,16 +35,17 @@ T_S = Quantity(
 )
 DRAWN = Quantity("drawn", "1", "standard normal number drawn last")
 
-EFFECT = Effect("noise", "White noise on a signal.", ("signal", "point"), SIGMA, source="textbook")
+EFFECT = Effect(
+    "noise", "White noise on a signal.", ("signal", "point"), SIGMA, source="textbook", random=True
+)
 
 
 def law(e: EffectModel) -> None:
     """Add the noise."""
-    sigma, t_s = e.parameter(in_unit(e, SIGMA)), e.parameter(T_S)
-    seed = e.parameter(seed_quantity("noise"))
-    state, drawn = e.discrete(RANDOM), e.discrete(sized(e, DRAWN))
-    clock = e.clock("sample", ca.if_else(sigma > 0, t_s, NEVER))
-    random = Random(state, seed)
-    e.update(clock, drawn, random.normals(e.size))
+    p = e.parameters(in_unit(e, SIGMA), T_S, seed_quantity("noise"))
+    state, n = e.discrete(RANDOM), e.discrete(sized(e, DRAWN))
+    clock = e.clock("sample", ca.if_else(p.sigma > 0, p.t_s, NEVER))
+    random = Random(state, p.seed)
+    e.update(clock, n, random.normals(e.size))
     e.update(clock, state, random.state)
-    e.add(sigma * drawn)
+    e.add(p.sigma * n)

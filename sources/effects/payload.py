@@ -25,5 +25,6 @@ EFFECT = Effect("payload", "Mass fixed to a body.", ("body",), MASS, source="mec
 
 def law(e: EffectModel) -> None:
     """Add the mass."""
-    e.add_mass(e.parameter(MASS), e.parameter(POSITION), ca.SX.zeros(3, 3))
+    m_p, p = e.parameter(MASS), e.parameter(POSITION)
+    e.add_mass(m_p, p, ca.SX.zeros(3, 3))
     e.loss(0)

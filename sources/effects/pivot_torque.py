@@ -18,17 +18,17 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-TORQUE = Quantity(
+M_PA = Quantity(
     "M_pa", "N.m", "scrub torque at standstill, 0 = absent", start=1.0, minimum=0.0, strength=True
 )
-K_RES = Quantity("K", "N.m2", "torque per spin over rolling speed", start=1.0, minimum=0.0)
+K = Quantity("K", "N.m2", "torque per spin over rolling speed", start=1.0, minimum=0.0)
 V_0 = Quantity("v_0", "m/s", "rolling speed that counts as standstill", start=0.005, minimum=1e-6)
 
 EFFECT = Effect(
     "pivot_torque",
     "Scrub torque of a turning contact patch.",
     ("pivot",),
-    TORQUE,
+    M_PA,
     source="omnidirectional base paper, pivot friction",
 )
 
@@ -38,9 +38,8 @@ SMALL = 1e-18
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    spin, largest = e.signal("spin"), e.parameter(TORQUE)
-    rolling = ca.sqrt(e.signal("rolling") ** 2 + e.parameter(V_0) ** 2)
-    q = e.parameter(K_RES) * spin / rolling
-    torque = -largest * q / ca.sqrt(largest**2 + q**2 + SMALL)
-    e.add(torque)
-    e.loss(-ca.dot(torque, spin))
+    p, s = e.parameters(M_PA, V_0, K), e.signals(w_s="spin", v="rolling")
+    q = p.K * s.w_s / ca.sqrt(s.v**2 + p.v_0**2)
+    M = -p.M_pa * q / ca.sqrt(p.M_pa**2 + q**2 + SMALL)
+    e.add(M)
+    e.loss(-ca.dot(M, s.w_s))

@@ -35,8 +35,8 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the missing voltage."""
-    zone = e.parameter(U_DZ)
-    missing = ca.fmax(-zone, ca.fmin(e.signal("voltage"), zone))
-    e.add(-missing)
-    e.supply(-missing * e.signal("current"))
+    u_dz, s = e.parameter(U_DZ), e.signals(u="voltage", i="current")
+    sat = ca.fmax(-u_dz, ca.fmin(s.u, u_dz))
+    e.add(-sat)
+    e.supply(-sat * s.i)
     e.loss(0)

@@ -15,7 +15,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-DRAG = Quantity(
+C = Quantity(
     "c",
     "N.m.s2/rad2",
     "drag torque per speed squared, 0 = absent",
@@ -28,14 +28,14 @@ EFFECT = Effect(
     "quadratic_drag",
     "Drag of a shaft with the square of its speed.",
     ("rotation",),
-    DRAG,
+    C,
     source="Eck 1973",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the drag torque."""
-    velocity = e.signal("velocity")
-    torque = -e.parameter(DRAG) * velocity * ca.fabs(velocity)
-    e.add(torque)
-    e.loss(-torque * velocity)
+    c, v = e.parameter(C), e.signal("velocity")
+    f = -c * v * ca.fabs(v)
+    e.add(f)
+    e.loss(-f * v)

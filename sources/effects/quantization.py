@@ -25,7 +25,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the rounding."""
-    step = e.parameter(in_unit(e, STEP))
-    value = e.signal("value")
-    divisor = ca.if_else(step > 0, step, 1.0)
-    e.add(ca.if_else(step > 0, step * ca.floor(value / divisor + 0.5) - value, 0.0))
+    q, v = e.parameter(in_unit(e, STEP)), e.signal("value")
+    divisor = ca.if_else(q > 0, q, 1.0)
+    e.add(ca.if_else(q > 0, q * ca.floor(v / divisor + 0.5) - v, 0.0))

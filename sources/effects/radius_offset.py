@@ -15,7 +15,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-OFFSET = Quantity(
+DR = Quantity(
     "dr", "m", "difference of the radius, 0 = absent", start=3e-4, nominal=1e-3, strength=True
 )
 
@@ -23,7 +23,7 @@ EFFECT = Effect(
     "radius_offset",
     "Wheel radius different from the declared one.",
     ("coefficient",),
-    OFFSET,
+    DR,
     needs=("angle",),
     unit="m",
     source="Borenstein, Feng 1996",
@@ -32,4 +32,4 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Shift the radius."""
-    e.add(e.parameter(OFFSET))
+    e.add(e.parameter(DR))

@@ -41,12 +41,11 @@ EFFECT = Effect("rate_limit", "Limit of a signal's rate.", ("signal",), SLOWNESS
 
 def law(e: EffectModel) -> None:
     """Replace the signal by the limited one."""
-    slowness, t_s = e.parameter(per_unit(e, SLOWNESS)), e.parameter(T_S)
-    value = e.signal("value")
-    limited, started = e.discrete(in_unit(e, sized(e, LIMITED))), e.discrete(STARTED)
-    clock = e.clock("limiter", ca.if_else(slowness > 0, t_s, NEVER))
-    largest = t_s / ca.if_else(slowness > 0, slowness, 1.0)
-    following = limited + ca.fmax(-largest, ca.fmin(largest, value - limited))
-    e.update(clock, limited, ca.if_else(started > 0.5, following, value))
+    p, v = e.parameters(s=per_unit(e, SLOWNESS), t_s=T_S), e.signal("value")
+    y, started = e.discrete(in_unit(e, sized(e, LIMITED))), e.discrete(STARTED)
+    clock = e.clock("limiter", ca.if_else(p.s > 0, p.t_s, NEVER))
+    largest = p.t_s / ca.if_else(p.s > 0, p.s, 1.0)
+    following = y + ca.fmax(-largest, ca.fmin(largest, v - y))
+    e.update(clock, y, ca.if_else(started > 0.5, following, v))
     e.update(clock, started, ca.SX(1.0))
-    e.add(ca.if_else(slowness > 0, started * (limited - value), 0.0))
+    e.add(ca.if_else(p.s > 0, started * (y - v), 0.0))

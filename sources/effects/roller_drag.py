@@ -40,4 +40,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Give the rollers their drag."""
-    e.add(e.parameter(RHO) * share(e))
+    rho = e.parameter(RHO)
+    e.add(rho * share(e))

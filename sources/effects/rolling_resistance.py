@@ -15,7 +15,7 @@ from ..effect_model import EffectModel
 from ..laws.contact import rolling_resistance
 from ..quantity import Quantity
 
-COEFFICIENT = Quantity(
+C = Quantity(
     "c",
     "1",
     "additional rolling resistance coefficient, 0 = absent",
@@ -29,7 +29,7 @@ EFFECT = Effect(
     "rolling_resistance",
     "Rolling resistance of a loaded wheel.",
     ("rotation",),
-    COEFFICIENT,
+    C,
     needs=("normal", "radius"),
     source="Johnson 1985",
 )
@@ -37,9 +37,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the moment."""
-    speed = e.signal("velocity")
-    moment = rolling_resistance(
-        e.parameter(COEFFICIENT), e.signal("normal"), e.signal("radius"), speed, e.parameter(W_0)
-    )
+    p, s = e.parameters(C, W_0), e.signals(N="normal", r="radius", w="velocity")
+    moment = rolling_resistance(p.c, s.N, s.r, s.w, p.w_0)
     e.add(-moment)
-    e.loss(moment * speed)
+    e.loss(moment * s.w)

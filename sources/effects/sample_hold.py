@@ -47,10 +47,9 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Replace the signal by its last sample."""
-    t_s = e.parameter(T_S)
-    value = e.signal("value")
-    held, started = e.discrete(in_unit(e, sized(e, HELD))), e.discrete(STARTED)
+    t_s, v = e.parameter(T_S), e.signal("value")
+    y, started = e.discrete(in_unit(e, sized(e, HELD))), e.discrete(STARTED)
     clock = e.clock("sample", ca.if_else(t_s > 0, ca.fmax(t_s, SHORTEST), NEVER))
-    e.update(clock, held, value)
+    e.update(clock, y, v)
     e.update(clock, started, ca.SX(1.0))
-    e.add(ca.if_else(t_s > 0, started * (held - value), 0.0))
+    e.add(ca.if_else(t_s > 0, started * (y - v), 0.0))

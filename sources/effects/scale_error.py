@@ -36,4 +36,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add to the scale."""
-    e.add(e.parameter(ERROR) * e.signal("value"))
+    p, scale = e.parameters(e=ERROR), e.signal("value")
+    e.add(p.e * scale)

@@ -19,7 +19,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-EXCESS = Quantity(
+TAU_S = Quantity(
     "tau_s",
     "N.m",
     "friction torque close to standstill above the sliding one, 0 = absent",
@@ -34,15 +34,14 @@ EFFECT = Effect(
     "stribeck",
     "Friction of a shaft that falls with speed.",
     ("rotation",),
-    EXCESS,
+    TAU_S,
     source="Armstrong 1991",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity = e.signal("velocity")
-    decay = ca.exp(-((velocity / e.parameter(W_S)) ** 2))
-    torque = -e.parameter(EXCESS) * decay * ca.tanh(velocity / e.parameter(W_0))
-    e.add(torque)
-    e.loss(-torque * velocity)
+    p, v = e.parameters(v_s=W_S, f_s=TAU_S, v_0=W_0), e.signal("velocity")
+    f = -p.f_s * ca.exp(-((v / p.v_s) ** 2)) * ca.tanh(v / p.v_0)
+    e.add(f)
+    e.loss(-f * v)

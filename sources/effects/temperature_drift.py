@@ -20,32 +20,31 @@ from ..effect_model import EffectModel
 from ..laws.signal_effect import sized
 from ..quantity import Quantity
 
-COLD = Quantity(
+B = Quantity(
     "b",
     "N.m.s/rad",
     "viscous friction of the cold shaft above the warm one, 0 = absent",
     start=0.05,
     strength=True,
 )
-WARM_UP = Quantity("t_w", "s", "time constant of warming up", start=60.0, minimum=1e-3)
+T_W = Quantity("t_w", "s", "time constant of warming up", start=60.0, minimum=1e-3)
 W_N = Quantity("w_n", "rad/s", "speed that warms up halfway", start=1.0, minimum=1e-6)
-WARMTH = Quantity("h", "1", "0 cold, 1 warm")
+H = Quantity("h", "1", "0 cold, 1 warm")
 
 EFFECT = Effect(
     "temperature_drift",
     "Friction of a shaft that falls while it warms up.",
     ("rotation",),
-    COLD,
+    B,
     source="Bittencourt 2010",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity, warmth = e.signal("velocity"), e.state(sized(e, WARMTH))
-    target = velocity**2 / (velocity**2 + e.parameter(W_N) ** 2)
-    e.derivative(warmth, (target - warmth) / e.parameter(WARM_UP))
-    cold = e.parameter(COLD)
-    torque = -(ca.fmax(cold, 0) * (1 - warmth) + ca.fmax(-cold, 0) * warmth) * velocity
-    e.add(torque)
-    e.loss(-torque * velocity)
+    p, v = e.parameters(v_n=W_N, t_w=T_W, b=B), e.signal("velocity")
+    h = e.state(sized(e, H))
+    e.derivative(h, (v**2 / (v**2 + p.v_n**2) - h) / p.t_w)
+    f = -(ca.fmax(p.b, 0) * (1 - h) + ca.fmax(-p.b, 0) * h) * v
+    e.add(f)
+    e.loss(-f * v)

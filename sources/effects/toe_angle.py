@@ -16,7 +16,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-ANGLE = Quantity(
+DELTA = Quantity(
     "delta", "rad", "angle of the wheel's plane, 0 = absent", start=0.005, strength=True
 )
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     "toe_angle",
     "Misaligned wheel.",
     ("coefficient",),
-    ANGLE,
+    DELTA,
     unit="rad",
     source="Pacejka 2012",
 )
@@ -32,4 +32,4 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Turn the wheel."""
-    e.add(e.parameter(ANGLE))
+    e.add(e.parameter(DELTA))

@@ -15,7 +15,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-LOSS = Quantity(
+S = Quantity(
     "s",
     "1",
     "share of the constant lost at high current, 0 = absent",
@@ -29,7 +29,7 @@ EFFECT = Effect(
     "torque_constant_saturation",
     "Torque constant that falls with current.",
     ("coefficient",),
-    LOSS,
+    S,
     needs=("current",),
     source="Hanselman 2006",
     unit="N.m/A",
@@ -38,6 +38,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add what the constant loses."""
-    square = e.signal("current") ** 2
-    fall = square / (square + e.parameter(I_S) ** 2)
-    e.add(-e.parameter(LOSS) * e.signal("value") * fall)
+    p, i, K = e.parameters(I_S, S), e.signal("current"), e.signal("value")
+    square = i**2
+    e.add(-p.s * K * (square / (square + p.i_s**2)))

@@ -19,19 +19,15 @@ from ..laws.angle import shaft_angle
 from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
-RIPPLE = Quantity(
-    "r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True
-)
-CYCLES = Quantity(
-    "n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1, tries=ORDERS
-)
-PHASE = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+R = Quantity("r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True)
+N = Quantity("n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1, tries=ORDERS)
+PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
 
 EFFECT = Effect(
     "torque_ripple",
     "Torque constant that repeats with the angle.",
     ("coefficient",),
-    RIPPLE,
+    R,
     needs=("speed",),
     source="Hanselman 2006",
     unit="N.m/A",
@@ -40,5 +36,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the variation of the constant."""
-    argument = e.parameter(CYCLES) * shaft_angle(e, "speed") + e.parameter(PHASE)
-    e.add(e.parameter(RIPPLE) * e.signal("value") * ca.cos(argument))
+    p, K = e.parameters(N, PSI, R), e.signal("value")
+    theta = shaft_angle(e, "speed")
+    e.add(p.r * K * ca.cos(p.n * theta + p.psi))

@@ -18,24 +18,24 @@ from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
 from ..quantity import Quantity
 
-MOMENT = Quantity(
+M_U = Quantity(
     "m_u", "N.m", "weight times its distance from the axis, 0 = absent", start=0.2, strength=True
 )
-PHASE = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0", mix="turn")
+PSI = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0", mix="turn")
 
 EFFECT = Effect(
     "unbalance",
     "Eccentric weight on a horizontal shaft.",
     ("rotation",),
-    MOMENT,
+    M_U,
     source="weight times lever arm",
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the moment of the weight."""
-    moment = e.parameter(MOMENT)
-    argument = shaft_angle(e, "velocity") + e.parameter(PHASE)
-    e.add(-moment * ca.sin(argument))
-    e.stored_energy(moment * (1 - ca.cos(argument)))
+    p, theta = e.parameters(M_U, PSI), shaft_angle(e, "velocity")
+    argument = theta + p.psi
+    e.add(-p.m_u * ca.sin(argument))
+    e.stored_energy(p.m_u * (1 - ca.cos(argument)))
     e.loss(0)

@@ -22,13 +22,13 @@ from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 KNOTS = 9
-GAIN = Quantity("g", "1", "factor on the curve, 0 = absent", start=1.0, strength=True)
-CURVE = Quantity("c", "1", "value at each knot", start=0.01, size=KNOTS)
-FIRST = Quantity("s_first", "1", "driver at the first knot", start=0.0)
-LAST = Quantity("s_last", "1", "driver at the last knot", start=1.0)
+G = Quantity("g", "1", "factor on the curve, 0 = absent", start=1.0, strength=True)
+C = Quantity("c", "1", "value at each knot", start=0.01, size=KNOTS)
+S_FIRST = Quantity("s_first", "1", "driver at the first knot", start=0.0)
+S_LAST = Quantity("s_last", "1", "driver at the last knot", start=1.0)
 SHARE = Quantity("share", "1", "part of it that each element of the balance gets", start=1.0)
-DRIVER = Quantity("s", "1", "what drives the curve")
-VALUE = Quantity("u", "1", "the unknown effort or error")
+S = Quantity("s", "1", "what drives the curve")
+U = Quantity("u", "1", "the unknown effort or error")
 STATIC = ("position", "gravity")
 """Kinds of balances that a component takes as constant in time: a mass centre that moves would have
 to be accelerated, which no equation accounts for."""
@@ -39,7 +39,7 @@ EFFECT = Effect(
     "unknown_input",
     "Curve of an unknown effort against its driver.",
     tuple(kind for kind in KINDS if kind not in STATIC),
-    GAIN,
+    G,
     source="hat functions",
     probe=True,
 )
@@ -54,30 +54,29 @@ def drivers(e: EffectModel) -> list[str]:
 
 def law(e: EffectModel) -> None:
     """Add the curve's value."""
-    gain, curve = e.parameter(GAIN), e.parameter(CURVE)
-    first, last = e.parameter(FIRST), e.parameter(LAST)
-    driver = e.parameter(_named("time", 1.0)) * e.t
+    p = e.parameters(G, C, S_FIRST, S_LAST)
+    s = e.parameter(_weight("time", 1.0)) * e.t
     for name in drivers(e):
-        driver += e.parameter(_named(name, 0.0)) * e.signal(name)
-    place = (KNOTS - 1) * (driver - first) / (last - first)
+        s += e.parameter(_weight(name, 0.0)) * e.signal(name)
+    place = (KNOTS - 1) * (s - p.s_first) / (p.s_last - p.s_first)
     place = ca.fmin(ca.fmax(place, 0.0), KNOTS - 1.0)
-    value = ca.SX(0)
+    u = ca.SX(0)
     for k in range(KNOTS):
-        value += curve[k] * ca.fmax(1 - ca.fabs(place - k), 0)
-    value *= gain
-    e.output(DRIVER, driver)
-    e.output(VALUE, value)
+        u += p.c[k] * ca.fmax(1 - ca.fabs(place - k), 0)
+    u *= p.g
+    e.output(S, s)
+    e.output(U, u)
     size = 6 if e.kind == "body" else e.size
     if size > 1:
-        value = value * e.parameter(replace(SHARE, size=size))
-    e.add(value)
+        u = u * e.parameter(replace(SHARE, size=size))
+    e.add(u)
     flow = KINDS[e.kind].flow
     if flow:
-        e.supply(value * e.signal(flow))
+        e.supply(u * e.signal(flow))
     elif e.kind == "body":
-        e.supply(ca.dot(value[:3], e.signal("velocity")) + ca.dot(value[3:], e.signal("rate")))
+        e.supply(ca.dot(u[:3], e.signal("velocity")) + ca.dot(u[3:], e.signal("rate")))
     e.loss(0)
 
 
-def _named(signal: str, start: float) -> Quantity:
+def _weight(signal: str, start: float) -> Quantity:
     return Quantity(f"w_{signal}", "1", f"weight of {signal} in what drives the curve", start=start)

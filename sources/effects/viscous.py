@@ -13,7 +13,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-DAMPING = Quantity(
+B = Quantity(
     "b",
     "N.m.s/rad",
     "additional viscous friction, 0 = absent",
@@ -23,13 +23,13 @@ DAMPING = Quantity(
 )
 
 EFFECT = Effect(
-    "viscous", "Viscous friction of a shaft.", ("rotation",), DAMPING, source="Armstrong 1991"
+    "viscous", "Viscous friction of a shaft.", ("rotation",), B, source="Armstrong 1991"
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the friction torque."""
-    velocity = e.signal("velocity")
-    torque = -e.parameter(DAMPING) * velocity
-    e.add(torque)
-    e.loss(-torque * velocity)
+    b, v = e.parameter(B), e.signal("velocity")
+    f = -b * v
+    e.add(f)
+    e.loss(-f * v)

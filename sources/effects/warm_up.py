@@ -20,7 +20,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-COLD = Quantity(
+K = Quantity(
     "k",
     "1",
     "viscous friction of the cold drive above the warm one, relative, 0 = absent",
@@ -29,16 +29,14 @@ COLD = Quantity(
     maximum=20.0,
     strength=True,
 )
-WARM_UP = Quantity(
-    "t_w", "s", "time constant of warming up", start=120.0, minimum=5.0, maximum=5000.0
-)
-SINCE = Quantity("t_on", "s", "time from switching on to t = 0", nominal=100.0)
+T_W = Quantity("t_w", "s", "time constant of warming up", start=120.0, minimum=5.0, maximum=5000.0)
+T_ON = Quantity("t_on", "s", "time from switching on to t = 0", nominal=100.0)
 
 EFFECT = Effect(
     "warm_up",
     "Viscous friction that falls with the time since the drives were switched on.",
     ("coefficient",),
-    COLD,
+    K,
     source="Bittencourt 2010",
     unit="N.m.s/rad",
 )
@@ -46,5 +44,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add what the cold drive has more."""
-    warmth = ca.exp(-(e.parameter(SINCE) + e.t) / e.parameter(WARM_UP))
-    e.add(e.parameter(COLD) * warmth * e.signal("value"))
+    p, b_warm = e.parameters(T_ON, T_W, K), e.signal("value")
+    e.add(p.k * ca.exp(-(p.t_on + e.t) / p.t_w) * b_warm)

@@ -15,16 +15,16 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
-ECCENTRICITY = Quantity(
+E = Quantity(
     "e", "m", "amplitude of the radius, 0 = absent", start=5e-4, nominal=1e-3, strength=True
 )
-PHASE = Quantity("phi_0", "rad", "wheel angle at which the radius is largest", mix="turn")
+PHI_0 = Quantity("phi_0", "rad", "wheel angle at which the radius is largest", mix="turn")
 
 EFFECT = Effect(
     "wheel_runout",
     "Eccentric wheel.",
     ("coefficient",),
-    ECCENTRICITY,
+    E,
     needs=("angle",),
     unit="m",
     source="kinematics",
@@ -33,4 +33,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Modulate the radius."""
-    e.add(e.parameter(ECCENTRICITY) * ca.cos(e.signal("angle") - e.parameter(PHASE)))
+    p, phi = e.parameters(E, PHI_0), e.signal("angle")
+    e.add(p.e * ca.cos(phi - p.phi_0))

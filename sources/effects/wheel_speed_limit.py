@@ -46,11 +46,10 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Replace the speeds by the limited ones."""
-    slowness, keep = e.parameter(per_unit(e, SLOWNESS)), e.parameter(KEEP)
-    w = e.signal("wheels")
-    active = slowness > 0
-    limit = 1 / ca.if_else(active, slowness, 1.0)
+    p, w = e.parameters(s=per_unit(e, SLOWNESS), keep=KEEP), e.signal("wheels")
+    active = p.s > 0
+    limit = 1 / ca.if_else(active, p.s, 1.0)
     over = ca.fmax(0.0, ca.mmax(w) - limit)
     under = ca.fmax(0.0, -limit - ca.mmin(w))
-    limited = ca.fmax(-limit, ca.fmin(limit, w - keep * (over - under)))
+    limited = ca.fmax(-limit, ca.fmin(limit, w - p.keep * (over - under)))
     e.add(ca.if_else(active, limited - w, 0.0))

@@ -29,7 +29,7 @@ R_TH = Quantity(
 )
 T_TH = Quantity("t_th", "s", "thermal time constant", start=60.0, minimum=1e-3)
 ALPHA = Quantity("alpha", "1/K", "temperature coefficient of resistance, copper", start=0.00393)
-HEAT = Quantity("p", "W", "copper loss behind the thermal time constant", nominal=10.0)
+P = Quantity("p", "W", "copper loss behind the thermal time constant", nominal=10.0)
 RISE = Quantity("rise", "K", "temperature rise of the winding")
 
 EFFECT = Effect(
@@ -44,10 +44,11 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the voltage across the additional resistance."""
-    current, resistance = e.signal("current"), e.signal("resistance")
-    heat = e.state(sized(e, HEAT))
-    rise = e.output(sized(e, RISE), e.parameter(R_TH) * heat)
-    added = resistance * e.parameter(ALPHA) * rise
-    e.derivative(heat, ((resistance + added) * current**2 - heat) / e.parameter(T_TH))
-    e.add(-added * current)
-    e.loss(added * current**2)
+    k = e.parameters(R_TH, ALPHA, T_TH)  # p is the copper loss
+    s = e.signals(i="current", R_0="resistance")
+    p = e.state(sized(e, P))
+    rise = e.output(sized(e, RISE), k.r_th * p)
+    added = s.R_0 * k.alpha * rise
+    e.derivative(p, ((s.R_0 + added) * s.i**2 - p) / k.t_th)
+    e.add(-added * s.i)
+    e.loss(added * s.i**2)

@@ -22,15 +22,14 @@ from typing import Any
 
 import casadi as ca
 
-from ..component import Solver
+from .. import encoder as qs
+from ..component import Fidelity, Solver
 from ..laws.history import History
 from ..model import Model
 from ..quantity import Quantity
-from . import PHI, PHI_MEAS, W_MEAS, W
 
 SX = Any
-LEVEL = 1
-SOLVER = Solver("rk4", step=1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", step=1e-3))
 SAMPLES = 10  # of the angle per window
 
 N = Quantity("n", "1", "counts per revolution of the shaft", 4096.0, minimum=1.0)
@@ -50,21 +49,21 @@ THETA = Quantity("theta", "rad", "angle that the counter has seen")
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    phi, w = m.input(PHI), m.input(W)
-    n, window, phase = m.parameter(N), m.parameter(WINDOW), m.parameter(PHASE)
-    count = 2.0 * math.pi / n
-    theta = m.state(THETA)
-    m.derivative(theta, w)
+    u = m.inputs(qs.PHI, qs.W)
+    p = m.parameters(N, WINDOW, PHASE)
+    x = m.states(THETA)
+    count = 2.0 * math.pi / p.n
+    m.derivative(x.theta, u.w)
     past = History(
-        m, "angle", theta, unit="rad", period=window / SAMPLES, slots=SAMPLES + 2, slope=w
+        m, "angle", x.theta, unit="rad", period=p.window / SAMPLES, slots=SAMPLES + 2, slope=u.w
     )
 
     def counts(angle: SX) -> SX:
-        return ca.floor(angle / count + phase)
+        return ca.floor(angle / count + p.phase)
 
-    speed = count * (counts(theta) - counts(past.at(window))) / window
+    speed = count * (counts(x.theta) - counts(past.at(p.window))) / p.window
     speed += m.balance("speed", "signal", unit="rad/s", value=speed).effort
-    angle = count * counts(phi)
+    angle = count * counts(u.phi)
     angle += m.balance("angle", "signal", unit="rad", value=angle).effort
-    m.output(W_MEAS, speed)
-    m.output(PHI_MEAS, angle)
+    m.output(qs.W_MEAS, speed)
+    m.output(qs.PHI_MEAS, angle)

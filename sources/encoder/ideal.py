@@ -9,16 +9,17 @@ Source: digital twin paper, encoder block (gain 1).
 
 from __future__ import annotations
 
+from .. import encoder as qs
+from ..component import Fidelity
 from ..model import Model
-from . import PHI, PHI_MEAS, W_MEAS, W
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    phi, w = m.input(PHI), m.input(W)
-    w += m.balance("speed", "signal", unit="rad/s", value=w).effort
-    phi += m.balance("angle", "signal", unit="rad", value=phi).effort
-    m.output(W_MEAS, w)
-    m.output(PHI_MEAS, phi)
+    u = m.inputs(qs.PHI, qs.W)
+    w = u.w + m.balance("speed", "signal", unit="rad/s", value=u.w).effort
+    phi = u.phi + m.balance("angle", "signal", unit="rad", value=u.phi).effort
+    m.output(qs.W_MEAS, w)
+    m.output(qs.PHI_MEAS, phi)

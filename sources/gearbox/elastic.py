@@ -21,13 +21,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import gearbox as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ETA, FLANGE_A, FLANGE_B, J_A, J_B, P_0, RATIO, TAU_A, TAU_B, W_A, W_B, B
 
-LEVEL = 2
-SOLVER = Solver("rodas3", 1e-4)
 K = Quantity(
     "k", "N.m/rad", "torsional stiffness, seen at flange b", start=6000.0, minimum=1e-6, nominal=1e3
 )
@@ -45,41 +43,44 @@ TWIST = Quantity(
 )
 ROTOR_SPEED = Quantity("rotor_speed", "rad/s", "state: speed of the rotor", nominal=100.0)
 SMALLEST_ROTOR = 1e-9
-STIFF = K
-LIMITS = {"ratio": {"signed": 0.0, "P_0": P_0.start}, "lossy": {"signed": 1.0}}
-"""Fidelities that an infinite stiffness gives, and what has to be set for that."""
+FIDELITY = Fidelity(
+    level=2,
+    solver=Solver("rodas3", 1e-4),
+    stiff=K,
+    limits={"ratio": {"signed": 0.0, "P_0": qs.P_0.starts()[0]}, "lossy": {"signed": 1.0}},
+)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    tau_a, w_b = m.input(TAU_A), m.input(W_B)
-    nominal, eta, friction = m.parameter(RATIO), m.parameter(ETA), m.parameter(B)
-    stiffness, damping = m.parameter(K), m.parameter(D)
+    u = m.inputs(qs.TAU_A, qs.W_B)
+    p = m.parameters(qs.RATIO, qs.ETA, qs.B, K, D, qs.J_A, qs.P_0, SIGNED)
+    x = m.states(TWIST, ROTOR_SPEED)
     # A rotor without inertia would have no finite acceleration.
-    inertia = ca.fmax(m.parameter(J_A), SMALLEST_ROTOR)
-    twist, w_a = m.state(TWIST), m.state(ROTOR_SPEED)
+    j_a = ca.fmax(p.J_a, SMALLEST_ROTOR)
+    w_a = x.rotor_speed
 
-    ripple = m.balance("ratio", "coefficient", unit="1", value=nominal, speed=w_b)
-    ratio = nominal + ripple.effort
-    rate = w_a / ratio - w_b
+    ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, speed=u.w_b)
+    ratio = p.ratio + ripple.effort
+    rate = w_a / ratio - u.w_b
     spring = m.balance(
-        "spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+        "spring", "compliance", deflection=x.twist, rate=rate, stiffness=p.k, damping=p.d
     )
-    tau_s = stiffness * twist + damping * rate - spring.effort
-    flange_b = m.balance("flange_b", "rotation", velocity=w_b, load=tau_s)
-    flange_a = m.balance("flange_a", "rotation", velocity=w_a, load=tau_a)
-    into_mesh = tau_a + flange_a.effort
-    follows = ca.tanh(into_mesh * w_a / m.parameter(P_0))
-    factor = eta ** (1 - m.parameter(SIGNED) * (1 - follows))
-    m.derivative(twist, rate)
-    m.derivative(w_a, (factor * into_mesh - tau_s / ratio) / inertia)
-    tau_b = tau_s - friction * w_b + flange_b.effort
-    m.output(W_A, w_a)
-    m.output(TAU_B, tau_b)
-    m.output(J_B, 0.0)
-    m.port(FLANGE_A, tau_a, w_a)
-    m.port(FLANGE_B, tau_b, w_b)
-    m.stored_energy(inertia * w_a**2 / 2 + stiffness * twist**2 / 2)
+    tau_s = p.k * x.twist + p.d * rate - spring.effort
+    flange_b = m.balance("flange_b", "rotation", velocity=u.w_b, load=tau_s)
+    flange_a = m.balance("flange_a", "rotation", velocity=w_a, load=u.tau_a)
+    into_mesh = u.tau_a + flange_a.effort
+    s = 1 - p.signed * (1 - ca.tanh(into_mesh * w_a / p.P_0))
+    factor = p.eta**s
+    m.derivative(x.twist, rate)
+    m.derivative(w_a, (factor * into_mesh - tau_s / ratio) / j_a)
+    tau_b = tau_s - p.b * u.w_b + flange_b.effort
+    m.output(qs.W_A, w_a)
+    m.output(qs.TAU_B, tau_b)
+    m.output(qs.J_B, 0.0)
+    m.port(qs.FLANGE_A, u.tau_a, w_a)
+    m.port(qs.FLANGE_B, tau_b, u.w_b)
+    m.stored_energy(j_a * w_a**2 / 2 + p.k * x.twist**2 / 2)
     m.loss("mesh", (1 - factor) * into_mesh * w_a)
-    m.loss("bearings", friction * w_b**2)
-    m.loss("spring", damping * rate**2)
+    m.loss("bearings", p.b * u.w_b**2)
+    m.loss("spring", p.d * rate**2)

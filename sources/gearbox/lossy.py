@@ -16,16 +16,15 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import gearbox as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import ETA, P_0
 from .rigid import rigid
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    eta, blend = m.parameter(ETA), m.parameter(P_0)
-    rigid(m, lambda torque, speed: eta ** ca.tanh(torque * speed / blend))
+    p = m.parameters(qs.ETA, qs.P_0)
+    rigid(m, lambda torque, speed: p.eta ** ca.tanh(torque * speed / p.P_0))

@@ -14,17 +14,16 @@ Source: digital twin paper (gearbox block of the UR5: ratio times efficiency).
 
 from __future__ import annotations
 
-from ..component import Solver
+from .. import gearbox as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import ETA
 from .rigid import rigid
 
-LEVEL = 0
 # No states of its own; bristles and angles of effects are stiff.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    eta = m.parameter(ETA)
-    rigid(m, lambda _torque, _speed: eta)
+    p = m.parameters(qs.ETA)
+    rigid(m, lambda _torque, _speed: p.eta)

@@ -9,12 +9,11 @@ Source: Newton's law for rotation.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from .load import rotation
 
-LEVEL = 0
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from .load import rotation
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 MASS = Quantity("m", "kg", "eccentric mass", start=1.0, minimum=0.0)
 DISTANCE = Quantity("l", "m", "distance of its centre from the axis", start=0.1, minimum=0.0)
 GRAVITY = Quantity("g", "m/s2", "gravity across the axis", start=9.81, minimum=0.0)
@@ -28,10 +27,10 @@ HANGING = Quantity("phi_0", "rad", "angle at which the mass hangs: the zero of t
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    moment = m.parameter(MASS) * m.parameter(GRAVITY) * m.parameter(DISTANCE)
-    hanging = m.parameter(HANGING)
+    p = m.parameters(MASS, GRAVITY, DISTANCE, HANGING)
+    moment = p.m * p.g * p.l
 
     def gravity(angle: SX) -> tuple[SX, SX]:
-        return -moment * ca.sin(angle - hanging), moment * (1 - ca.cos(angle - hanging))
+        return -moment * ca.sin(angle - p.phi_0), moment * (1 - ca.cos(angle - p.phi_0))
 
     rotation(m, gravity)

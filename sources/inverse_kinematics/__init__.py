@@ -33,9 +33,9 @@ COMPONENT = Component(
 
 def motor_speeds(m: Model, v_d: SX, w_d: SX) -> None:
     """Outputs of a base that shall move forward with v_d and turn with w_d, and its balances."""
-    r, track, ratio = m.parameter(R), m.parameter(TRACK), m.parameter(RATIO)
-    half = 0.5 * track
-    both = ratio / r * ca.vertcat(v_d - half * w_d, v_d + half * w_d)
+    p = m.parameters(R, TRACK, RATIO)
+    half = 0.5 * p.track
+    both = p.ratio / p.r * ca.vertcat(v_d - half * w_d, v_d + half * w_d)
     both += m.balance("command", "signal", unit="rad/s", value=both).effort
     left, right = both[0], both[1]
     left += m.balance("left", "signal", unit="rad/s", value=left).effort

@@ -9,15 +9,17 @@ Source: digital twin paper, Eq 1 in body form.
 
 from __future__ import annotations
 
+from .. import inverse_kinematics as qs
+from ..component import Fidelity
 from ..model import Model
-from . import PHI_D, V_D, W_D, XD_D, YD_D, motor_speeds
+from . import motor_speeds
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    v_d, w_d = m.input(V_D), m.input(W_D)
-    for unused in (XD_D, YD_D, PHI_D):
+    u = m.inputs(qs.V_D, qs.W_D)
+    for unused in (qs.XD_D, qs.YD_D, qs.PHI_D):
         m.input(unused)
-    motor_speeds(m, v_d, w_d)
+    motor_speeds(m, u.v_d, u.w_d)

@@ -15,14 +15,15 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import inverse_kinematics as qs
+from ..component import Fidelity
 from ..model import Model
-from . import PHI_D, V_D, W_D, XD_D, YD_D, motor_speeds
+from . import motor_speeds
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    m.input(V_D)
-    w_d, xd_d, yd_d, phi_d = m.input(W_D), m.input(XD_D), m.input(YD_D), m.input(PHI_D)
-    motor_speeds(m, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d, w_d)
+    u = m.inputs(qs.V_D, qs.W_D, qs.XD_D, qs.YD_D, qs.PHI_D)
+    motor_speeds(m, ca.cos(u.phi_d) * u.xd_d + ca.sin(u.phi_d) * u.yd_d, u.w_d)

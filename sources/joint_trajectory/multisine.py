@@ -17,12 +17,13 @@ import math
 
 import casadi as ca
 
+from .. import joint_trajectory as qs
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
-from . import Q_HOLD, RAMP, T_START
 from .path import output_path, window
 
-LEVEL = 2
+FIDELITY = Fidelity(level=2)
 LINES = 5
 AMPLITUDE = Quantity(
     "amplitude", "rad", "sums of the amplitudes of a joint's sines", start=0.5, size=6
@@ -33,9 +34,9 @@ DURATION = Quantity("duration", "s", "from first to last motion", start=20.0, mi
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    start, amplitude = m.parameter(T_START), m.parameter(AMPLITUDE)
-    faded = window(m, start, m.parameter(DURATION), m.parameter(RAMP))
-    base = 2 * math.pi * m.parameter(FREQUENCY) * (m.t - start)
+    p = m.parameters(qs.T_START, AMPLITUDE, DURATION, qs.RAMP, FREQUENCY, qs.Q_HOLD)
+    faded = window(m, p.t_start, p.duration, p.ramp)
+    base = 2 * math.pi * p.f * (m.t - p.t_start)
     waves = [
         sum(
             ca.sin((joint + 6 * k) * base - math.pi * k * (k - 1) / LINES) / LINES
@@ -43,4 +44,4 @@ def equations(m: Model) -> None:
         )
         for joint in range(1, 7)
     ]
-    output_path(m, m.parameter(Q_HOLD) + amplitude * faded * ca.vertcat(*waves))
+    output_path(m, p.q_hold + p.amplitude * faded * ca.vertcat(*waves))

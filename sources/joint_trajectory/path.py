@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import joint_trajectory as qs
 from ..model import SX, Model
-from . import Q_SET, QD_SET, QDD_SET
 
 
 def smooth(s: SX) -> SX:
@@ -22,6 +22,6 @@ def window(m: Model, start: SX, duration: SX, ramp: SX) -> SX:
 def output_path(m: Model, q: SX) -> None:
     """Output the angles and their time derivatives."""
     speed = ca.jacobian(q, m.t)
-    m.output(Q_SET, q)
-    m.output(QD_SET, speed)
-    m.output(QDD_SET, ca.jacobian(speed, m.t))
+    m.output(qs.Q_SET, q)
+    m.output(qs.QD_SET, speed)
+    m.output(qs.QDD_SET, ca.jacobian(speed, m.t))

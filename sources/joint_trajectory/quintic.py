@@ -9,18 +9,19 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control, 2009, ch. 4
 
 from __future__ import annotations
 
+from .. import joint_trajectory as qs
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
-from . import Q_HOLD, T_START
 from .path import output_path, smooth
 
-LEVEL = 0
-Q_START = Quantity("q_start", "rad", "angles before the move", start=Q_HOLD.start, size=6)
+FIDELITY = Fidelity(level=0)
+Q_START = Quantity("q_start", "rad", "angles before the move", start=qs.Q_HOLD.start, size=6)
 Q_END = Quantity(
     "q_end",
     "rad",
     "angles after the move",
-    start=(Q_HOLD.starts()[0] + 0.5, *Q_HOLD.starts()[1:]),
+    start=(qs.Q_HOLD.starts()[0] + 0.5, *qs.Q_HOLD.starts()[1:]),
     size=6,
 )
 DURATION = Quantity("duration", "s", "time that the move takes", start=1.0, minimum=1e-3)
@@ -28,6 +29,6 @@ DURATION = Quantity("duration", "s", "time that the move takes", start=1.0, mini
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    first, last = m.parameter(Q_START), m.parameter(Q_END)
-    s = (m.t - m.parameter(T_START)) / m.parameter(DURATION)
-    output_path(m, first + (last - first) * smooth(s))
+    p = m.parameters(Q_START, Q_END, qs.T_START, DURATION)
+    s = (m.t - p.t_start) / p.duration
+    output_path(m, p.q_start + (p.q_end - p.q_start) * smooth(s))

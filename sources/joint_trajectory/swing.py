@@ -15,12 +15,13 @@ import math
 
 import casadi as ca
 
+from .. import joint_trajectory as qs
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
-from . import Q_HOLD, RAMP, T_START
 from .path import output_path, window
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 AMPLITUDE = Quantity(
     "amplitude",
     "rad",
@@ -35,7 +36,7 @@ DURATION = Quantity("duration", "s", "from first to last motion", start=10.0, mi
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    start = m.parameter(T_START)
-    faded = window(m, start, m.parameter(DURATION), m.parameter(RAMP))
-    phase = 2 * math.pi * m.parameter(FREQUENCY) * (m.t - start)
-    output_path(m, m.parameter(Q_HOLD) + m.parameter(AMPLITUDE) * faded * ca.sin(phase))
+    p = m.parameters(qs.T_START, DURATION, qs.RAMP, FREQUENCY, qs.Q_HOLD, AMPLITUDE)
+    faded = window(m, p.t_start, p.duration, p.ramp)
+    phase = 2 * math.pi * p.f * (m.t - p.t_start)
+    output_path(m, p.q_hold + p.amplitude * faded * ca.sin(phase))

@@ -21,10 +21,10 @@ STICK = 0.7
 """Deflection, relative to the sliding one, below which nothing slides."""
 
 
-def bristle(velocity: SX, deflection: SX, height: SX, length: SX) -> tuple[SX, SX]:
-    """Rate of the relative deflection, and the share `a` of sliding (0 stuck, 1 sliding)."""
-    size = ca.fabs(deflection)
-    stuck = STICK * height
-    x = ca.fmax(0, ca.fmin((size - stuck) / (height - stuck), 1))
-    slides = ca.if_else(velocity * deflection > 0, x**2 * (3 - 2 * x), 0)
-    return velocity / length * (1 - slides * size / height), slides
+def bristle(v: SX, z: SX, h: SX, x_0: SX) -> tuple[SX, SX]:
+    """Rate z' of the relative deflection, and the share `a` of sliding (0 stuck, 1 sliding)."""
+    size = ca.fabs(z)
+    z_stick = STICK * h
+    x = ca.fmax(0, ca.fmin((size - z_stick) / (h - z_stick), 1))
+    a = ca.if_else(v * z > 0, x**2 * (3 - 2 * x), 0)
+    return v / x_0 * (1 - a * size / h), a

@@ -21,19 +21,19 @@ SMALL = 1e-24
 """Added to squared speeds and lengths (SI), so that their roots have a slope at 0."""
 
 
-def normal_force(depth: SX, rate: SX, k: SX, b: SX, width: SX) -> tuple[SX, SX, SX]:
-    """Normal force, elastic energy and loss power of a floor that is penetrated by `depth`.
+def normal_force(d: SX, d_dot: SX, k: SX, b: SX, width: SX) -> tuple[SX, SX, SX]:
+    """Normal force, elastic energy and loss power of a floor that is penetrated by the depth `d`.
 
     f = max(0, s (k d + b d')),  s = x^2 (3 - 2 x),  x = d/width limited to 0 ... 1
     """
-    x = ca.fmax(0, ca.fmin(depth / width, 1))
-    onset = x * x * (3 - 2 * x)
-    elastic = onset * k * depth
-    force = ca.fmax(0, elastic + onset * b * rate)
+    x = ca.fmax(0, ca.fmin(d / width, 1))
+    s = x * x * (3 - 2 * x)
+    elastic = s * k * d
+    f = ca.fmax(0, elastic + s * b * d_dot)
     rise = width**2 * x**4 * (3 / 4 - 2 / 5 * x)  # integral of s d over the transition
-    beyond = ca.fmax(depth, width)
+    beyond = ca.fmax(d, width)
     energy = k * (rise + (beyond * beyond - width**2) / 2)
-    return force, energy, (force - elastic) * rate
+    return f, energy, (f - elastic) * d_dot
 
 
 def stick_slip(s_x: SX, s_y: SX, f_n: SX, mu_s: SX, mu_d: SX, v_c: SX) -> tuple[SX, SX]:
@@ -43,9 +43,9 @@ def stick_slip(s_x: SX, s_y: SX, f_n: SX, mu_s: SX, mu_d: SX, v_c: SX) -> tuple[
           = mu_d + (mu_s - mu_d) exp(-((v/v_c - 1)/2)^2)            for v > v_c
     """
     square = (s_x * s_x + s_y * s_y) / (v_c * v_c)
-    v = ca.sqrt(ca.fmax(square, 1))
-    sliding = mu_d + (mu_s - mu_d) * ca.exp(-(((v - 1) / 2) ** 2))
-    gain = -f_n * sliding * (3 - ca.fmin(square, 1)) / (2 * v_c * v)
+    ratio = ca.sqrt(ca.fmax(square, 1))  # v/v_c, 1 below v_c
+    mu = mu_d + (mu_s - mu_d) * ca.exp(-(((ratio - 1) / 2) ** 2))
+    gain = -f_n * mu * (3 - ca.fmin(square, 1)) / (2 * v_c * ratio)
     return gain * s_x, gain * s_y
 
 
@@ -60,12 +60,12 @@ def creep(s_x: SX, s_y: SX, c_x: SX, c_y: SX, limit: SX) -> tuple[SX, SX]:
     return scale * p_x, scale * p_y
 
 
-def creep_coefficient(coefficient: SX, rest: SX, speed: SX, transition: SX) -> SX:
-    """Creep coefficient of a wheel that rolls at `speed`: `rest` times it at standstill."""
-    square = speed * speed
-    return coefficient * (rest + (1 - rest) * square / (square + transition * transition))
+def creep_coefficient(c: SX, rest: SX, v: SX, v_creep: SX) -> SX:
+    """Creep coefficient at the rolling speed v, `c (rest + (1 - rest) v^2/(v^2 + v_creep^2))`."""
+    square = v * v
+    return c * (rest + (1 - rest) * square / (square + v_creep * v_creep))
 
 
-def rolling_resistance(coefficient: SX, f_n: SX, radius: SX, w: SX, w_0: SX) -> SX:
+def rolling_resistance(c: SX, f_n: SX, r: SX, w: SX, w_0: SX) -> SX:
     """Moment against rolling, `c f_n r tanh(w/w_0)`."""
-    return coefficient * f_n * radius * ca.tanh(w / w_0)
+    return c * f_n * r * ca.tanh(w / w_0)

@@ -38,11 +38,11 @@ V_CREEP = Quantity(
 
 def stick_slip(m: Model) -> Callable[[SX, SX, SX, SX, SX], tuple[SX, SX]]:
     """Smooth stick-slip, (s_x, s_y, load, x, y) -> forces; effects on `mu` act on mu_d alike."""
-    mu_s, mu_d, v_c = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_C)
+    p = m.parameters(MU_S, MU_D, V_C)
 
     def friction(s_x: SX, s_y: SX, load: SX, x: SX, y: SX) -> tuple[SX, SX]:
-        patch = m.balance("mu", "coefficient", unit="1", value=mu_s, x=x, y=y)
-        share = 1 + patch.effort / mu_s
-        return contact.stick_slip(s_x, s_y, load * share, mu_s, mu_d, v_c)
+        patch = m.balance("mu", "coefficient", unit="1", value=p.mu_s, x=x, y=y)
+        share = 1 + patch.effort / p.mu_s
+        return contact.stick_slip(s_x, s_y, load * share, p.mu_s, p.mu_d, p.v_c)
 
     return friction

@@ -19,15 +19,15 @@ SX = Any
 
 
 def accelerations(
-    mass: SX, s_x: SX, s_y: SX, inertia: SX, force_x: SX, force_y: SX, moment: SX, rate: SX
+    m: SX, s_x: SX, s_y: SX, J: SX, F_x: SX, F_y: SX, M: SX, w: SX
 ) -> tuple[SX, SX, SX]:
-    """Acceleration of the reference point (body axes) and angular acceleration."""
-    x, y = force_x + s_x * rate**2, force_y + s_y * rate**2
-    central = inertia - (s_x**2 + s_y**2) / mass
-    angular = (moment - (s_x * y - s_y * x) / mass) / central
-    return (x + s_y * angular) / mass, (y - s_x * angular) / mass, angular
+    """Acceleration (a_x, a_y) of the reference point in body axes, and w'."""
+    x, y = F_x + s_x * w**2, F_y + s_y * w**2
+    central = J - (s_x**2 + s_y**2) / m  # about the mass centre
+    w_dot = (M - (s_x * y - s_y * x) / m) / central
+    return (x + s_y * w_dot) / m, (y - s_x * w_dot) / m, w_dot
 
 
-def kinetic_energy(mass: SX, s_x: SX, s_y: SX, inertia: SX, v_x: SX, v_y: SX, rate: SX) -> SX:
+def kinetic_energy(m: SX, s_x: SX, s_y: SX, J: SX, v_x: SX, v_y: SX, w: SX) -> SX:
     """Kinetic energy [J] from the velocity of the reference point (body axes) and the rate."""
-    return mass * (v_x**2 + v_y**2) / 2 + rate * (s_x * v_y - s_y * v_x) + inertia * rate**2 / 2
+    return m * (v_x**2 + v_y**2) / 2 + w * (s_x * v_y - s_y * v_x) + J * w**2 / 2

@@ -143,23 +143,20 @@ def with_load(chain: Chain, mass: SX, first_moment: SX, inertia: SX) -> Chain:
     last = chain.links[-1]
     turn, shift = chain.flange_rotation, chain.flange_offset
     h = turn @ ca.SX(first_moment)
-    j = _symmetric(turn @ ca.SX(inertia) @ turn.T)
+    J = _symmetric(turn @ ca.SX(inertia) @ turn.T)
     link = replace(
         last,
         mass=last.mass + mass,
         first_moment=last.first_moment + (h + mass * shift),
-        inertia=last.inertia + (j + _shifted(mass, h, shift)),
+        inertia=last.inertia + (J + _shifted(mass, h, shift)),
     )
     return replace(chain, links=(*chain.links[:-1], link))
 
 
-def _shifted(mass: SX, h: SX, r: SX) -> SX:
+def _shifted(m: SX, h: SX, r: SX) -> SX:
     """What an inertia gains when its reference point moves by -r (h: first moment before)."""
     return _symmetric(
-        (2 * ca.dot(r, h) + mass * ca.dot(r, r)) * ca.SX.eye(3)
-        - r @ h.T
-        - h @ r.T
-        - mass * (r @ r.T)
+        (2 * ca.dot(r, h) + m * ca.dot(r, r)) * ca.SX.eye(3) - r @ h.T - h @ r.T - m * (r @ r.T)
     )
 
 
@@ -220,8 +217,8 @@ class Posture:
             ca.horzcat(xy_new, yy - shift, yz),
             ca.horzcat(xz, yz, matrix[2, 2]),
         )
-        e = self.chain.links[i].rotation
-        return _symmetric(e @ turned @ e.T)
+        rotation = self.chain.links[i].rotation
+        return _symmetric(rotation @ turned @ rotation.T)
 
     def _down_matrix(self, i: int, matrix: SX) -> SX:
         columns = [self.down(i, matrix[:, k]) for k in range(3)]
@@ -291,25 +288,25 @@ class Posture:
         whole, load = bare._composite()[0], self._load
         position, rotation = self.flange()
         h = rotation @ load.first_moment
-        j = _symmetric(rotation @ load.inertia @ rotation.T)
+        J = _symmetric(rotation @ load.inertia @ rotation.T)
         return Body(
             whole.mass + load.mass,
             whole.first_moment + (h + load.mass * position),
-            whole.inertia + (j + _shifted(load.mass, h, position)),
+            whole.inertia + (J + _shifted(load.mass, h, position)),
         )
 
     def _composite(self) -> list[Body]:
         """Per frame (0: mount) the mass properties of all that lies beyond it."""
         bodies = []
-        mass, h, j = ca.SX(0), ca.SX.zeros(3), ca.SX.zeros(3, 3)
+        m, h, J = ca.SX(0), ca.SX.zeros(3), ca.SX.zeros(3, 3)
         for i in reversed(range(len(self.chain.links))):
             link = self.chain.links[i]
-            mass, h, j = mass + link.mass, h + link.first_moment, j + link.inertia
-            bodies.append(Body(mass, h, j))
-            h, j = self.down(i, h), self._down_symmetric(i, j)
-            j = j + _shifted(mass, h, link.offset)
-            h = h + mass * link.offset
-        bodies.append(Body(mass, h, j))
+            m, h, J = m + link.mass, h + link.first_moment, J + link.inertia
+            bodies.append(Body(m, h, J))
+            h, J = self.down(i, h), self._down_symmetric(i, J)
+            J = J + _shifted(m, h, link.offset)
+            h = h + m * link.offset
+        bodies.append(Body(m, h, J))
         return bodies[::-1]
 
     # -- energy ----------------------------------------------------------------------------------
@@ -318,11 +315,8 @@ class Posture:
         """Kinetic energy of the links [J] (rotors not included)."""
         total = ca.SX(0)
         for link, w, v in zip(self.chain.links, rates, velocities, strict=True):
-            total += (
-                link.mass * ca.dot(v, v) / 2
-                + ca.dot(v, ca.cross(w, link.first_moment))
-                + ca.dot(w, link.inertia @ w) / 2
-            )
+            m, h, J = link.mass, link.first_moment, link.inertia
+            total += m * ca.dot(v, v) / 2 + ca.dot(v, ca.cross(w, h)) + ca.dot(w, J @ w) / 2
         return total
 
     # -- dynamics --------------------------------------------------------------------------------
@@ -348,37 +342,30 @@ class Posture:
         """
         rates = self.rates(qd, base_rate)
         a, alpha, w = base_acceleration, base_angular_acceleration, base_rate
-        forces = []
+        wrenches = []
         for i, link in enumerate(self.chain.links):
-            a = self.up(i, a + ca.cross(alpha, link.offset) + _centripetal(w, link.offset))
+            m, h, J, r = link.mass, link.first_moment, link.inertia, link.offset
+            a = self.up(i, a + ca.cross(alpha, r) + _centripetal(w, r))
             alpha, w = self.up(i, alpha) + _coriolis(rates[i], qd[i]), rates[i]
             alpha = ca.vertcat(alpha[0], alpha[1], alpha[2] + qdd[i])
-            force = (
-                link.mass * a
-                + ca.cross(alpha, link.first_moment)
-                + _centripetal(w, link.first_moment)
-            )
-            moment = (
-                link.inertia @ alpha
-                + ca.cross(link.first_moment, a)
-                + ca.cross(w, link.inertia @ w)
-            )
-            forces.append((force, moment))
+            F = m * a + ca.cross(alpha, h) + _centripetal(w, h)
+            M = J @ alpha + ca.cross(h, a) + ca.cross(w, J @ w)
+            wrenches.append((F, M))
         tau = []
-        force, moment = self._minus_load(load)
+        F, M = self._minus_load(load)
         for i in reversed(range(len(self.chain.links))):
-            force, moment = force + forces[i][0], moment + forces[i][1]
-            tau.append(moment[2])
-            force, moment = self.down(i, force), self.down(i, moment)
-            moment = moment + ca.cross(self.chain.links[i].offset, force)
-        return ca.vertcat(*tau[::-1]), ca.vertcat(force, moment)
+            F, M = F + wrenches[i][0], M + wrenches[i][1]
+            tau.append(M[2])
+            F, M = self.down(i, F), self.down(i, M)
+            M = M + ca.cross(self.chain.links[i].offset, F)
+        return ca.vertcat(*tau[::-1]), ca.vertcat(F, M)
 
     def _minus_load(self, load: SX | None) -> tuple[SX, SX]:
         if load is None:
             return ca.SX.zeros(3), ca.SX.zeros(3)
-        force = self.chain.flange_rotation @ load[:3]
-        moment = self.chain.flange_rotation @ load[3:] + ca.cross(self.chain.flange_offset, force)
-        return -force, -moment
+        F = self.chain.flange_rotation @ load[:3]
+        M = self.chain.flange_rotation @ load[3:] + ca.cross(self.chain.flange_offset, F)
+        return -F, -M
 
     def mass_matrix(self) -> SX:
         """Joint inertia matrix (composite rigid bodies; rotors not included)."""
@@ -387,12 +374,12 @@ class Posture:
         matrix = ca.SX.zeros(size, size)
         for i in range(size):
             h = bodies[i].first_moment
-            force, moment = ca.vertcat(-h[1], h[0], 0), bodies[i].inertia[:, 2]
-            matrix[i, i] = moment[2]
+            F, M = ca.vertcat(-h[1], h[0], 0), bodies[i].inertia[:, 2]
+            matrix[i, i] = M[2]
             for k in range(i, 0, -1):
-                force, moment = self.down(k, force), self.down(k, moment)
-                moment = moment + ca.cross(self.chain.links[k].offset, force)
-                matrix[k - 1, i] = matrix[i, k - 1] = moment[2]
+                F, M = self.down(k, F), self.down(k, M)
+                M = M + ca.cross(self.chain.links[k].offset, F)
+                matrix[k - 1, i] = matrix[i, k - 1] = M[2]
         return matrix
 
     def forward_dynamics(
@@ -419,20 +406,21 @@ class Posture:
         """
         links, rates = self.chain.links, self.rates(qd, base_rate)
         mass, cross, inertia = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
-        force, moment = self._minus_load(load)
+        F, M = self._minus_load(load)
         joints: list[tuple[SX, SX, SX, SX]] = []
         for i in reversed(range(len(links))):
             link, w = links[i], rates[i]
-            mass = mass + link.mass * ca.SX.eye(3)
-            cross = cross - skew(link.first_moment)
-            inertia = inertia + link.inertia
-            force = force + _centripetal(w, link.first_moment)
-            moment = moment + ca.cross(w, link.inertia @ w)
+            m, h, J, r = link.mass, link.first_moment, link.inertia, link.offset
+            mass = mass + m * ca.SX.eye(3)
+            cross = cross - skew(h)
+            inertia = inertia + J
+            F = F + _centripetal(w, h)
+            M = M + ca.cross(w, J @ w)
 
             # the joint gives way: what remains is felt across it
             u_force, u_moment = cross[:, 2], inertia[:, 2]
             inverse = 1 / (u_moment[2] + rotor[i])
-            torque = tau[i] - moment[2]
+            torque = tau[i] - M[2]
             joints.append((u_force, u_moment, inverse, torque))
             # these quotients first, so that numbers known at build time round as at run time
             kept, by_force, by_moment = (
@@ -446,17 +434,17 @@ class Posture:
             edge = u_moment * kept
             inertia = ca.vertcat(ca.horzcat(corner, edge[:2]), edge.T)
             turning = _coriolis(w, qd[i])[:2]
-            force = force + by_force * torque + cross[:, :2] @ turning
-            passed = ca.vertcat(moment[:2] + by_moment * torque, tau[i] - kept * torque)
-            moment = passed + inertia[:, :2] @ turning
+            F = F + by_force * torque + cross[:, :2] @ turning
+            passed = ca.vertcat(M[:2] + by_moment * torque, tau[i] - kept * torque)
+            M = passed + inertia[:, :2] @ turning
 
             # to the frame of the predecessor
-            r, w_parent = link.offset, rates[i - 1] if i else base_rate
+            w_p = rates[i - 1] if i else base_rate
             mass, inertia = self._down_symmetric(i, mass), self._down_symmetric(i, inertia)
             cross, shift = self._down_matrix(i, cross), skew(r)
-            centripetal = _centripetal(w_parent, r)
-            force = self.down(i, force) + mass @ centripetal
-            moment = self.down(i, moment) + cross.T @ centripetal + ca.cross(r, force)
+            centripetal = _centripetal(w_p, r)
+            F = self.down(i, F) + mass @ centripetal
+            M = self.down(i, M) + cross.T @ centripetal + ca.cross(r, F)
             shifted = cross - mass @ shift
             inertia = _symmetric(inertia - cross.T @ shift + shift @ shifted)
             cross = shifted
@@ -474,7 +462,7 @@ class Posture:
         return ForwardDynamics(
             ca.vertcat(*qdd),
             ca.vertcat(ca.horzcat(mass, cross), ca.horzcat(cross.T, inertia)),
-            ca.vertcat(force, moment),
+            ca.vertcat(F, M),
         )
 
 

@@ -17,10 +17,10 @@ SX = Any
 TINY = 1e-32  # square of half an angle below which the rotation vector's direction fades to 0
 
 
-def rotation_matrix(quaternion: SX) -> SX:
-    """Rotation matrix, body to world."""
-    w, x, y, z = (quaternion[i] for i in range(4))
-    s = 2 / ca.dot(quaternion, quaternion)
+def rotation_matrix(q: SX) -> SX:
+    """Rotation matrix R, body to world."""
+    w, x, y, z = (q[i] for i in range(4))
+    s = 2 / ca.dot(q, q)
     return ca.vertcat(
         ca.horzcat(1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
         ca.horzcat(s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)),
@@ -40,14 +40,14 @@ def product(first: SX, second: SX) -> SX:
     )
 
 
-def quaternion_rate(quaternion: SX, rate: SX) -> SX:
-    """Time derivative of a quaternion for an angular velocity in body axes."""
-    return product(quaternion, ca.vertcat(0, rate)) / 2
+def quaternion_rate(q: SX, w: SX) -> SX:
+    """Time derivative q' of a quaternion for an angular velocity in body axes."""
+    return product(q, ca.vertcat(0, w)) / 2
 
 
-def rotation_vector(quaternion: SX) -> SX:
+def rotation_vector(q: SX) -> SX:
     """Axis times angle, with an angle up to pi."""
-    w, v = quaternion[0], quaternion[1:]
-    length = ca.sqrt(ca.dot(v, v) + TINY * ca.dot(quaternion, quaternion))
+    w, v = q[0], q[1:]
+    length = ca.sqrt(ca.dot(v, v) + TINY * ca.dot(q, q))
     angle = 2 * ca.atan2(length, ca.fabs(w))
     return ca.if_else(w < 0, -1.0, 1.0) * angle / length * v

@@ -9,7 +9,7 @@ import casadi as ca
 
 from ..effect_model import EffectModel
 from ..quantity import Quantity
-from ..units import parse
+from ..units import base_exponents, coherent
 
 SX = Any
 
@@ -23,8 +23,8 @@ def in_unit(e: EffectModel, quantity: Quantity) -> Quantity:
 
 def per_unit(e: EffectModel, quantity: Quantity) -> Quantity:
     """A quantity declared with its own unit per unit of the balance."""
-    exponents = dict(parse(quantity.unit).exponents)
-    for base, exponent in parse(e.unit).exponents:
+    exponents = base_exponents(coherent(quantity.unit))
+    for base, exponent in base_exponents(coherent(e.unit)).items():
         exponents[base] = exponents.get(base, 0) - exponent
     unit = ".".join(f"{base}{n if n != 1 else ''}" for base, n in exponents.items() if n)
     return replace(quantity, unit=unit or "1")

@@ -12,19 +12,19 @@ SX = Any
 def solve(matrix: SX, right: SX) -> SX:
     """Solution x of `matrix x = right`, by matrix = L D L^T; only the lower triangle is read."""
     size = right.numel()
-    lower: list[list[SX]] = [[] for _ in range(size)]
-    scaled: list[list[SX]] = [[] for _ in range(size)]  # L D
+    L: list[list[SX]] = [[] for _ in range(size)]
+    LD: list[list[SX]] = [[] for _ in range(size)]
     inverse: list[SX] = []  # of D
     forward: list[SX] = []
     for i in range(size):
         for k in range(i):
-            scaled[i].append(matrix[i, k] - _dot(scaled[i], lower[k]))
-            lower[i].append(scaled[i][k] * inverse[k])
-        inverse.append(1 / (matrix[i, i] - _dot(scaled[i], lower[i])))
-        forward.append(right[i] - _dot(lower[i], forward))
+            LD[i].append(matrix[i, k] - _dot(LD[i], L[k]))
+            L[i].append(LD[i][k] * inverse[k])
+        inverse.append(1 / (matrix[i, i] - _dot(LD[i], L[i])))
+        forward.append(right[i] - _dot(L[i], forward))
     x = [f * d for f, d in zip(forward, inverse, strict=True)]
     for i in reversed(range(size)):
-        x[i] -= sum((lower[k][i] * x[k] for k in range(i + 1, size)), ca.SX(0))
+        x[i] -= sum((L[k][i] * x[k] for k in range(i + 1, size)), ca.SX(0))
     return ca.vertcat(*x)
 
 

@@ -36,11 +36,12 @@ COMPONENT = Component(
 
 def markers(m: Model) -> tuple[SX, SX]:
     """Exact positions of the markers in the camera frame, two columns."""
-    pose = ca.vertcat(m.input(X), m.input(Y), m.input(PHI))
+    u = m.inputs(X, Y, PHI)
+    p = m.parameters(PHI_FRAME, X_B, Y_B, X_FRAME, Y_FRAME)
+    pose = ca.vertcat(u.x, u.y, u.phi)
     pose += m.balance("pose", "pose", value=pose).effort
-    phi_frame = m.parameter(PHI_FRAME)
-    x, y = rotated(pose[2], m.parameter(X_B), m.parameter(Y_B))
-    x, y = rotated(phi_frame, pose[0] + x, pose[1] + y)
-    x, y = x + m.parameter(X_FRAME), y + m.parameter(Y_FRAME)
+    x, y = rotated(pose[2], p.x_b, p.y_b)
+    x, y = rotated(p.phi_frame, pose[0] + x, pose[1] + y)
+    x, y = x + p.x_frame, y + p.y_frame
     scale = 1 + m.balance("scale", "scale", unit="1", value=ca.SX(1)).effort
     return scale * x, scale * y

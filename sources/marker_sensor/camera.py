@@ -13,12 +13,14 @@ Source: rig sheet crawler; crawler paper (resolution 0.02 mm).
 
 from __future__ import annotations
 
+from .. import marker_sensor as qs
+from ..component import Fidelity
 from ..laws.noise import RANDOM, Random, seed_quantity
 from ..model import Model
 from ..quantity import Quantity
-from . import MARKERS, X_M, Y_M, markers
+from . import MARKERS, markers
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 T = Quantity("T", "s", "sample period", 0.02, minimum=1e-6, variability="fixed")
 SIGMA = Quantity("sigma", "m", "standard deviation of each coordinate", 1e-4, minimum=0.0)
 DRAWN = Quantity("drawn", "1", "noise of the present sample", size=2 * MARKERS)
@@ -27,11 +29,11 @@ DRAWN = Quantity("drawn", "1", "noise of the present sample", size=2 * MARKERS)
 def equations(m: Model) -> None:
     """Collect the equations."""
     x, y = markers(m)
-    sigma = m.parameter(SIGMA)
-    state, drawn = m.discrete(RANDOM), m.discrete(DRAWN)
-    random = Random(state, m.parameter(seed_quantity("marker_sensor")))
-    clock = m.clock("sample", m.parameter(T))
-    m.update(clock, drawn, random.normals(2 * MARKERS))
-    m.update(clock, state, random.state)
-    m.output(X_M, x + sigma * drawn[:MARKERS])
-    m.output(Y_M, y + sigma * drawn[MARKERS:])
+    p = m.parameters(SIGMA, seed_quantity("marker_sensor"), T)
+    z = m.discretes(RANDOM, DRAWN)
+    random = Random(z.random, p.seed)
+    clock = m.clock("sample", p.T)
+    m.update(clock, z.drawn, random.normals(2 * MARKERS))
+    m.update(clock, z.random, random.state)
+    m.output(qs.X_M, x + p.sigma * z.drawn[:MARKERS])
+    m.output(qs.Y_M, y + p.sigma * z.drawn[MARKERS:])

@@ -9,14 +9,16 @@ Source: rigid-body geometry; crawler paper (markers M1 to M5).
 
 from __future__ import annotations
 
+from .. import marker_sensor as qs
+from ..component import Fidelity
 from ..model import Model
-from . import X_M, Y_M, markers
+from . import markers
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
     x, y = markers(m)
-    m.output(X_M, x)
-    m.output(Y_M, y)
+    m.output(qs.X_M, x)
+    m.output(qs.Y_M, y)

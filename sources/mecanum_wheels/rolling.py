@@ -23,56 +23,47 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import mecanum_wheels as qs
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
-from ..model import Model
-from . import (
-    GAMMA,
-    LENGTH,
-    LOAD,
-    PHI,
-    POSE_PHI,
-    POSE_X,
-    POSE_Y,
-    V_X,
-    V_Y,
-    W_Z,
-    WIDTH,
-    R,
-    W,
-    X,
-    Y,
-)
+from ..model import SX, Model
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 FRONT = ca.DM([1, 1, -1, -1])
 LEFT = ca.DM([1, -1, 1, -1])
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    w = m.input(W)
-    w += m.balance("speeds", "signal", unit="rad/s", value=w).effort
-    r, gamma, load = (m.parameter(q) for q in (R, GAMMA, LOAD))
-    p_x, p_y = FRONT * m.parameter(LENGTH), LEFT * m.parameter(WIDTH)
-    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(4), roller=load).effort
-    cosine, sine = ca.repmat(ca.cos(gamma), 4), -FRONT * LEFT * ca.sin(gamma)
+    u = m.inputs(qs.W)
+    p = m.parameters(qs.R, qs.GAMMA, qs.LOAD, qs.LENGTH, qs.WIDTH)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
+    w = u.w + m.balance("speeds", "signal", unit="rad/s", value=u.w).effort
+    p_x, p_y = FRONT * p.length, LEFT * p.width
+    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(4), roller=p.load).effort
+    cosine, sine = ca.repmat(ca.cos(p.gamma), 4), -FRONT * LEFT * ca.sin(p.gamma)
 
-    def rows(x: ca.SX, y: ca.SX) -> ca.SX:
+    def rows(x: SX, y: SX) -> SX:
         """(x, y) . v_i as rows on (v_x, v_y, w_z)."""
         return ca.horzcat(x, y, p_x * y - p_y * x)
 
     along, across = rows(cosine, sine), rows(-sine, cosine)
-    weight = load / (ca.sum1(load) / 4)
+    total: SX = ca.sum1(p.load)
+    weight = p.load / (total / 4)
     matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
-    right = along.T @ (weight * cosine * r * w) - across.T @ (weight * drag * sine * r * w)
+    right = along.T @ (weight * cosine * p.r * w) - across.T @ (weight * drag * sine * p.r * w)
     v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, right))
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    x_rate, y_rate = rotated(phi, v_x, v_y)
-    m.derivative(x, x_rate)
-    m.derivative(y, y_rate)
-    m.derivative(phi, w_z)
-    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V_X, v_x), (V_Y, v_y), (W_Z, w_z)):
+    x_rate, y_rate = rotated(x.pose_phi, v_x, v_y)
+    m.derivative(x.pose_x, x_rate)
+    m.derivative(x.pose_y, y_rate)
+    m.derivative(x.pose_phi, w_z)
+    for quantity, value in (
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.V_X, v_x),
+        (qs.V_Y, v_y),
+        (qs.W_Z, w_z),
+    ):
         m.output(quantity, value)

@@ -17,37 +17,15 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import mobile_base as qs
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from ..wheel_contact import R
-from . import (
-    AXLE_L,
-    AXLE_R,
-    J_L,
-    J_R,
-    PHI,
-    PHI_L,
-    PHI_R,
-    POSE_PHI,
-    POSE_X,
-    POSE_Y,
-    TAU_L,
-    TAU_R,
-    TRACK,
-    W_L,
-    W_R,
-    W_Z,
-    V,
-    X,
-    Y,
-    Z,
-)
 from .mount import read_mount, write_planar_motion
 from .wheels import wheel_parameter
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-3))
 J_EQ = Quantity(
     "J_eq",
     "kg.m2",
@@ -65,43 +43,46 @@ SPEED_R = Quantity("speed_r", "rad/s", "state: speed of the right drive wheel")
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount = read_mount(m)
-    radius, track, inertia = wheel_parameter(m, R), m.parameter(TRACK), m.parameter(J_EQ)
+    r = wheel_parameter(m, R)
+    p = m.parameters(qs.TRACK, J_EQ)
 
     def wheel(
         name: str, torque: Quantity, added: Quantity, angle: Quantity, speed: Quantity
     ) -> tuple[SX, SX, SX, SX]:
         tau, carried = m.input(torque), m.input(added)
         phi, w = m.state(angle), m.state(speed)
-        axle = m.balance(name, "rotation", velocity=w, angle=phi, load=tau, radius=radius)
-        acceleration = (tau + axle.effort) / (inertia + carried)
+        axle = m.balance(name, "rotation", velocity=w, angle=phi, load=tau, radius=r)
+        acceleration = (tau + axle.effort) / (p.J_eq + carried)
         m.derivative(phi, w)
         m.derivative(w, acceleration)
-        m.stored_energy((inertia + carried) * w**2 / 2)
+        m.stored_energy((p.J_eq + carried) * w**2 / 2)
         return tau, phi, w, acceleration
 
-    tau_l, phi_l, w_l, alpha_l = wheel("left_axle", TAU_L, J_L, ANGLE_L, SPEED_L)
-    tau_r, phi_r, w_r, alpha_r = wheel("right_axle", TAU_R, J_R, ANGLE_R, SPEED_R)
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    v, w_z = radius * (w_r + w_l) / 2, radius * (w_r - w_l) / track
-    m.derivative(x, v * ca.cos(phi))
-    m.derivative(y, v * ca.sin(phi))
-    m.derivative(phi, w_z)
+    tau_l, phi_l, w_l, alpha_l = wheel("left_axle", qs.TAU_L, qs.J_L, ANGLE_L, SPEED_L)
+    tau_r, phi_r, w_r, alpha_r = wheel("right_axle", qs.TAU_R, qs.J_R, ANGLE_R, SPEED_R)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
+    v, w_z = r * (w_r + w_l) / 2, r * (w_r - w_l) / p.track
+    m.derivative(x.pose_x, v * ca.cos(x.pose_phi))
+    m.derivative(x.pose_y, v * ca.sin(x.pose_phi))
+    m.derivative(x.pose_phi, w_z)
 
     for quantity, value in (
-        (X, x),
-        (Y, y),
-        (PHI, phi),
-        (Z, radius),
-        (V, v),
-        (W_Z, w_z),
-        (W_L, w_l),
-        (W_R, w_r),
-        (PHI_L, phi_l),
-        (PHI_R, phi_r),
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.Z, r),
+        (qs.V, v),
+        (qs.W_Z, w_z),
+        (qs.W_L, w_l),
+        (qs.W_R, w_r),
+        (qs.PHI_L, phi_l),
+        (qs.PHI_R, phi_r),
     ):
         m.output(quantity, value)
-    forward = radius * (alpha_r + alpha_l) / 2
-    turning = radius * (alpha_r - alpha_l) / track
-    write_planar_motion(m, mount, (x, y, phi), (v, 0, w_z), (forward, w_z * v, turning))
-    m.port(AXLE_L, tau_l, w_l)
-    m.port(AXLE_R, tau_r, w_r)
+    forward = r * (alpha_r + alpha_l) / 2
+    turning = r * (alpha_r - alpha_l) / p.track
+    write_planar_motion(
+        m, mount, (x.pose_x, x.pose_y, x.pose_phi), (v, 0, w_z), (forward, w_z * v, turning)
+    )
+    m.port(qs.AXLE_L, tau_l, w_l)
+    m.port(qs.AXLE_R, tau_r, w_r)

@@ -11,22 +11,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from .. import mobile_base as qs
 from ..laws.planar_frame import rotated
 from ..laws.symmetric import unpack
 from ..model import SX, Model
-from . import (
-    ARM_BIAS,
-    ARM_INERTIA,
-    MOUNT_ACCELERATION,
-    MOUNT_ANGULAR_ACCELERATION,
-    MOUNT_POSITION,
-    MOUNT_QUATERNION,
-    MOUNT_RATE,
-    MOUNT_VELOCITY,
-    MOUNT_X,
-    MOUNT_Y,
-    MOUNT_Z,
-)
 
 
 @dataclass(frozen=True)
@@ -61,9 +49,10 @@ class Mount:
 
 def read_mount(m: Model) -> Mount:
     """Declare the inputs of the arm and the place of its mount."""
-    inertia = unpack(m.input(ARM_INERTIA), 6)
-    bias = m.input(ARM_BIAS)
-    return Mount(m.parameter(MOUNT_X), m.parameter(MOUNT_Y), m.parameter(MOUNT_Z), inertia, bias)
+    u = m.inputs(qs.ARM_INERTIA, qs.ARM_BIAS)
+    p = m.parameters(qs.MOUNT_X, qs.MOUNT_Y, qs.MOUNT_Z)
+    inertia = unpack(u.arm_inertia, 6)
+    return Mount(p.mount_x, p.mount_y, p.mount_z, inertia, u.arm_bias)
 
 
 def write_motion(
@@ -76,12 +65,12 @@ def write_motion(
     angular: SX,
 ) -> None:
     """Declare the outputs for the arm."""
-    m.output(MOUNT_POSITION, position)
-    m.output(MOUNT_QUATERNION, quaternion)
-    m.output(MOUNT_VELOCITY, velocity)
-    m.output(MOUNT_RATE, rate)
-    m.output(MOUNT_ACCELERATION, acceleration)
-    m.output(MOUNT_ANGULAR_ACCELERATION, angular)
+    m.output(qs.MOUNT_POSITION, position)
+    m.output(qs.MOUNT_QUATERNION, quaternion)
+    m.output(qs.MOUNT_VELOCITY, velocity)
+    m.output(qs.MOUNT_RATE, rate)
+    m.output(qs.MOUNT_ACCELERATION, acceleration)
+    m.output(qs.MOUNT_ANGULAR_ACCELERATION, angular)
 
 
 def write_planar_motion(

@@ -24,44 +24,22 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import mobile_base as qs
+from ..component import Fidelity, Solver
 from ..declarations import ModelError
 from ..laws import planar_body
 from ..laws.symmetric import solve
 from ..model import SX, Balance, Model
 from ..quantity import Quantity
-from . import (
-    PHI,
-    POSE_PHI,
-    POSE_X,
-    POSE_Y,
-    W_Z,
-    V,
-    X,
-    Y,
-    Z,
-)
-from .body import (
-    CABINET_I_ZZ,
-    CABINET_MASS,
-    COM_X,
-    COM_Y,
-    DRIVE_INERTIA,
-    DRIVE_MASS,
-    GRAVITY,
-    I_ZZ,
-    MASS,
-    V_Y,
-    VEL_X,
-    VEL_Y,
-    YAW_RATE,
-)
+from . import body as bs
 from .mount import Mount, read_mount, write_planar_motion
 from .wheels import Drive, Places, add_wheels, read_caster_mass, read_places, write_wheels
 
-LEVEL = 1
-SOLVER = Solver("rosw3_adaptive", 1e-3, 1e-5)
-SLOTS = {"wheel_contact": "stick_slip", "caster": "swivel"}
+FIDELITY = Fidelity(
+    level=1,
+    solver=Solver("rosw3_adaptive", 1e-3, 1e-5),
+    slots={"wheel_contact": "stick_slip", "caster": "swivel"},
+)
 PRELOAD = Quantity(
     "preload", "N", "load of a drive wheel that does not depend on the weight", minimum=0.0
 )
@@ -82,33 +60,42 @@ def equations(m: Model) -> None:
             "the wheel's height, which a planar base does not move; take stick_slip, or six_dof"
         )
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
-    mass, com = m.parameter(MASS), ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), 0)
+    p = m.parameters(
+        bs.MASS,
+        bs.COM_X,
+        bs.COM_Y,
+        bs.CABINET_MASS,
+        bs.DRIVE_MASS,
+        bs.I_ZZ,
+        bs.CABINET_I_ZZ,
+        bs.DRIVE_INERTIA,
+    )
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI, bs.VEL_X, bs.VEL_Y, bs.YAW_RATE)
+    com = ca.vertcat(p.com_x, p.com_y, 0)
     com += m.balance("load", "position", value=com).effort
-    cabinet, drive_mass = m.parameter(CABINET_MASS), m.parameter(DRIVE_MASS)
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    v_x, v_y, w = m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE)
+    w = x.yaw_rate
 
     # without the casters, which count their own kinetic energy
-    own = mass + cabinet + 2 * drive_mass
-    s_x, s_y = mass * com[0], mass * com[1]
+    own = p.mass + p.cabinet_mass + 2 * p.drive_mass
+    s_x, s_y = p.mass * com[0], p.mass * com[1]
     yaw = (
-        m.parameter(I_ZZ)
-        + mass * (com[0] ** 2 + com[1] ** 2)
-        + m.parameter(CABINET_I_ZZ)
-        + 2 * (m.parameter(DRIVE_INERTIA) + drive_mass * places.half_track**2)
+        p.I_zz
+        + p.mass * (com[0] ** 2 + com[1] ** 2)
+        + p.cabinet_I_zz
+        + 2 * (p.drive_inertia + p.drive_mass * places.half_track**2)
     )
     carried = 4 * caster_mass
-    cos, sin = ca.cos(phi), ca.sin(phi)
+    cos, sin = ca.cos(x.pose_phi), ca.sin(x.pose_phi)
     body = m.balance(
         "body",
         "body",
-        velocity=ca.vertcat(v_x, v_y, 0),
+        velocity=ca.vertcat(x.vel_x, x.vel_y, 0),
         rate=ca.vertcat(0, 0, w),
-        gravity=ca.vertcat(0, 0, -GRAVITY),
-        position=ca.vertcat(x, y, places.radius),
+        gravity=ca.vertcat(0, 0, -bs.GRAVITY),
+        position=ca.vertcat(x.pose_x, x.pose_y, places.radius),
         rotation=ca.vertcat(ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)),
-        mass=own + carried + mount.weight / GRAVITY,
-        first_moment=ca.vertcat(s_x, s_y, 0) + mount.weight_moment / GRAVITY,
+        mass=own + carried + mount.weight / bs.GRAVITY,
+        first_moment=ca.vertcat(s_x, s_y, 0) + mount.weight_moment / bs.GRAVITY,
     )
     own += body.mass
     s_x, s_y = s_x + body.first_moment[0], s_y + body.first_moment[1]
@@ -116,8 +103,10 @@ def equations(m: Model) -> None:
 
     loads = _loads(m, mount, places, own + carried, s_x, s_y, body)
     drives = (Drive(loads[0], places.radius), Drive(loads[1], places.radius))
-    wheels = add_wheels(m, places, (x, y, phi), (v_x, v_y, w), drives, loads[2:])
-    m.eliminate_last(x, y, phi, v_x, v_y, w)
+    wheels = add_wheels(
+        m, places, (x.pose_x, x.pose_y, x.pose_phi), (x.vel_x, x.vel_y, w), drives, loads[2:]
+    )
+    m.eliminate_last(x.pose_x, x.pose_y, x.pose_phi, x.vel_x, x.vel_y, w)
 
     total = own + carried
     inertia = yaw + carried * (places.x**2 + places.y**2)
@@ -125,7 +114,7 @@ def equations(m: Model) -> None:
         ca.horzcat(total, 0, -s_y), ca.horzcat(0, total, s_x), ca.horzcat(-s_y, s_x, inertia)
     )
     # velocity components change by v' = a - w x v: their part of what the forks take off
-    turning = wheels.relief @ ca.vertcat(w * v_y, -w * v_x, 0)
+    turning = wheels.relief @ ca.vertcat(w * x.vel_y, -w * x.vel_x, 0)
     # rates of O and body to the mount's: [a_m; alpha] = reach [a; alpha] - w^2 (r, 0)
     reach = ca.SX.eye(3)
     reach[0, 2], reach[1, 2] = -mount.y, mount.x
@@ -141,26 +130,28 @@ def equations(m: Model) -> None:
         - reach.T @ arm_bias
     )
     a = solve(rigid + reach.T @ arm @ reach - wheels.relief, force)
-    m.derivative(v_x, a[0] + w * v_y)
-    m.derivative(v_y, a[1] - w * v_x)
+    m.derivative(x.vel_x, a[0] + w * x.vel_y)
+    m.derivative(x.vel_y, a[1] - w * x.vel_x)
     m.derivative(w, a[2])
-    m.derivative(x, cos * v_x - sin * v_y)
-    m.derivative(y, sin * v_x + cos * v_y)
-    m.derivative(phi, w)
+    m.derivative(x.pose_x, cos * x.vel_x - sin * x.vel_y)
+    m.derivative(x.pose_y, sin * x.vel_x + cos * x.vel_y)
+    m.derivative(x.pose_phi, w)
 
     write_wheels(m, wheels, loads)
     for quantity, value in (
-        (X, x),
-        (Y, y),
-        (PHI, phi),
-        (Z, places.radius),
-        (V, v_x),
-        (V_Y, v_y),
-        (W_Z, w),
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.Z, places.radius),
+        (qs.V, x.vel_x),
+        (bs.V_Y, x.vel_y),
+        (qs.W_Z, w),
     ):
         m.output(quantity, value)
-    v_mx, v_my = write_planar_motion(m, mount, (x, y, phi), (v_x, v_y, w), (a[0], a[1], a[2]))
-    m.stored_energy(planar_body.kinetic_energy(own, s_x, s_y, yaw, v_x, v_y, w))
+    v_mx, v_my = write_planar_motion(
+        m, mount, (x.pose_x, x.pose_y, x.pose_phi), (x.vel_x, x.vel_y, w), (a[0], a[1], a[2])
+    )
+    m.stored_energy(planar_body.kinetic_energy(own, s_x, s_y, yaw, x.vel_x, x.vel_y, w))
     wrench = arm @ (reach @ a) + arm_bias
     m.supply(-(wrench[0] * v_mx + wrench[1] * v_my + wrench[2] * w))
 
@@ -169,26 +160,28 @@ def _loads(
     m: Model, mount: Mount, places: Places, mass: SX, s_x: SX, s_y: SX, body: Balance
 ) -> list[SX]:
     """Wheel loads left, right, and of the casters."""
-    preload, share = m.parameter(PRELOAD), m.parameter(SHARE)
+    p = m.parameters(PRELOAD, SHARE)
     f, n = body.effort[:3], body.effort[3:]
     force, moment = mount.bias[:3], mount.bias[3:]
-    weight = GRAVITY * mass - f[2] + force[2]
+    weight = bs.GRAVITY * mass - f[2] + force[2]
     height = mount.height
     m_x = (
         n[0]
         - places.radius * f[1]
-        - GRAVITY * s_y
+        - bs.GRAVITY * s_y
         - (moment[0] + mount.y * force[2] - height * force[1])
     )
     m_y = (
         n[1]
         + places.radius * f[0]
-        + GRAVITY * s_x
+        + bs.GRAVITY * s_x
         - (moment[1] + height * force[0] - mount.x * force[2])
     )
-    level = (weight - 2 * preload) / (4 + 2 * share)
+    level = (weight - 2 * p.preload) / (4 + 2 * p.share)
     pitch = m_y / (4 * places.x**2)
-    roll = -m_x / (4 * places.y**2 + 2 * share * places.half_track**2)
-    drives = [preload + share * (level + roll * y) for y in (places.half_track, -places.half_track)]
+    roll = -m_x / (4 * places.y**2 + 2 * p.share * places.half_track**2)
+    drives = [
+        p.preload + p.share * (level + roll * y) for y in (places.half_track, -places.half_track)
+    ]
     casters = [level + pitch * x + roll * y for x, y in places.casters]
     return [ca.fmax(0, load) for load in (*drives, *casters)]

@@ -12,13 +12,15 @@ Source: digital twin paper, MiR250 model in Simscape Multibody.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from .spatial_body import spatial_body
 
-LEVEL = 2
-SOLVER = Solver("rosw3_adaptive", 1e-3, 1e-5)
-SLOTS = {"wheel_contact": "spatial", "caster": "swivel"}
+FIDELITY = Fidelity(
+    level=2,
+    solver=Solver("rosw3_adaptive", 1e-3, 1e-5),
+    slots={"wheel_contact": "spatial", "caster": "swivel"},
+)
 
 
 def equations(m: Model) -> None:

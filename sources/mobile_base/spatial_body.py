@@ -28,41 +28,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from .. import mobile_base as qs
 from ..caster.fork import R as CASTER_R
 from ..laws.contact import normal_force
 from ..laws.symmetric import solve
 from ..model import SX, Model
 from ..quantity import Quantity
 from ..wheel_contact.wheel import WIDTH, B, K
-from . import PHI, POSE_PHI, POSE_X, POSE_Y, W_Z, V, X, Y, Z
-from .body import (
-    CABINET_I_XX,
-    CABINET_I_YY,
-    CABINET_I_ZZ,
-    CABINET_MASS,
-    CABINET_Z,
-    CASTER_Z,
-    COM_X,
-    COM_Y,
-    COM_Z,
-    DRIVE_INERTIA,
-    DRIVE_MASS,
-    GRAVITY,
-    I_XX,
-    I_YY,
-    I_ZZ,
-    MASS,
-    PITCH,
-    PITCH_RATE,
-    POSE_Z,
-    ROLL,
-    ROLL_RATE,
-    V_Y,
-    VEL_X,
-    VEL_Y,
-    VEL_Z,
-    YAW_RATE,
-)
+from . import body as bs
 from .mount import read_mount, write_motion
 from .wheels import (
     CASTERS,
@@ -143,23 +116,34 @@ def _ring(mass: SX, count: int, x: SX, y: SX, z: SX) -> _Mass:
 def _base_mass(m: Model, places: Places) -> _Mass:
     """Body and cabinet, with the drive wheels' inertia about their own centres."""
     r = places.radius
-    com = ca.vertcat(m.parameter(COM_X), m.parameter(COM_Y), m.parameter(COM_Z) - r)
+    p = m.parameters(
+        bs.COM_X,
+        bs.COM_Y,
+        bs.COM_Z,
+        bs.MASS,
+        bs.I_XX,
+        bs.I_YY,
+        bs.I_ZZ,
+        bs.CABINET_MASS,
+        bs.CABINET_Z,
+        bs.CABINET_I_XX,
+        bs.CABINET_I_YY,
+        bs.CABINET_I_ZZ,
+        bs.DRIVE_INERTIA,
+    )
+    com = ca.vertcat(p.com_x, p.com_y, p.com_z - r)
     load = m.balance("load", "position", value=com)
     body = _at(
-        m.parameter(MASS),
+        p.mass,
         com + load.effort,
-        ca.diag(ca.vertcat(m.parameter(I_XX), m.parameter(I_YY), m.parameter(I_ZZ))),
+        ca.diag(ca.vertcat(p.I_xx, p.I_yy, p.I_zz)),
     )
     cabinet = _at(
-        m.parameter(CABINET_MASS),
-        ca.vertcat(0, 0, m.parameter(CABINET_Z) - r),
-        ca.diag(
-            ca.vertcat(
-                m.parameter(CABINET_I_XX), m.parameter(CABINET_I_YY), m.parameter(CABINET_I_ZZ)
-            )
-        ),
+        p.cabinet_mass,
+        ca.vertcat(0, 0, p.cabinet_z - r),
+        ca.diag(ca.vertcat(p.cabinet_I_xx, p.cabinet_I_yy, p.cabinet_I_zz)),
     )
-    transverse = 2 * m.parameter(DRIVE_INERTIA)
+    transverse = 2 * p.drive_inertia
     turning = _Mass(0, ca.SX.zeros(3), ca.diag(ca.vertcat(transverse, 0, transverse)))
     return body + cabinet + turning
 
@@ -168,20 +152,32 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     """Collect the equations."""
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
     r = places.radius
-    drive_mass = m.parameter(DRIVE_MASS)
-    unsprung = 2 * drive_mass if sprung else ca.SX(0)
+    p = m.parameters(bs.DRIVE_MASS)
+    x = m.states(
+        qs.POSE_X,
+        qs.POSE_Y,
+        qs.POSE_PHI,
+        bs.POSE_Z,
+        bs.PITCH,
+        bs.ROLL,
+        bs.VEL_X,
+        bs.VEL_Y,
+        bs.VEL_Z,
+        bs.ROLL_RATE,
+        bs.PITCH_RATE,
+        bs.YAW_RATE,
+    )
+    unsprung = 2 * p.drive_mass if sprung else ca.SX(0)
     base = _base_mass(m, places)
     if not sprung:
-        base += _ring(drive_mass, 2, 0, places.half_track, 0)
-    casters = _ring(caster_mass, 4, places.x, places.y, m.parameter(CASTER_Z) - r)
+        base += _ring(p.drive_mass, 2, 0, places.half_track, 0)
+    casters = _ring(caster_mass, 4, places.x, places.y, m.parameter(bs.CASTER_Z) - r)
 
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    z, pitch, roll = m.state(POSE_Z), m.state(PITCH), m.state(ROLL)
-    v: SX = ca.vertcat(m.state(VEL_X), m.state(VEL_Y), m.state(VEL_Z))
-    w: SX = ca.vertcat(m.state(ROLL_RATE), m.state(PITCH_RATE), m.state(YAW_RATE))
+    v: SX = ca.vertcat(x.vel_x, x.vel_y, x.vel_z)
+    w: SX = ca.vertcat(x.roll_rate, x.pitch_rate, x.yaw_rate)
 
-    c, s = ca.cos(phi), ca.sin(phi)
-    cp, sp, cr, sr = ca.cos(pitch), ca.sin(pitch), ca.cos(roll), ca.sin(roll)
+    c, s = ca.cos(x.pose_phi), ca.sin(x.pose_phi)
+    cp, sp, cr, sr = ca.cos(x.pitch), ca.sin(x.pitch), ca.cos(x.roll), ca.sin(x.roll)
     up = ca.vertcat(-sp, cp * sr, cp * cr)
     rotation = ca.vertcat(
         ca.horzcat(c * cp, c * sp * sr - s * cr, c * sp * cr + s * sr),
@@ -195,23 +191,23 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         "body",
         velocity=v,
         rate=w,
-        gravity=-GRAVITY * up,
-        position=ca.vertcat(x, y, z),
+        gravity=-bs.GRAVITY * up,
+        position=ca.vertcat(x.pose_x, x.pose_y, x.pose_z),
         rotation=rotation,
-        mass=plain.mass + unsprung + mount.weight / GRAVITY,
-        first_moment=plain.first + mount.weight_moment / GRAVITY,
+        mass=plain.mass + unsprung + mount.weight / bs.GRAVITY,
+        first_moment=plain.first + mount.weight_moment / bs.GRAVITY,
     )
     payload = _Mass(body.mass, body.first_moment, body.inertia)
     all_mass = plain + payload
 
-    legs = _Legs(m, places, up, z, v, w)
+    legs = _Legs(m, places, up, x.pose_z, v, w)
     drives = legs.sprung_drives() if sprung else legs.rigid_drives()
     u_x, u_y = v[0] - r * w[1], v[1] + r * w[0]
     u = (u_x, u_y, w[2])
     caster_loads, forks = legs.caster_loads(read_feet(m, places, u))
-    wheels = add_wheels(m, places, (x, y, phi), u, drives, caster_loads, forks)
-    legs.stand(wheels.lift, drive_mass)
-    m.eliminate_last(x, y, phi, z, pitch, roll, v, w)
+    wheels = add_wheels(m, places, (x.pose_x, x.pose_y, x.pose_phi), u, drives, caster_loads, forks)
+    legs.stand(wheels.lift, p.drive_mass)
+    m.eliminate_last(x.pose_x, x.pose_y, x.pose_phi, x.pose_z, x.pitch, x.roll, v, w)
 
     mu = ca.vertcat(mount.x, mount.y, mount.height - r)
     about = all_mass.about(mu)
@@ -230,7 +226,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         wheels.moment,
     ) - relief @ ca.vertcat(turning[0], turning[1], 0)
 
-    weight_force = -GRAVITY * up
+    weight_force = -bs.GRAVITY * up
     effort, moment = body.effort[:3], body.effort[3:]
     force = (
         all_mass.mass * weight_force
@@ -260,29 +256,29 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     m.derivative(v, a_m - turning - ca.cross(alpha, mu))
     m.derivative(w, alpha)
     velocity = rotation @ v
-    m.derivative(x, velocity[0])
-    m.derivative(y, velocity[1])
-    m.derivative(z, ca.dot(up, v))
+    m.derivative(x.pose_x, velocity[0])
+    m.derivative(x.pose_y, velocity[1])
+    m.derivative(x.pose_z, ca.dot(up, v))
     yaw = (w[1] * sr + w[2] * cr) / cp
-    m.derivative(phi, yaw)
-    m.derivative(pitch, w[1] * cr - w[2] * sr)
-    m.derivative(roll, w[0] + yaw * sp)
+    m.derivative(x.pose_phi, yaw)
+    m.derivative(x.pitch, w[1] * cr - w[2] * sr)
+    m.derivative(x.roll, w[0] + yaw * sp)
 
     for quantity, value in (
-        (X, x),
-        (Y, y),
-        (PHI, phi),
-        (Z, z),
-        (V, v[0]),
-        (V_Y, v[1]),
-        (W_Z, yaw),
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.Z, x.pose_z),
+        (qs.V, v[0]),
+        (bs.V_Y, v[1]),
+        (qs.W_Z, yaw),
     ):
         m.output(quantity, value)
     write_wheels(m, wheels, (*legs.lift, *caster_loads))
     write_motion(
         m,
-        ca.vertcat(x, y, z) + rotation @ mu,
-        _quaternion(phi, pitch, roll),
+        ca.vertcat(x.pose_x, x.pose_y, x.pose_z) + rotation @ mu,
+        _quaternion(x.pose_phi, x.pitch, x.roll),
         v_m,
         w,
         a_m,
@@ -292,7 +288,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     planar = (unsprung - 4 * caster_mass) * (u_x**2 + u_y**2)  # the casters count their own
     turn = (unsprung * half**2 - 4 * caster_mass * spread) * w[2] ** 2
     m.stored_energy(all_mass.energy(v, w) + (planar + turn) / 2)
-    m.stored_energy(GRAVITY * (all_mass.mass * z + ca.dot(up, all_mass.first)))
+    m.stored_energy(bs.GRAVITY * (all_mass.mass * x.pose_z + ca.dot(up, all_mass.first)))
     wrench = mount.inertia @ q + mount.bias
     m.supply(-ca.dot(wrench[:3], v_m) - ca.dot(wrench[3:], w))
 
@@ -374,19 +370,19 @@ class _Legs:
     def sprung_drives(self) -> tuple[Drive, Drive]:
         """Drive wheels on springs, with states of their own."""
         m = self._m
-        k, d, preload = m.parameter(SPRING), m.parameter(DAMPER), m.parameter(SPRING_PRELOAD)
+        p = m.parameters(SPRING, DAMPER, SPRING_PRELOAD)
         drives, springs = [], []
-        for name, p, travelled, climbing in zip(
+        for name, seat, travelled, climbing in zip(
             ("left", "right"), self._seats, (TRAVEL_L, TRAVEL_R), (CLIMB_L, CLIMB_R), strict=True
         ):
             h, c = m.state(travelled), m.state(climbing)
-            rate = c - self._rise(p)
+            rate = c - self._rise(seat)
             m.derivative(h, rate)
-            height = self._height(p) + h
+            height = self._height(seat) + h
             drives.append(self._drive(name, height, c))
-            springs.append(preload + k * h + d * rate)
-            m.stored_energy((preload + k * h / 2) * h)
-            m.loss(f"{name}.damper", d * rate**2)
+            springs.append(p.spring_preload + p.spring * h + p.damper * rate)
+            m.stored_energy((p.spring_preload + p.spring * h / 2) * h)
+            m.loss(f"{name}.damper", p.damper * rate**2)
             self._moving.append((c, height))
         self._springs = tuple(springs)
         return drives[0], drives[1]
@@ -401,8 +397,8 @@ class _Legs:
         """Let the drive wheels push: the normal forces, or the springs between."""
         if self._springs:
             for (c, height), f_n, spring in zip(self._moving, contact, self._springs, strict=True):
-                self._m.derivative(c, (f_n - spring) / mass - GRAVITY)
-                self._m.stored_energy(mass * (c**2 / 2 + GRAVITY * height))
+                self._m.derivative(c, (f_n - spring) / mass - bs.GRAVITY)
+                self._m.stored_energy(mass * (c**2 / 2 + bs.GRAVITY * height))
             self.lift = (self._springs[0], self._springs[1])
         else:
             self.lift = contact

@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from .. import mobile_base as qs
 from ..caster import M_F, M_W
 from ..caster.fork import MOMENTUM, SPIN, SWIVEL_ANGLE, Swing
 from ..laws.planar_frame import rotated
@@ -15,19 +16,6 @@ from ..model import SX, Model
 from ..quantity import Quantity
 from ..variant import device_values, devices, fidelity
 from ..wheel_contact import R
-from . import (
-    AXLE_L,
-    AXLE_R,
-    J_L,
-    J_R,
-    PHI_L,
-    PHI_R,
-    TAU_L,
-    TAU_R,
-    TRACK,
-    W_L,
-    W_R,
-)
 from .body import LOADS
 
 CASTER_X = Quantity(
@@ -143,9 +131,9 @@ def _shared(m: Model, component: str, prefix: str, quantity: Quantity) -> SX:
 
 def read_places(m: Model) -> Places:
     """Declare where the wheels are."""
-    return Places(
-        wheel_parameter(m, R), m.parameter(TRACK) / 2, m.parameter(CASTER_X), m.parameter(CASTER_Y)
-    )
+    radius = wheel_parameter(m, R)
+    p = m.parameters(qs.TRACK, CASTER_X, CASTER_Y)
+    return Places(radius, p.track / 2, p.caster_x, p.caster_y)
 
 
 def read_caster_mass(m: Model) -> SX:
@@ -205,11 +193,11 @@ def add_wheels(
     lift, torques, speeds, angles, psi = [], [], [], [], []
 
     slot = m.slots["wheel_contact"]
-    component, equations, _ = fidelity("wheel_contact", slot)
+    component, equations = fidelity("wheel_contact", slot)
     values = part_values(m, "wheel_contact")
     for name, side, tau, added, drive in (
-        ("left", 1, TAU_L, J_L, drives[0]),
-        ("right", -1, TAU_R, J_R, drives[1]),
+        ("left", 1, qs.TAU_L, qs.J_L, drives[0]),
+        ("right", -1, qs.TAU_R, qs.J_R, drives[1]),
     ):
         p_y = side * places.half_track
         d_x, d_y = rotated(phi, 0, p_y)
@@ -242,7 +230,7 @@ def add_wheels(
         angles.append(out["phi"])
 
     slot = m.slots["caster"]
-    component, equations, _ = fidelity("caster", slot)
+    component, equations = fidelity("caster", slot)
     values = part_values(m, "caster")
     relief = ca.SX.zeros(3, 3)
     for (name, _, _), (p_x, p_y), load, torque in zip(
@@ -299,9 +287,9 @@ def add_wheels(
 def write_wheels(m: Model, wheels: Wheels, loads: Sequence[SX]) -> None:
     """Declare the outputs of the wheels and bind their axles."""
     (w_l, w_r), (phi_l, phi_r) = wheels.speeds, wheels.angles
-    for quantity, value in ((W_L, w_l), (W_R, w_r), (PHI_L, phi_l), (PHI_R, phi_r)):
+    for quantity, value in ((qs.W_L, w_l), (qs.W_R, w_r), (qs.PHI_L, phi_l), (qs.PHI_R, phi_r)):
         m.output(quantity, value)
     m.output(PSI, wheels.psi)
     m.output(LOADS, ca.vertcat(*loads))
-    m.port(AXLE_L, wheels.torques[0], w_l)
-    m.port(AXLE_R, wheels.torques[1], w_r)
+    m.port(qs.AXLE_L, wheels.torques[0], w_l)
+    m.port(qs.AXLE_R, wheels.torques[1], w_r)

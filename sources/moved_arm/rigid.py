@@ -19,37 +19,13 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from .. import moved_arm as qs
+from ..component import Fidelity, Solver
 from ..laws.rigid_chain import Chain, Posture, standard_dh
 from ..model import SX, Model
-from . import (
-    F_0,
-    F_C,
-    F_V,
-    GAIN,
-    GRAVITY,
-    H_X,
-    H_Y,
-    H_Z,
-    J_M,
-    J_XX,
-    J_XY,
-    J_XZ,
-    J_YY,
-    J_YZ,
-    J_ZZ,
-    JOINT,
-    QD,
-    QDD,
-    TAU,
-    W_0,
-    I,
-    Q,
-)
 
-LEVEL = 0
 # No states of its own; bristles that stick within 0.1 mrad need short steps.
-SOLVER = Solver("rodas3", 1e-4)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-4))
 
 
 def chain(m: Model) -> Chain:
@@ -57,53 +33,52 @@ def chain(m: Model) -> Chain:
     mass = m.constant("mass")
     nothing = [[0.0] * 3] * 6, [[0.0] * 6] * 6
     bare = standard_dh(m.constant("d"), m.constant("a"), m.constant("alpha"), mass, *nothing)
-    x, y, z = (m.parameter(quantity) for quantity in (H_X, H_Y, H_Z))
-    xx, yy, zz = (m.parameter(quantity) for quantity in (J_XX, J_YY, J_ZZ))
-    xy, xz, yz = (m.parameter(quantity) for quantity in (J_XY, J_XZ, J_YZ))
+    p = m.parameters(qs.H_X, qs.H_Y, qs.H_Z, qs.J_XX, qs.J_YY, qs.J_ZZ, qs.J_XY, qs.J_XZ, qs.J_YZ)
     links = []
     for k, link in enumerate(bare.links):
         inertia = ca.vertcat(
-            ca.horzcat(xx[k], xy[k], xz[k]),
-            ca.horzcat(xy[k], yy[k], yz[k]),
-            ca.horzcat(xz[k], yz[k], zz[k]),
+            ca.horzcat(p.J_xx[k], p.J_xy[k], p.J_xz[k]),
+            ca.horzcat(p.J_xy[k], p.J_yy[k], p.J_yz[k]),
+            ca.horzcat(p.J_xz[k], p.J_yz[k], p.J_zz[k]),
         )
-        moment = ca.vertcat(x[k], y[k], z[k])
+        moment = ca.vertcat(p.h_x[k], p.h_y[k], p.h_z[k])
         links.append(replace(link, first_moment=moment, inertia=inertia))
     return replace(bare, links=tuple(links))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    q, qd, qdd = m.input(Q), m.input(QD), m.input(QDD)
-    m.input_rate(q, qd)
-    m.input_rate(qd, qdd)
-    posture, zero = Posture(chain(m), q), ca.SX.zeros(3)
-    gravity = m.parameter(GRAVITY)
+    u = m.inputs(qs.Q, qs.QD, qs.QDD)
+    m.input_rate(u.q, u.qd)
+    m.input_rate(u.qd, u.qdd)
+    posture, zero = Posture(chain(m), u.q), ca.SX.zeros(3)
+    p = m.parameters(qs.GRAVITY, qs.J_M, qs.F_C, qs.W_0, qs.F_0, qs.F_V, qs.GAIN)
     moving, _ = posture.inverse_dynamics(
-        qd,
-        qdd,
+        u.qd,
+        u.qdd,
         base_rate=zero,
-        base_acceleration=ca.vertcat(0, 0, gravity),
+        base_acceleration=ca.vertcat(0, 0, p.gravity),
         base_angular_acceleration=zero,
     )
-    rotor = m.parameter(J_M)
-    dry = m.parameter(F_C) * ca.tanh(qd / m.parameter(W_0)) + m.parameter(F_0)
-    friction = m.parameter(F_V) * qd + dry
-    load: SX = moving + rotor * qdd
-    effects = m.balance("joint", "rotation", velocity=qd, angle=q, load=load).effort
+    dry = p.F_c * ca.tanh(u.qd / p.w_0) + p.F_0
+    friction = p.F_v * u.qd + dry
+    load: SX = moving + p.J_m * u.qdd
+    effects = m.balance("joint", "rotation", velocity=u.qd, angle=u.q, load=load).effort
     effects += ca.vertcat(
         *[
-            m.balance(f"joint_{k + 1}", "rotation", velocity=qd[k], angle=q[k], load=load[k]).effort
+            m.balance(
+                f"joint_{k + 1}", "rotation", velocity=u.qd[k], angle=u.q[k], load=load[k]
+            ).effort
             for k in range(6)
         ]
     )
     torque = load + friction - effects
-    m.output(TAU, torque)
-    m.output(I, torque / m.parameter(GAIN))
-    m.port(JOINT, torque, qd)
-    rates = posture.rates(qd, zero)
+    m.output(qs.TAU, torque)
+    m.output(qs.I, torque / p.K)
+    m.port(qs.JOINT, torque, u.qd)
+    rates = posture.rates(u.qd, zero)
     velocities = posture.velocities(rates, zero, zero)
     height = posture.mass_properties().first_moment[2]
     kinetic = posture.kinetic_energy(rates, velocities)
-    m.stored_energy(kinetic + gravity * height + ca.dot(rotor, qd**2) / 2)
-    m.loss("friction", ca.dot(friction, qd))
+    m.stored_energy(kinetic + p.gravity * height + ca.dot(p.J_m, u.qd**2) / 2)
+    m.loss("friction", ca.dot(friction, u.qd))

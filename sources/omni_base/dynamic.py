@@ -16,14 +16,13 @@ Source: omnidirectional base paper, Eq 20 to 34 and 45 to 48 (Eq 47 and 48 corre
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..model import Model
 from .platform import finish, forces, geometry, motion_states
 from .rigid_body import joint_map, kinetic_energy, reduced
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from .platform import finish, forces, geometry, motion_states
 from .rigid_body import joint_map, mean_inertia
 
-LEVEL = 0
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:

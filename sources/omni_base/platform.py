@@ -6,32 +6,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import omni_base as qs
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import (
-    BETA,
-    BETA_RATE,
-    PHI,
-    PHI_RATE,
-    POSE_THETA,
-    POSE_X,
-    POSE_Y,
-    ROLLING,
-    ROLLING_ANGLE,
-    STEERING,
-    STEERING_ANGLE,
-    TAU_BETA,
-    TAU_PHI,
-    THETA,
-    THETA_RATE,
-    VEL_X,
-    VEL_Y,
-    X_RATE,
-    Y_RATE,
-    YAW_RATE,
-    X,
-    Y,
-)
 from .rigid_body import Geometry, Masses, rotation
 
 L_A = Quantity(
@@ -87,19 +64,34 @@ class Motion(NamedTuple):
 
 def motion_states(m: Model) -> Motion:
     """Declare the states that every fidelity has."""
-    beta, phi = m.state(STEERING_ANGLE), m.state(ROLLING_ANGLE)
-    x, y, theta = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_THETA)
-    rates = ca.vertcat(m.state(VEL_X), m.state(VEL_Y), m.state(YAW_RATE))
-    to_platform = rotation(theta)
-    return Motion(x, y, theta, beta, phi, rates, to_platform @ rates, to_platform)
+    x = m.states(
+        qs.STEERING_ANGLE,
+        qs.ROLLING_ANGLE,
+        qs.POSE_X,
+        qs.POSE_Y,
+        qs.POSE_THETA,
+        qs.VEL_X,
+        qs.VEL_Y,
+        qs.YAW_RATE,
+    )
+    rates = ca.vertcat(x.vel_x, x.vel_y, x.yaw_rate)
+    to_platform = rotation(x.pose_theta)
+    return Motion(
+        x.pose_x,
+        x.pose_y,
+        x.pose_theta,
+        x.steering_angle,
+        x.rolling_angle,
+        rates,
+        to_platform @ rates,
+        to_platform,
+    )
 
 
 def geometry(m: Model) -> Geometry:
     """Declare the geometry."""
-    distance, direction = m.parameter(L_A), m.parameter(ALPHA_A)
-    return Geometry(
-        distance * ca.cos(direction), distance * ca.sin(direction), m.parameter(E), m.parameter(R)
-    )
+    p = m.parameters(L_A, ALPHA_A, E, R)
+    return Geometry(p.l_A * ca.cos(p.alpha_A), p.l_A * ca.sin(p.alpha_A), p.e, p.r)
 
 
 class Forces(NamedTuple):
@@ -119,52 +111,49 @@ def forces(
     Axle friction is f_s tanh(q'/w_0) + f_v q' on all six axles. Each wheel carries a third of the
     weight.
     """
-    tau_beta, tau_phi = m.input(TAU_BETA), m.input(TAU_PHI)
-    m_p, m_w, d = m.parameter(M_P), m.parameter(M_W), m.parameter(D)
-    i_p, i_s, i_phi = m.parameter(I_P), m.parameter(I_S), m.parameter(I_PHI)
-    x_g, y_g, gravity = m.parameter(X_G), m.parameter(Y_G), m.parameter(GRAVITY)
-    f_s, f_v, w_0 = m.parameter(F_S), m.parameter(F_V), m.parameter(W_0)
+    u = m.inputs(qs.TAU_BETA, qs.TAU_PHI)
+    p = m.parameters(M_P, M_W, D, I_P, I_S, I_PHI, X_G, Y_G, GRAVITY, F_S, F_V, W_0)
 
-    load = m.balance("load", "position", value=ca.vertcat(x_g, y_g, 0))
-    centre = ca.vertcat(x_g, y_g, 0) + load.effort
+    load = m.balance("load", "position", value=ca.vertcat(p.x_G, p.y_G, 0))
+    centre = ca.vertcat(p.x_G, p.y_G, 0) + load.effort
     body = m.balance(
         "body",
         "body",
         velocity=ca.vertcat(motion.u[0], motion.u[1], 0),
         rate=ca.vertcat(0, 0, motion.u[2]),
-        gravity=ca.vertcat(0, 0, -gravity),
+        gravity=ca.vertcat(0, 0, -p.gravity),
         position=ca.vertcat(motion.x, motion.y, 0),
         rotation=motion.to_platform.T,
-        mass=m_p + 3 * m_w,
-        first_moment=m_p * centre + m_w * ca.vertcat(ca.sum1(g.x), ca.sum1(g.y), 0),
+        mass=p.m_p + 3 * p.m_w,
+        first_moment=p.m_p * centre + p.m_w * ca.vertcat(ca.sum1(g.x), ca.sum1(g.y), 0),
     )
     steering = m.balance(
-        "steering", "rotation", velocity=beta_rate, angle=motion.beta, load=tau_beta
+        "steering", "rotation", velocity=beta_rate, angle=motion.beta, load=u.tau_beta
     )
-    rolling = m.balance("rolling", "rotation", velocity=phi_rate, angle=motion.phi, load=tau_phi)
+    rolling = m.balance("rolling", "rotation", velocity=phi_rate, angle=motion.phi, load=u.tau_phi)
 
     masses = Masses(
-        m_p + body.mass,
-        m_p * centre[0] + body.first_moment[0],
-        m_p * centre[1] + body.first_moment[1],
-        i_p + m_p * (centre[0] ** 2 + centre[1] ** 2) + body.inertia[2, 2],
-        m_w,
-        d,
-        i_s,
-        i_phi,
+        p.m_p + body.mass,
+        p.m_p * centre[0] + body.first_moment[0],
+        p.m_p * centre[1] + body.first_moment[1],
+        p.I_p + p.m_p * (centre[0] ** 2 + centre[1] ** 2) + body.inertia[2, 2],
+        p.m_w,
+        p.d,
+        p.I_s,
+        p.I_phi,
     )
-    normal = ca.repmat(((masses.mass + 3 * m_w) * gravity - body.effort[2]) / 3, 3)
+    normal = ca.repmat(((masses.mass + 3 * p.m_w) * p.gravity - body.effort[2]) / 3, 3)
     speed = ca.sqrt((g.r * phi_rate) ** 2 + ROLLING_FLOOR**2)
     pivot = m.balance("pivot", "pivot", spin=beta_rate + motion.u[2], rolling=speed, normal=normal)
 
-    friction_beta = f_s * ca.tanh(beta_rate / w_0) + f_v * beta_rate
-    friction_phi = f_s * ca.tanh(phi_rate / w_0) + f_v * phi_rate
+    friction_beta = p.f_s * ca.tanh(beta_rate / p.w_0) + p.f_v * beta_rate
+    friction_phi = p.f_s * ca.tanh(phi_rate / p.w_0) + p.f_v * phi_rate
     m.loss("axles", ca.dot(friction_beta, beta_rate) + ca.dot(friction_phi, phi_rate))
-    m.port(STEERING, tau_beta, beta_rate)
-    m.port(ROLLING, tau_phi, phi_rate)
+    m.port(qs.STEERING, u.tau_beta, beta_rate)
+    m.port(qs.ROLLING, u.tau_phi, phi_rate)
     on_pose = ca.vertcat(body.effort[0], body.effort[1], body.effort[5] + ca.sum1(pivot.effort))
-    on_beta = tau_beta - friction_beta + steering.effort + pivot.effort
-    return masses, Forces(on_pose, on_beta, tau_phi - friction_phi + rolling.effort, normal)
+    on_beta = u.tau_beta - friction_beta + steering.effort + pivot.effort
+    return masses, Forces(on_pose, on_beta, u.tau_phi - friction_phi + rolling.effort, normal)
 
 
 def finish(m: Model, motion: Motion, acceleration: SX, beta_rate: SX, phi_rate: SX) -> None:
@@ -178,13 +167,13 @@ def finish(m: Model, motion: Motion, acceleration: SX, beta_rate: SX, phi_rate: 
     m.derivative(motion.beta, beta_rate)
     m.derivative(motion.phi, phi_rate)
     m.derivative(motion.rates, motion.to_platform.T @ acceleration)
-    m.output(X, motion.x)
-    m.output(Y, motion.y)
-    m.output(THETA, motion.theta)
-    m.output(X_RATE, motion.rates[0])
-    m.output(Y_RATE, motion.rates[1])
-    m.output(THETA_RATE, motion.rates[2])
-    m.output(BETA, motion.beta)
-    m.output(PHI, motion.phi)
-    m.output(BETA_RATE, beta_rate)
-    m.output(PHI_RATE, phi_rate)
+    m.output(qs.X, motion.x)
+    m.output(qs.Y, motion.y)
+    m.output(qs.THETA, motion.theta)
+    m.output(qs.X_RATE, motion.rates[0])
+    m.output(qs.Y_RATE, motion.rates[1])
+    m.output(qs.THETA_RATE, motion.rates[2])
+    m.output(qs.BETA, motion.beta)
+    m.output(qs.PHI, motion.phi)
+    m.output(qs.BETA_RATE, beta_rate)
+    m.output(qs.PHI_RATE, phi_rate)

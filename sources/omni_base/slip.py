@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.contact import stick_slip
 from ..laws.planar_frame import rotated
@@ -33,8 +33,7 @@ from .rigid_body import (
     velocity_forces,
 )
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 5e-3, 1e-6)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 5e-3, 1e-6))
 
 MU_S = Quantity("mu_s", "1", "static friction coefficient on the floor", start=0.35, minimum=1e-3)
 MU_D = Quantity("mu_d", "1", "sliding friction coefficient on the floor", start=0.35, minimum=0.0)
@@ -49,25 +48,32 @@ SLIP_ACROSS = Quantity("slip_across", "m/s", "slip velocities across the wheels'
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    phi_rate, beta_rate = m.state(ROLLING_RATE), m.state(STEERING_RATE)
+    x = m.states(ROLLING_RATE, STEERING_RATE)
     motion = motion_states(m)
     g = geometry(m)
-    masses, acting = forces(m, g, motion, beta_rate, phi_rate)
-    mu_s, mu_d, v_c = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_C)
+    masses, acting = forces(m, g, motion, x.steering_rate, x.rolling_rate)
+    p = m.parameters(MU_S, MU_D, V_C)
 
     j1, c1 = rolling_rows(g, motion.beta), lateral_rows(g, motion.beta)
-    along = m.output(SLIP_ALONG, j1 @ motion.u + g.r * phi_rate)
-    across = m.output(SLIP_ACROSS, c1 @ motion.u + g.e * beta_rate)
-    x, y = rotated(motion.theta, g.x - g.e * ca.cos(motion.beta), g.y - g.e * ca.sin(motion.beta))
-    patch = m.balance(
-        "mu", "coefficient", unit="1", value=ca.repmat(mu_s, 3), x=motion.x + x, y=motion.y + y
+    along = m.output(SLIP_ALONG, j1 @ motion.u + g.r * x.rolling_rate)
+    across = m.output(SLIP_ACROSS, c1 @ motion.u + g.e * x.steering_rate)
+    d_x, d_y = rotated(
+        motion.theta, g.x - g.e * ca.cos(motion.beta), g.y - g.e * ca.sin(motion.beta)
     )
-    share = 1 + patch.effort / mu_s
-    f_along, f_across = stick_slip(along, across, acting.normal * share, mu_s, mu_d, v_c)
+    patch = m.balance(
+        "mu",
+        "coefficient",
+        unit="1",
+        value=ca.repmat(p.mu_s, 3),
+        x=motion.x + d_x,
+        y=motion.y + d_y,
+    )
+    share = 1 + patch.effort / p.mu_s
+    f_along, f_across = stick_slip(along, across, acting.normal * share, p.mu_s, p.mu_d, p.v_c)
     m.loss("slip", -ca.dot(f_along, along) - ca.dot(f_across, across))
 
     f, coupling = inertia_blocks(g, masses, motion.beta)
-    h_pose, h_beta = velocity_forces(g, masses, motion.beta, motion.u[2], beta_rate)
+    h_pose, h_beta = velocity_forces(g, masses, motion.beta, motion.u[2], x.steering_rate)
     i_beta = masses.i_beta
     on_pose = acting.pose + j1.T @ f_along + c1.T @ f_across - h_pose
     on_beta = acting.beta + g.e * f_across - h_beta
@@ -76,7 +82,9 @@ def equations(m: Model) -> None:
     acceleration = symmetric.solve(
         f - coupling @ coupling.T / i_beta, on_pose - coupling @ on_beta / i_beta
     )
-    m.derivative(beta_rate, (on_beta - coupling.T @ acceleration) / i_beta)
-    m.derivative(phi_rate, on_phi / masses.i_phi)
-    finish(m, motion, acceleration, beta_rate, phi_rate)
-    m.stored_energy(kinetic_energy(g, masses, motion.beta, motion.u, beta_rate, phi_rate))
+    m.derivative(x.steering_rate, (on_beta - coupling.T @ acceleration) / i_beta)
+    m.derivative(x.rolling_rate, on_phi / masses.i_phi)
+    finish(m, motion, acceleration, x.steering_rate, x.rolling_rate)
+    m.stored_energy(
+        kinetic_energy(g, masses, motion.beta, motion.u, x.steering_rate, x.rolling_rate)
+    )

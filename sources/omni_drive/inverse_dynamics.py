@@ -15,23 +15,25 @@ simulator).
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..omni_base import STEERING_ANGLE
 from ..omni_base.rigid_body import joint_map, rotation
 from .torques import least_torques, output_torques, read_base, read_signals
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-3))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
     signals, base = read_signals(m), read_base(m)
-    beta = m.state(STEERING_ANGLE)
+    x = m.states(STEERING_ANGLE)
     theta, rates = signals.pose_set[2], signals.rate_set
-    k_beta, _ = joint_map(base.geometry, beta)
-    m.derivative(beta, k_beta @ (rotation(theta) @ rates))
+    k_beta, _ = joint_map(base.geometry, x.steering_angle)
+    m.derivative(x.steering_angle, k_beta @ (rotation(theta) @ rates))
     output_torques(
-        m, signals, beta, least_torques(base, theta, beta, rates, signals.acceleration_set)
+        m,
+        signals,
+        x.steering_angle,
+        least_torques(base, theta, x.steering_angle, rates, signals.acceleration_set),
     )

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
 from .torques import least_torques, output_torques, read_base, read_signals
 
-LEVEL = 1
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-3))
 KP = Quantity(
     "Kp", "1/s2", "proportional gains for x, y and heading", 75.0, minimum=0.0, nominal=50.0, size=3
 )
@@ -42,16 +41,16 @@ CORRECTION = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     signals, base = read_signals(m), read_base(m)
-    correction = m.state(CORRECTION)
+    p = m.parameters(KI, KD, KP, TAU_MAX)
+    x = m.states(CORRECTION)
     error = signals.pose_set - signals.pose
-    m.derivative(correction, m.parameter(KI) * error)
+    m.derivative(x.correction, p.Ki * error)
     acceleration = (
         signals.acceleration_set
-        + m.parameter(KD) * (signals.rate_set - signals.rate)
-        + m.parameter(KP) * error
-        + correction
+        + p.Kd * (signals.rate_set - signals.rate)
+        + p.Kp * error
+        + x.correction
     )
-    limit = m.parameter(TAU_MAX)
     wanted = least_torques(base, signals.pose[2], signals.beta, signals.rate_set, acceleration)
-    tau_beta, tau_phi = (ca.fmax(-limit, ca.fmin(torque, limit)) for torque in wanted)
+    tau_beta, tau_phi = (ca.fmax(-p.tau_max, ca.fmin(torque, p.tau_max)) for torque in wanted)
     output_torques(m, signals, signals.beta, (tau_beta, tau_phi))

@@ -6,43 +6,15 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import omni_base
+from .. import omni_drive as qs
 from ..model import SX, Model
-from ..omni_base import (
-    BETA,
-    BETA_RATE,
-    PHI_RATE,
-    TAU_BETA,
-    TAU_PHI,
-    THETA,
-    THETA_RATE,
-    X_RATE,
-    Y_RATE,
-    X,
-    Y,
-)
+from ..omni_base import platform
 from ..omni_base.inverse_dynamics import motor_torques
-from ..omni_base.platform import (
-    ALPHA_A,
-    F_S,
-    F_V,
-    I_P,
-    I_PHI,
-    I_S,
-    L_A,
-    M_P,
-    M_W,
-    W_0,
-    X_G,
-    Y_G,
-    D,
-    E,
-    R,
-)
 from ..omni_base.rigid_body import Geometry, Masses
 from ..pose_trajectory import SET_MOTION
 from ..quantity import Quantity
 from ..variant import device_values, devices
-from . import BETA_SET, ROLLING, STEERING
 
 
 class Signals(NamedTuple):
@@ -69,18 +41,20 @@ class BaseModel(NamedTuple):
 def read_signals(m: Model) -> Signals:
     """Declare the inputs."""
     motion = [ca.vertcat(*(m.input(quantity) for quantity in row)) for row in SET_MOTION]
-    pose = ca.vertcat(m.input(X), m.input(Y), m.input(THETA))
-    rate = ca.vertcat(m.input(X_RATE), m.input(Y_RATE), m.input(THETA_RATE))
-    return Signals(
-        motion[0],
-        motion[1],
-        motion[2],
-        pose,
-        rate,
-        m.input(BETA),
-        m.input(BETA_RATE),
-        m.input(PHI_RATE),
+    u = m.inputs(
+        omni_base.X,
+        omni_base.Y,
+        omni_base.THETA,
+        omni_base.X_RATE,
+        omni_base.Y_RATE,
+        omni_base.THETA_RATE,
+        omni_base.BETA,
+        omni_base.BETA_RATE,
+        omni_base.PHI_RATE,
     )
+    pose = ca.vertcat(u.x, u.y, u.theta)
+    rate = ca.vertcat(u.xd, u.yd, u.thetad)
+    return Signals(motion[0], motion[1], motion[2], pose, rate, u.beta, u.betad, u.phid)
 
 
 def read_base(m: Model) -> BaseModel:
@@ -94,22 +68,27 @@ def read_base(m: Model) -> BaseModel:
         start = tuple(entry.value) if isinstance(entry.value, list) else entry.value
         return m.parameter(quantity.with_start(start))
 
-    distance, direction = value(L_A), value(ALPHA_A)
+    distance, direction = value(platform.L_A), value(platform.ALPHA_A)
     geometry = Geometry(
-        distance * ca.cos(direction), distance * ca.sin(direction), value(E), value(R)
+        distance * ca.cos(direction),
+        distance * ca.sin(direction),
+        value(platform.E),
+        value(platform.R),
     )
-    mass, x_g, y_g = value(M_P), value(X_G), value(Y_G)
+    mass, x_g, y_g = value(platform.M_P), value(platform.X_G), value(platform.Y_G)
     masses = Masses(
         mass,
         mass * x_g,
         mass * y_g,
-        value(I_P) + mass * (x_g**2 + y_g**2),
-        value(M_W),
-        value(D),
-        value(I_S),
-        value(I_PHI),
+        value(platform.I_P) + mass * (x_g**2 + y_g**2),
+        value(platform.M_W),
+        value(platform.D),
+        value(platform.I_S),
+        value(platform.I_PHI),
     )
-    return BaseModel(geometry, masses, (value(F_S), value(F_V), value(W_0)))
+    return BaseModel(
+        geometry, masses, (value(platform.F_S), value(platform.F_V), value(platform.W_0))
+    )
 
 
 def least_torques(
@@ -123,10 +102,10 @@ def least_torques(
 
 def output_torques(m: Model, signals: Signals, beta_set: SX, torques: tuple[SX, SX]) -> None:
     """Open the balances of the axles, output the torques and bind the ports."""
-    m.output(BETA_SET, beta_set)
+    m.output(qs.BETA_SET, beta_set)
     for name, quantity, port, speed, torque in (
-        ("steering", TAU_BETA, STEERING, signals.beta_rate, torques[0]),
-        ("rolling", TAU_PHI, ROLLING, signals.phi_rate, torques[1]),
+        ("steering", omni_base.TAU_BETA, qs.STEERING, signals.beta_rate, torques[0]),
+        ("rolling", omni_base.TAU_PHI, qs.ROLLING, signals.phi_rate, torques[1]),
     ):
         axle = m.balance(name, "rotation", velocity=speed, load=torque)
         m.port(port, m.output(quantity, torque + axle.effort), speed)

@@ -21,32 +21,39 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import omni_wheels as qs
+from ..component import Fidelity, Solver
 from ..laws import symmetric
 from ..laws.planar_frame import rotated
-from ..model import Model
-from . import ALPHA, ARM, LOAD, PHI, POSE_PHI, POSE_X, POSE_Y, V_X, V_Y, W_Z, R, W, X, Y
+from ..model import SX, Model
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    w = m.input(W)
-    w += m.balance("speeds", "signal", unit="rad/s", value=w).effort
-    r, arm, alpha, load = (m.parameter(q) for q in (R, ARM, ALPHA, LOAD))
-    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(3), roller=load).effort
-    cosine, sine = ca.cos(alpha), ca.sin(alpha)
-    along = ca.horzcat(-sine, cosine, ca.repmat(arm, 3))
+    u = m.inputs(qs.W)
+    p = m.parameters(qs.R, qs.ARM, qs.ALPHA, qs.LOAD)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
+    w = u.w + m.balance("speeds", "signal", unit="rad/s", value=u.w).effort
+    drag = m.balance("roller", "coefficient", unit="1", value=ca.DM.zeros(3), roller=p.load).effort
+    cosine, sine = ca.cos(p.alpha), ca.sin(p.alpha)
+    along = ca.horzcat(-sine, cosine, ca.repmat(p.arm, 3))
     across = ca.horzcat(cosine, sine, ca.DM.zeros(3))
-    weight = load / (ca.sum1(load) / 3)
+    total: SX = ca.sum1(p.load)
+    weight = p.load / (total / 3)
     matrix = along.T @ ca.diag(weight) @ along + across.T @ ca.diag(weight * drag) @ across
-    v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, along.T @ (weight * r * w)))
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    x_rate, y_rate = rotated(phi, v_x, v_y)
-    m.derivative(x, x_rate)
-    m.derivative(y, y_rate)
-    m.derivative(phi, w_z)
-    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V_X, v_x), (V_Y, v_y), (W_Z, w_z)):
+    v_x, v_y, w_z = ca.vertsplit(symmetric.solve(matrix, along.T @ (weight * p.r * w)))
+    x_rate, y_rate = rotated(x.pose_phi, v_x, v_y)
+    m.derivative(x.pose_x, x_rate)
+    m.derivative(x.pose_y, y_rate)
+    m.derivative(x.pose_phi, w_z)
+    for quantity, value in (
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.V_X, v_x),
+        (qs.V_Y, v_y),
+        (qs.W_Z, w_z),
+    ):
         m.output(quantity, value)

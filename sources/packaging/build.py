@@ -18,6 +18,7 @@ from typing import Literal
 
 import casadi as ca
 
+from cosim import spec
 from cosim.spec.variant import Name
 
 from ..function import Functions, build_functions
@@ -30,6 +31,7 @@ from .layout import Entry, layout
 
 Kind = description.Kind
 _SOURCES = Path(__file__).parent.parent
+_SPEC = Path(spec.__path__[0])
 _EQUATIONS = threading.Lock()
 """Held while CasADi works: it counts references without locks. Compilers run beside it."""
 
@@ -128,7 +130,7 @@ def _documentation(variant: Variant) -> bytes:
 def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
     """All files but the libraries, and the generated C source that these are compiled from."""
     identifier = variant.name.identifier
-    template = native.model_source(variant.model, variant.functions, variant.entries, identifier)
+    template = native.model_source(variant.functions, variant.entries, identifier)
     fixed = {path.name: path.read_text(encoding="utf-8") for path in native.C_SOURCES.glob("*.c")}
     xml2 = description.describe_fmi2(
         variant.model,
@@ -197,13 +199,13 @@ def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
 
 @lru_cache(maxsize=1)
 def sources_key() -> str:
-    """Hash of everything that an FMU is made of: our sources and the versions of the makers."""
+    """Hash of what an FMU is made of: `sources/`, units and names of `cosim/spec`, its makers."""
     digest = hashlib.sha256()
-    for path in sorted(_SOURCES.rglob("*")):
-        if path.suffix in (".py", ".c", ".toml"):
-            digest.update(
-                path.relative_to(_SOURCES).as_posix().encode() + b"\0" + path.read_bytes()
-            )
+    for folder in (_SOURCES, _SPEC):
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".py", ".c", ".toml"):
+                name = path.relative_to(folder).as_posix().encode()
+                digest.update(name + b"\0" + path.read_bytes())
     for package in ("casadi", "pythonfmu", "ziglang"):
         digest.update(importlib.metadata.version(package).encode())
     return digest.hexdigest()

@@ -6,6 +6,7 @@ import inspect
 from functools import lru_cache
 from typing import Any
 
+from ..component import Fidelity
 from ..model import Model, misfit
 from ..quantity import Quantity
 from ..variant import build_model, components, devices, effects, fidelities, parse_name
@@ -66,7 +67,7 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
         fitting = {
             effect: module.EFFECT
             for effect, module in effects().items()
-            if not (hasattr(module, "seed_quantity") or module.EFFECT.probe)
+            if not (module.EFFECT.random or module.EFFECT.probe)
             and not misfit(module.EFFECT, model.balances[members[0]])
         }
         special = {item.general for item in fitting.values()}
@@ -86,10 +87,8 @@ def _has_place(effect: str) -> bool:
 def refinements(name: str) -> list[dict[str, Any]]:
     """Fidelities of which a variant is the limit, with the variant's effects.
 
-    A fidelity's module says so by `LIMITS` (fidelity -> values without which the limit is another)
-    and by the quantity that is infinite there, `STIFF`, or the one that vanishes, the first of
-    `SOFT`; the others mean nothing there. Elements of these count one by one; they have the
-    balances that its `PLACES` names. An effect that is looked for `alone` comes with its fidelity.
+    A fidelity's declaration says so (`component.Fidelity`). An effect that is looked for `alone`
+    comes with its fidelity.
 
     Returns:
         One mapping each: `effect` (what it is called), `fidelity` (short form), `parameter` (its
@@ -100,21 +99,21 @@ def refinements(name: str) -> list[dict[str, Any]]:
     carried = "".join(f"+{effect}" + (f"@{at}" if at else "") for effect, at in parsed.effects)
     found = []
     for fidelity, module in fidelities(parsed.component).items():
-        limits = getattr(module, "LIMITS", {})
-        if parsed.fidelity not in limits:
+        own: Fidelity = module.FIDELITY
+        if parsed.fidelity not in own.limits:
             continue
         text = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
-        known = {"held": dict(limits[parsed.fidelity]), "text": text}
+        known = {"held": dict(own.limits[parsed.fidelity]), "text": text}
         short = fidelity + carried
-        if soft := getattr(module, "SOFT", None):
+        if own.stiff is None:
             found += [
-                {**known, "effect": module.NAME, "fidelity": short, "stiff": "", "port": place,
-                 "parameter": f"{soft[0].name}[{i + 1}]",
-                 "others": tuple(f"{q.name}[{i + 1}]" for q in soft[1:])}
-                for i, place in enumerate(module.PLACES)
+                {**known, "effect": own.called, "fidelity": short, "stiff": "", "port": place,
+                 "parameter": f"{own.soft[0].name}[{i + 1}]",
+                 "others": tuple(f"{q.name}[{i + 1}]" for q in own.soft[1:])}
+                for i, place in enumerate(own.places)
             ]  # fmt: skip
             continue
-        stiff = module.STIFF.name
+        stiff = own.stiff.name
         known["stiff"] = stiff
         found.append({**known, "effect": fidelity, "fidelity": short, "port": "",
                       "parameter": stiff})  # fmt: skip

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 from ..function import Functions
 from ..model import Model
-from ..units import parse
+from ..units import base_exponents, coherent
 from .layout import METHODS, Entry
 
 Kind = Literal["native", "python"]
@@ -38,11 +38,8 @@ def _attributes(**values: object) -> dict[str, str]:
 def _units(parent: ET.Element, entries: Sequence[Entry]) -> None:
     definitions = ET.SubElement(parent, "UnitDefinitions")
     for symbol in sorted({entry.quantity.unit for entry in entries}):
-        unit = parse(symbol)
         element = ET.SubElement(definitions, "Unit", name=symbol)
-        base = {name: str(exponent) for name, exponent in unit.exponents}
-        if unit.factor != 1.0:
-            base["factor"] = _text(unit.factor)
+        base = {name: str(power) for name, power in base_exponents(coherent(symbol)).items()}
         ET.SubElement(element, "BaseUnit", base)
 
 

@@ -19,7 +19,6 @@ from pathlib import Path
 import casadi as ca
 
 from ..function import Functions
-from ..model import Model
 from .cache import cache_folder, write_atomically
 from .elimination import eliminate
 from .layout import Entry, owners
@@ -85,7 +84,7 @@ def _casadi_code(functions: Functions) -> str:
     return re.sub(r"if \(res\[\d+\]!=0\) ", "", code)
 
 
-def model_source(model: Model, functions: Functions, entries: list[Entry], identifier: str) -> str:
+def model_source(functions: Functions, entries: list[Entry], identifier: str) -> str:
     """The generated C file `model.c` of a variant: sizes, tables, CasADi functions, elimination.
 
     The instantiation token is left out; `with_token` puts it in.

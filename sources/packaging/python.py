@@ -10,6 +10,7 @@ import importlib.metadata
 import inspect
 import re
 from pathlib import Path
+from types import ModuleType
 
 import casadi as ca
 
@@ -17,7 +18,7 @@ from cosim.spec.variant import Name
 
 from ..function import Functions
 from ..model import Model
-from . import runtime
+from . import c_functions, runtime
 from .elimination import eliminate
 from .layout import Entry, owners
 
@@ -101,6 +102,10 @@ def function_source(function: ca.Function) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _below_the_line(module: ModuleType) -> str:
+    return inspect.getsource(module).split("# -- run time ", 1)[1].split("\n", 1)[1]
+
+
 def slave_source(model: Model, functions: Functions, entries: list[Entry], name: Name) -> str:
     """The slave file of a variant: generated functions, tables, and the generic run time."""
     nx = sum(entry.part == "state" for entry in entries)
@@ -126,7 +131,7 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
         return "[" + ", ".join(default if v is None else repr(float(v)) for v in values) + "]"
 
     class_name = re.sub(r"\W", "_", name.identifier)
-    body = inspect.getsource(runtime).split("# -- run time ", 1)[1].split("\n", 1)[1]
+    body = "\n\n".join(map(_below_the_line, (c_functions, runtime)))
     fixed = [e.part == "parameter" and e.quantity.variability == "fixed" for e in entries]
     nominal = [float(e.quantity.nominal or 1.0) for e in entries if e.part == "state"]
     tables = [

@@ -33,10 +33,10 @@ COMPONENT = Component(
 
 def body_pose(m: Model) -> tuple[SX, SX]:
     """The inputs: planar pose (3) and height, with the balances on them."""
-    x, y, z, phi = (m.input(quantity) for quantity in (X, Y, Z, PHI))
-    pose = ca.vertcat(x, y, phi)
+    u = m.inputs(X, Y, Z, PHI)
+    pose = ca.vertcat(u.x, u.y, u.phi)
     pose += m.balance("pose", "pose", value=pose).effort
     pose[:2] += m.balance("position", "point", unit="m", value=pose[:2]).effort
     pose[2] += m.balance("yaw", "signal", unit="rad", value=pose[2]).effort
-    z += m.balance("height", "signal", unit="m", value=z).effort
+    z = u.z + m.balance("height", "signal", unit="m", value=u.z).effort
     return pose, z

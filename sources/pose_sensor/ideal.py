@@ -11,17 +11,19 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import pose_sensor as qs
+from ..component import Fidelity
 from ..model import Model
-from . import PHI_MEAS, VALID, X_MEAS, Y_MEAS, Z_MEAS, body_pose
+from . import body_pose
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
     pose, z = body_pose(m)
-    m.output(X_MEAS, pose[0])
-    m.output(Y_MEAS, pose[1])
-    m.output(Z_MEAS, z)
-    m.output(PHI_MEAS, pose[2])
-    m.output(VALID, ca.SX(1.0))
+    m.output(qs.X_MEAS, pose[0])
+    m.output(qs.Y_MEAS, pose[1])
+    m.output(qs.Z_MEAS, z)
+    m.output(qs.PHI_MEAS, pose[2])
+    m.output(qs.VALID, ca.SX(1.0))

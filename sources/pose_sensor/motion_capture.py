@@ -19,13 +19,15 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import pose_sensor as qs
+from ..component import Fidelity
 from ..laws.noise import RANDOM, Random, seed_quantity
 from ..laws.planar_frame import rotated
 from ..model import Model
 from ..quantity import Quantity
-from . import PHI_MEAS, VALID, X_MEAS, Y_MEAS, Z_MEAS, body_pose
+from . import body_pose
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 
 T = Quantity("T", "s", "sample period", 0.01, minimum=1e-6, variability="fixed")
 SIGMA_XY = Quantity("sigma_xy", "m", "standard deviation of x and y", minimum=0.0)
@@ -51,32 +53,46 @@ STARTED = Quantity("started", "1", "1 once the first sample is taken")
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    pose, z = body_pose(m)
-    phi_frame = m.parameter(PHI_FRAME)
-    x_frame, y_frame, z_frame = (m.parameter(q) for q in (X_FRAME, Y_FRAME, Z_FRAME))
-    x_marker, y_marker, phi_marker = (m.parameter(q) for q in (X_MARKER, Y_MARKER, PHI_MARKER))
-    x_offset, y_offset = rotated(pose[2], x_marker, y_marker)
-    x, y = rotated(phi_frame, pose[0] + x_offset, pose[1] + y_offset)
-    exact = ca.vertcat(x + x_frame, y + y_frame, z + z_frame, pose[2] + phi_frame + phi_marker)
+    pose, height = body_pose(m)
+    p = m.parameters(
+        PHI_FRAME,
+        X_FRAME,
+        Y_FRAME,
+        Z_FRAME,
+        X_MARKER,
+        Y_MARKER,
+        PHI_MARKER,
+        SIGMA_XY,
+        SIGMA_Z,
+        SIGMA_PHI,
+        seed_quantity("pose_sensor"),
+        P_LOSE,
+        P_FIND,
+        T,
+        HELD,
+    )
+    z = m.discretes(DRAWN, SAMPLE, SEEN, RANDOM, STARTED)
+    x_offset, y_offset = rotated(pose[2], p.x_marker, p.y_marker)
+    x, y = rotated(p.phi_frame, pose[0] + x_offset, pose[1] + y_offset)
+    exact = ca.vertcat(
+        x + p.x_frame, y + p.y_frame, height + p.z_frame, pose[2] + p.phi_frame + p.phi_marker
+    )
 
-    sigma_xy = m.parameter(SIGMA_XY)
-    sigma = ca.vertcat(sigma_xy, sigma_xy, m.parameter(SIGMA_Z), m.parameter(SIGMA_PHI))
-    drawn, sample, seen = m.discrete(DRAWN), m.discrete(SAMPLE), m.discrete(SEEN)
-    state, started = m.discrete(RANDOM), m.discrete(STARTED)
-    random = Random(state, m.parameter(seed_quantity("pose_sensor")))
+    sigma = ca.vertcat(p.sigma_xy, p.sigma_xy, p.sigma_z, p.sigma_phi)
+    random = Random(z.random, p.seed)
     normals, lot = random.normals(4), random.uniform()
-    lost = ca.if_else(seen > 0.5, m.parameter(P_LOSE), 1.0 - m.parameter(P_FIND))
-    sees = ca.logic_or(lot >= lost, started < 0.5)
+    lost = ca.if_else(z.seen > 0.5, p.p_lose, 1.0 - p.p_find)
+    sees = ca.logic_or(lot >= lost, z.started < 0.5)
 
-    clock = m.clock("sample", m.parameter(T))
-    m.update(clock, drawn, normals)
-    m.update(clock, sample, ca.if_else(sees, exact + sigma * normals, sample))
-    m.update(clock, seen, ca.if_else(sees, 1.0, 0.0))
-    m.update(clock, state, random.state)
-    m.update(clock, started, ca.SX(1.0))
+    clock = m.clock("sample", p.T)
+    m.update(clock, z.drawn, normals)
+    m.update(clock, z.sample, ca.if_else(sees, exact + sigma * normals, z.sample))
+    m.update(clock, z.seen, ca.if_else(sees, 1.0, 0.0))
+    m.update(clock, z.random, random.state)
+    m.update(clock, z.started, ca.SX(1.0))
 
-    kept = ca.logic_and(started > 0.5, ca.logic_or(m.parameter(HELD) > 0.5, seen < 0.5))
-    measured = ca.if_else(kept, sample, exact + sigma * drawn)
-    for index, quantity in enumerate((X_MEAS, Y_MEAS, Z_MEAS, PHI_MEAS)):
+    kept = ca.logic_and(z.started > 0.5, ca.logic_or(p.held > 0.5, z.seen < 0.5))
+    measured = ca.if_else(kept, z.sample, exact + sigma * z.drawn)
+    for index, quantity in enumerate((qs.X_MEAS, qs.Y_MEAS, qs.Z_MEAS, qs.PHI_MEAS)):
         m.output(quantity, measured[index])
-    m.output(VALID, seen)
+    m.output(qs.VALID, z.seen)

@@ -47,4 +47,5 @@ def output_motion(m: Model, pose: SX) -> None:
 
 def start_pose(m: Model) -> SX:
     """The pose before the motion."""
-    return ca.vertcat(m.parameter(X_0), m.parameter(Y_0), m.parameter(THETA_0))
+    p = m.parameters(X_0, Y_0, THETA_0)
+    return ca.vertcat(p.x_0, p.y_0, p.theta_0)

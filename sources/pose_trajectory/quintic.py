@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import pose_trajectory as qs
+from ..component import Fidelity
 from ..joint_trajectory.path import smooth
 from ..model import Model
 from ..quantity import Quantity
-from . import T_START, output_motion, start_pose
+from . import output_motion, start_pose
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 DX = Quantity("dx", "m", "move along the world's x axis", start=1.5)
 DY = Quantity("dy", "m", "move along the world's y axis", start=0.5)
 DTHETA = Quantity("dtheta", "rad", "turn, positive to the left", start=1.0)
@@ -28,6 +30,7 @@ DURATION = Quantity("duration", "s", "time that the move takes", start=5.0, mini
 def equations(m: Model) -> None:
     """Collect the equations."""
     start = start_pose(m)
-    move = ca.vertcat(m.parameter(DX), m.parameter(DY), m.parameter(DTHETA))
-    s = (m.t - m.parameter(T_START)) / m.parameter(DURATION)
+    p = m.parameters(DX, DY, DTHETA, qs.T_START, DURATION)
+    move = ca.vertcat(p.dx, p.dy, p.dtheta)
+    s = (m.t - p.t_start) / p.duration
     output_motion(m, start + move * smooth(s))

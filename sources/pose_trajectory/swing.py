@@ -16,12 +16,14 @@ import math
 
 import casadi as ca
 
+from .. import pose_trajectory as qs
+from ..component import Fidelity
 from ..joint_trajectory.path import window
 from ..model import Model
 from ..quantity import Quantity
-from . import T_START, output_motion, start_pose
+from . import output_motion, start_pose
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1)
 A_X = Quantity("A_x", "m", "amplitude along the world's x axis", start=1.0)
 A_Y = Quantity("A_y", "m", "amplitude along the world's y axis", start=0.5)
 A_THETA = Quantity("A_theta", "rad", "amplitude of the heading", start=0.5)
@@ -33,8 +35,9 @@ RAMP = Quantity("ramp", "s", "time to fade in and out", start=2.0, minimum=1e-3)
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    begin, start = m.parameter(T_START), start_pose(m)
-    amplitude = ca.vertcat(m.parameter(A_X), m.parameter(A_Y), m.parameter(A_THETA))
-    phase = 2 * math.pi * m.parameter(FREQUENCY) * (m.t - begin) * m.parameter(N)
-    faded = window(m, begin, m.parameter(DURATION), m.parameter(RAMP))
+    t_start, start = m.parameter(qs.T_START), start_pose(m)
+    p = m.parameters(A_X, A_Y, A_THETA, FREQUENCY, N, DURATION, RAMP)
+    amplitude = ca.vertcat(p.A_x, p.A_y, p.A_theta)
+    phase = 2 * math.pi * p.f * (m.t - t_start) * p.n
+    faded = window(m, t_start, p.duration, p.ramp)
     output_motion(m, start + faded * amplitude * ca.sin(phase))

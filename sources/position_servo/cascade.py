@@ -19,14 +19,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import position_servo as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import PHI, Q_REF, SHAFT, T_LOOP, TAU, U_HELD, U, W
 
-LEVEL = 0
 # No states of its own; those of effects (lags) may be stiff.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 U_ADD = Quantity("u_add", "V", "set value added behind the loops")
 K_P = Quantity("K_p", "1/s", "gain of the position loop", start=100.0, minimum=0.0)
 K_V = Quantity("K_v", "V.s/rad", "gain of the speed loop", start=0.1, minimum=0.0)
@@ -38,26 +37,23 @@ BEFORE_LAST = Quantity("phi_before_last", "rad", "angle at the tick before the l
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, angle, speed = m.input(Q_REF), m.input(PHI), m.input(W)
-    added = m.input(U_ADD)
-    command = command + m.balance("command", "signal", unit="rad", value=command).effort
-    sensed = angle + m.balance("angle_sensor", "signal", unit="rad", value=angle).effort
-    period = m.parameter(T_LOOP)
-    tick = m.clock("loops", period)
-    held = m.discrete(U_HELD)
-    before, before_last = m.discrete(BEFORE), m.discrete(BEFORE_LAST)
-    gain, limit = m.parameter(K_V), m.parameter(U_MAX)
+    u = m.inputs(qs.Q_REF, qs.PHI, qs.W, U_ADD)
+    p = m.parameters(qs.T_LOOP, K_V, U_MAX, K_P, K_U)
+    z = m.discretes(qs.U_HELD, BEFORE, BEFORE_LAST)
+    q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
+    tick = m.clock("loops", p.T_loop)
 
-    measured = (sensed - before_last) / (2 * period)
-    wanted = gain * (m.parameter(K_P) * (command - sensed) - measured) + added
-    m.update(tick, held, ca.fmax(-limit, ca.fmin(wanted, limit)))
-    m.update(tick, before_last, before)
-    m.update(tick, before, sensed)
+    w_m = (phi - z.phi_before_last) / (2 * p.T_loop)
+    wanted = p.K_v * (p.K_p * (q_ref - phi) - w_m) + u.u_add
+    m.update(tick, z.u_held, ca.fmax(-p.u_max, ca.fmin(wanted, p.u_max)))
+    m.update(tick, z.phi_before_last, z.phi_before)
+    m.update(tick, z.phi_before, phi)
 
-    amplifier = m.balance("amplifier", "signal", unit="V", value=held)
-    shaft = m.balance("shaft", "rotation", velocity=speed, angle=angle)
-    torque = m.parameter(K_U) * (held + amplifier.effort)
-    m.output(TAU, torque + shaft.effort)
-    m.output(U, held)
-    m.port(SHAFT, torque + shaft.effort, speed)
-    m.supply(torque * speed)
+    amplifier = m.balance("amplifier", "signal", unit="V", value=z.u_held)
+    shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi)
+    torque = p.K_u * (z.u_held + amplifier.effort)
+    m.output(qs.TAU, torque + shaft.effort)
+    m.output(qs.U, z.u_held)
+    m.port(qs.SHAFT, torque + shaft.effort, u.w)
+    m.supply(torque * u.w)

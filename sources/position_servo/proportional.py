@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import position_servo as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import PHI, Q_REF, SHAFT, T_LOOP, TAU, U_HELD, U, W
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 U_SUPPLY = Quantity("u_supply", "V", "voltage of the supply", start=7.4, nominal=10.0)
 ENABLE = Quantity("enable", "1", "above 0.5: the bridge is on", start=1.0)
 K_D = Quantity("k_d", "1/rad", "duty per position error", start=1.0, minimum=0.0)
@@ -37,49 +36,48 @@ I = Quantity("i", "A", "winding current, positive drives forward")  # noqa: E741
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command, angle, speed = m.input(Q_REF), m.input(PHI), m.input(W)
-    m.input_rate(angle, speed)
-    supply, enable = m.input(U_SUPPLY), m.input(ENABLE)
-    command = command + m.balance("command", "signal", unit="rad", value=command).effort
-    sensed = angle + m.balance("angle_sensor", "signal", unit="rad", value=angle).effort
-    tick = m.clock("loops", m.parameter(T_LOOP))
-    held = m.discrete(U_HELD)
-    duty = ca.fmax(-1, ca.fmin(m.parameter(K_D) * (command - sensed), 1))
-    m.update(tick, held, duty * supply)
+    u = m.inputs(qs.Q_REF, qs.PHI, qs.W, U_SUPPLY, ENABLE)
+    p = m.parameters(qs.T_LOOP, K_D, R_A, K_T)
+    z = m.discretes(qs.U_HELD)
+    m.input_rate(u.phi, u.w)
+    q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
+    tick = m.clock("loops", p.T_loop)
+    d = ca.fmax(-1, ca.fmin(p.k_d * (q_ref - phi), 1))
+    m.update(tick, z.u_held, d * u.u_supply)
 
-    resistance, constant = m.parameter(R_A), m.parameter(K_T)
-    on = ca.if_else(enable > 0.5, 1.0, 0.0)
-    nominal = on * (held - constant * speed) / resistance
+    on = ca.if_else(u.enable > 0.5, 1.0, 0.0)
+    nominal = on * (z.u_held - p.K_t * u.w) / p.R_a
     # One constant for torque and back-EMF, whatever an effect does to it: their powers cancel.
-    constant = (
-        constant
+    k_t = (
+        p.K_t
         + m.balance(
             "torque_constant",
             "coefficient",
             unit="N.m/A",
-            value=constant,
+            value=p.K_t,
             current=nominal,
-            speed=speed,
+            speed=u.w,
         ).effort
     )
-    plain = on * (held - constant * speed) / resistance
+    plain = on * (z.u_held - k_t * u.w) / p.R_a
     winding = m.balance(
         "winding",
         "winding",
         current=plain,
-        speed=speed,
-        voltage=held,
-        resistance=resistance,
-        emf_constant=constant,
+        speed=u.w,
+        voltage=z.u_held,
+        resistance=p.R_a,
+        emf_constant=k_t,
     )
-    current = plain + on * winding.effort / resistance
-    shaft = m.balance("shaft", "rotation", velocity=speed, angle=angle, load=constant * current)
-    torque = constant * current + shaft.effort
-    m.output(TAU, torque)
-    m.output(U, held)
-    m.output(I, current)
-    m.port(SHAFT, torque, speed)
-    m.supply(on * held * current)
+    i = plain + on * winding.effort / p.R_a
+    shaft = m.balance("shaft", "rotation", velocity=u.w, angle=u.phi, load=k_t * i)
+    torque = k_t * i + shaft.effort
+    m.output(qs.TAU, torque)
+    m.output(qs.U, z.u_held)
+    m.output(I, i)
+    m.port(qs.SHAFT, torque, u.w)
+    m.supply(on * z.u_held * i)
     # effects book their power at the current that flows without them: with no inductance there is
     # no other before they act; what they change of it is the winding's
-    m.loss("winding", resistance * current**2 - on * winding.effort * (current - plain))
+    m.loss("winding", p.R_a * i**2 - on * winding.effort * (i - plain))

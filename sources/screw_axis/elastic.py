@@ -19,13 +19,12 @@ import math
 
 import casadi as ca
 
-from ..component import Solver
+from .. import screw_axis as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, F_0, F_C, F_V, FLANGE, LEAD, MASS, PHI, SPEED, TAU, V_0, X_0, W, X
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 2.5e-4)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 2.5e-4))
 SHARE = Quantity(
     "share", "1", "part of the moving mass that turns with the rotor", start=0.3, minimum=1e-3,
     maximum=0.999,
@@ -38,37 +37,32 @@ CARRIAGE = Quantity("w_c", "rad/s", "state: speed of the carriage over r", nomin
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    torque = m.input(TAU)
-    radius = m.parameter(LEAD) / (2 * math.pi)
-    whole = m.parameter(MASS) * radius**2
-    rotor = m.parameter(SHARE) * whole
-    stiffness, damping = m.parameter(K), m.parameter(D)
-    angle, twist = m.state(ANGLE), m.state(TWIST)
-    speed, carriage = m.state(SPEED), m.state(CARRIAGE)
-    v, rate = radius * carriage, speed - carriage
-    viscous = m.parameter(F_V) * v
-    dry = m.parameter(F_C) * ca.tanh(v / m.parameter(V_0))
-    offset = m.parameter(F_0)
+    u = m.inputs(qs.TAU)
+    p = m.parameters(qs.LEAD, qs.MASS, SHARE, K, D, qs.F_V, qs.F_C, qs.V_0, qs.F_0, qs.X_0)
+    x = m.states(qs.ANGLE, TWIST, qs.SPEED, CARRIAGE)
+    phi, w, w_2 = x.angle, x.speed, x.w_c
+    r = p.lead / (2 * math.pi)
+    whole = p.M * r**2
+    j_1 = p.share * whole
+    v_c, rate = r * w_2, w - w_2
+    viscous = p.F_v * v_c
+    dry = p.F_c * ca.tanh(v_c / p.v_0)
     spring = m.balance(
-        "spring", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+        "spring", "compliance", deflection=x.twist, rate=rate, stiffness=p.k, damping=p.d
     )
-    tau_s = stiffness * twist + damping * rate - spring.effort
-    turned = angle + m.parameter(X_0) / radius
-    shaft = m.balance("screw", "rotation", velocity=carriage, angle=turned - twist, load=tau_s)
-    motor = m.balance("rotor", "rotation", velocity=speed, angle=turned, load=torque)
-    m.derivative(angle, speed)
-    m.derivative(twist, rate)
-    m.derivative(speed, (torque - tau_s + motor.effort) / rotor)
-    m.derivative(
-        carriage, (tau_s + radius * (offset - viscous - dry) + shaft.effort) / (whole - rotor)
-    )
-    m.output(W, speed)
-    m.output(PHI, angle)
-    m.output(X, radius * angle)
-    m.port(FLANGE, torque, speed)
-    m.supply(offset * v)
-    m.stored_energy(
-        rotor * speed**2 / 2 + (whole - rotor) * carriage**2 / 2 + stiffness * twist**2 / 2
-    )
-    m.loss("friction", (viscous + dry) * v)
-    m.loss("spring", damping * rate**2)
+    tau_s = p.k * x.twist + p.d * rate - spring.effort
+    turned = phi + p.x_0 / r
+    shaft = m.balance("screw", "rotation", velocity=w_2, angle=turned - x.twist, load=tau_s)
+    motor = m.balance("rotor", "rotation", velocity=w, angle=turned, load=u.tau)
+    m.derivative(phi, w)
+    m.derivative(x.twist, rate)
+    m.derivative(w, (u.tau - tau_s + motor.effort) / j_1)
+    m.derivative(w_2, (tau_s + r * (p.F_0 - viscous - dry) + shaft.effort) / (whole - j_1))
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.output(qs.X, r * phi)
+    m.port(qs.FLANGE, u.tau, w)
+    m.supply(p.F_0 * v_c)
+    m.stored_energy(j_1 * w**2 / 2 + (whole - j_1) * w_2**2 / 2 + p.k * x.twist**2 / 2)
+    m.loss("friction", (viscous + dry) * v_c)
+    m.loss("spring", p.d * rate**2)

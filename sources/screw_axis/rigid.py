@@ -17,33 +17,33 @@ import math
 
 import casadi as ca
 
-from ..component import Solver
+from .. import screw_axis as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import ANGLE, F_0, F_C, F_V, FLANGE, LEAD, MASS, PHI, SPEED, TAU, V_0, X_0, W, X
 
-LEVEL = 0
 # L-stable: close to standstill the friction has a time constant of v_0 M / F_c.
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-3))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    torque = m.input(TAU)
-    radius = m.parameter(LEAD) / (2 * math.pi)
-    inertia = m.parameter(MASS) * radius**2
-    angle, speed = m.state(ANGLE), m.state(SPEED)
-    v = radius * speed
-    viscous = m.parameter(F_V) * v
-    dry = m.parameter(F_C) * ca.tanh(v / m.parameter(V_0))
-    offset = m.parameter(F_0)
-    turned = angle + m.parameter(X_0) / radius
-    shaft = m.balance("screw", "rotation", velocity=speed, angle=turned, load=torque)
-    m.derivative(angle, speed)
-    m.derivative(speed, (torque + radius * (offset - viscous - dry) + shaft.effort) / inertia)
-    m.output(W, speed)
-    m.output(PHI, angle)
-    m.output(X, radius * angle)
-    m.port(FLANGE, torque, speed)
-    m.supply(offset * v)
-    m.stored_energy(inertia * speed**2 / 2)
+    u = m.inputs(qs.TAU)
+    p = m.parameters(qs.LEAD, qs.MASS, qs.F_V, qs.F_C, qs.V_0, qs.F_0, qs.X_0)
+    x = m.states(qs.ANGLE, qs.SPEED)
+    phi, w = x.angle, x.speed
+    r = p.lead / (2 * math.pi)
+    inertia = p.M * r**2
+    v = r * w
+    viscous = p.F_v * v
+    dry = p.F_c * ca.tanh(v / p.v_0)
+    turned = phi + p.x_0 / r
+    shaft = m.balance("screw", "rotation", velocity=w, angle=turned, load=u.tau)
+    m.derivative(phi, w)
+    m.derivative(w, (u.tau + r * (p.F_0 - viscous - dry) + shaft.effort) / inertia)
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.output(qs.X, r * phi)
+    m.port(qs.FLANGE, u.tau, w)
+    m.supply(p.F_0 * v)
+    m.stored_energy(inertia * w**2 / 2)
     m.loss("friction", (viscous + dry) * v)

@@ -53,7 +53,7 @@ class SlipLaw(Protocol):
 
 
 @dataclass(frozen=True)
-class Candidate:
+class LawCandidate:
     """A law.
 
     Attributes:
@@ -131,7 +131,7 @@ def _candidates() -> tuple[SlipLaw, ...]:
     single = [(term,) for term in TERMS]
     pairs = [("1", term) for term in TERMS if term != "1"]
     inner = [(), *single, *pairs, ("sum",)]
-    linear = [Candidate(outer, other) for outer in [*single, *pairs] for other in inner]
+    linear = [LawCandidate(outer, other) for outer in [*single, *pairs] for other in inner]
     return (*linear, OuterSkid())
 
 
@@ -163,7 +163,7 @@ def path_error(turns: Turns, e2: Vector, e3: Vector, c: Constants, angle: float)
 
 
 @dataclass(frozen=True)
-class Score:
+class LawScore:
     """What a law is worth on sets that it was not fitted to.
 
     Attributes:
@@ -192,14 +192,14 @@ class Score:
         return float(np.std(means, ddof=1) / np.sqrt(len(means)))
 
 
-def _scored(turns: Turns, found: Vector, e2: Vector, e3: Vector, c: Constants) -> Score:
+def _scored(turns: Turns, found: Vector, e2: Vector, e3: Vector, c: Constants) -> LawScore:
     w_z, radius = predict(turns, found[0], found[1], c)
     quarter = path_error(turns, found[0], found[1], c, np.pi / 2)
-    return Score(found[0] - e2, found[1] - e3, radius / turns.R_S - 1, w_z / turns.w_z - 1,
+    return LawScore(found[0] - e2, found[1] - e3, radius / turns.R_S - 1, w_z / turns.w_z - 1,
                  quarter, turns.group)  # fmt: skip
 
 
-def left_out(law: SlipLaw, turns: Turns, e2: Vector, e3: Vector, c: Constants) -> Score:
+def left_out(law: SlipLaw, turns: Turns, e2: Vector, e3: Vector, c: Constants) -> LawScore:
     """Score of a law on each set, fitted to the other sets."""
     found = np.empty((2, e2.size))
     for group in np.unique(turns.group):
@@ -209,7 +209,7 @@ def left_out(law: SlipLaw, turns: Turns, e2: Vector, e3: Vector, c: Constants) -
     return _scored(turns, found, e2, e3, c)
 
 
-def other_runs(turns: Turns, e2: Vector, e3: Vector, c: Constants) -> Score:
+def other_runs(turns: Turns, e2: Vector, e3: Vector, c: Constants) -> LawScore:
     """Score of the mean of the other runs of the same set: what scatter alone leaves."""
     found = np.empty((2, e2.size))
     for i in range(e2.size):
@@ -220,7 +220,7 @@ def other_runs(turns: Turns, e2: Vector, e3: Vector, c: Constants) -> Score:
 
 def ranked(
     turns: Turns, e2: Vector, e3: Vector, c: Constants, laws: Iterable[SlipLaw] = CANDIDATES
-) -> list[tuple[SlipLaw, Score]]:
+) -> list[tuple[SlipLaw, LawScore]]:
     """Laws by their error on the sets left out, without those whose virtual wheels would meet."""
     found = []
     for law in laws:
@@ -230,14 +230,16 @@ def ranked(
     return sorted(found, key=lambda item: item[1].error)
 
 
-def simplest(table: list[tuple[SlipLaw, Score]]) -> SlipLaw:
+def simplest(table: list[tuple[SlipLaw, LawScore]]) -> SlipLaw:
     """The law with fewest parameters within one standard error of the best, of these the best."""
     best = table[0][1]
     near = [item for item in table if item[1].error <= best.error + best.deviation]
     return min(near, key=lambda item: (item[0].size, item[1].error))[0]
 
 
-def nested(turns: Turns, e2: Vector, e3: Vector, c: Constants) -> tuple[Score, dict[int, SlipLaw]]:
+def nested(
+    turns: Turns, e2: Vector, e3: Vector, c: Constants
+) -> tuple[LawScore, dict[int, SlipLaw]]:
     """Score of choosing a law: in each fold it is chosen, and fitted, without the set left out."""
     found = np.empty((2, e2.size))
     chosen: dict[int, SlipLaw] = {}

@@ -89,29 +89,25 @@ def profile(m: Model) -> Profile:
     A value that goes from one segment to the next by d over the time tau contributes
     `d * ramp((t - start of the segment) / tau)`; the contributions are added, so ramps may overlap.
     """
-    start = m.parameter(T_0)
-    duration, speed = m.parameter(DURATION), m.parameter(SPEED)
-    curvature, turn = m.parameter(CURVATURE), m.parameter(TURN)
-    acceleration, yaw_acceleration = m.parameter(A), m.parameter(ALPHA)
-    t_curve, smooth = m.parameter(T_CURVE), m.parameter(SMOOTH)
+    p = m.parameters(T_0, DURATION, SPEED, CURVATURE, TURN, A, ALPHA, T_CURVE, SMOOTH)
 
     def ramp(begin: SX, length: SX) -> SX:
         r = ca.fmax(0.0, ca.fmin(1.0, (m.t - begin) / length))
-        return (1.0 - smooth) * r + smooth * r**2 * (3.0 - 2.0 * r)
+        return (1.0 - p.smooth) * r + p.smooth * r**2 * (3.0 - 2.0 * r)
 
     shortest = 1e-9  # where two values are equal there is nothing to ramp
-    now = Profile(ca.SX(0.0), curvature[0], ca.SX(0.0))
-    begin = start
+    now = Profile(ca.SX(0.0), p.curvature[0], ca.SX(0.0))
+    begin = p.t_0
     for k in range(SEGMENTS + 1):
         ended = k == SEGMENTS
-        d_speed = (0.0 if ended else speed[k]) - (speed[k - 1] if k else 0.0)
-        d_turn = (0.0 if ended else turn[k]) - (turn[k - 1] if k else 0.0)
-        d_curve = 0.0 if ended or not k else curvature[k] - curvature[k - 1]
+        d_speed = (0.0 if ended else p.speed[k]) - (p.speed[k - 1] if k else 0.0)
+        d_turn = (0.0 if ended else p.turn[k]) - (p.turn[k - 1] if k else 0.0)
+        d_curve = 0.0 if ended or not k else p.curvature[k] - p.curvature[k - 1]
         now = Profile(
-            now.speed + d_speed * ramp(begin, ca.fmax(ca.fabs(d_speed) / acceleration, shortest)),
-            now.curvature + d_curve * ramp(begin, t_curve),
-            now.turn + d_turn * ramp(begin, ca.fmax(ca.fabs(d_turn) / yaw_acceleration, shortest)),
+            now.speed + d_speed * ramp(begin, ca.fmax(ca.fabs(d_speed) / p.a, shortest)),
+            now.curvature + d_curve * ramp(begin, p.t_curve),
+            now.turn + d_turn * ramp(begin, ca.fmax(ca.fabs(d_turn) / p.alpha, shortest)),
         )
         if not ended:
-            begin = begin + duration[k]
+            begin = begin + p.duration[k]
     return now

@@ -17,25 +17,26 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import trajectory as qs
+from ..component import Fidelity
 from ..model import Model
-from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D, profile
+from . import SOLVER, profile
 
-LEVEL = 0
-__all__ = ["SOLVER", "equations"]
+FIDELITY = Fidelity(level=0, solver=SOLVER)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    v_set, w_set = m.input(V_SET), m.input(W_SET)
+    u = m.inputs(qs.V_SET, qs.W_SET)
+    x = m.states(qs.HEADING)
     now = profile(m)
-    v_d = now.speed + v_set
+    v_d = now.speed + u.v_set
     v_d += m.balance("speed", "signal", unit="m/s", value=v_d).effort
-    w_d = now.curvature * now.speed + now.turn + w_set
+    w_d = now.curvature * now.speed + now.turn + u.w_set
     w_d += m.balance("yaw_rate", "signal", unit="rad/s", value=w_d).effort
-    heading = m.state(HEADING)
-    m.derivative(heading, w_d)
-    m.output(V_D, v_d)
-    m.output(W_D, w_d)
-    m.output(XD_D, v_d * ca.cos(heading))
-    m.output(YD_D, v_d * ca.sin(heading))
-    m.output(PHI_D, heading)
+    m.derivative(x.heading, w_d)
+    m.output(qs.V_D, v_d)
+    m.output(qs.W_D, w_d)
+    m.output(qs.XD_D, v_d * ca.cos(x.heading))
+    m.output(qs.YD_D, v_d * ca.sin(x.heading))
+    m.output(qs.PHI_D, x.heading)

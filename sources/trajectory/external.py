@@ -11,22 +11,23 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import trajectory as qs
+from ..component import Fidelity
 from ..model import Model
-from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D
+from . import SOLVER
 
-LEVEL = 2
-__all__ = ["SOLVER", "equations"]
+FIDELITY = Fidelity(level=2, solver=SOLVER)
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    v_d, w_d = m.input(V_SET), m.input(W_SET)
-    v_d = v_d + m.balance("speed", "signal", unit="m/s", value=v_d).effort
-    w_d = w_d + m.balance("yaw_rate", "signal", unit="rad/s", value=w_d).effort
-    heading = m.state(HEADING)
-    m.derivative(heading, w_d)
-    m.output(V_D, v_d)
-    m.output(W_D, w_d)
-    m.output(XD_D, v_d * ca.cos(heading))
-    m.output(YD_D, v_d * ca.sin(heading))
-    m.output(PHI_D, heading)
+    u = m.inputs(qs.V_SET, qs.W_SET)
+    x = m.states(qs.HEADING)
+    v_d = u.v_set + m.balance("speed", "signal", unit="m/s", value=u.v_set).effort
+    w_d = u.w_set + m.balance("yaw_rate", "signal", unit="rad/s", value=u.w_set).effort
+    m.derivative(x.heading, w_d)
+    m.output(qs.V_D, v_d)
+    m.output(qs.W_D, w_d)
+    m.output(qs.XD_D, v_d * ca.cos(x.heading))
+    m.output(qs.YD_D, v_d * ca.sin(x.heading))
+    m.output(qs.PHI_D, x.heading)

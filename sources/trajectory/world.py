@@ -16,30 +16,33 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import trajectory as qs
+from ..component import Fidelity
 from ..model import Model
 from ..quantity import Quantity
-from . import HEADING, PHI_D, SOLVER, V_D, V_SET, W_D, W_SET, XD_D, YD_D, profile
+from . import SOLVER, profile
 
-LEVEL = 1
+FIDELITY = Fidelity(level=1, solver=SOLVER)
 CRAB = Quantity("crab", "rad", "angle from the set heading to the course, positive to the left")
-__all__ = ["SOLVER", "equations"]
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    v_set, w_set = m.input(V_SET), m.input(W_SET)
-    now, crab = profile(m), m.parameter(CRAB)
-    speed = now.speed
-    speed += m.balance("speed", "signal", unit="m/s", value=speed).effort
-    w_d = now.curvature * now.speed + now.turn + w_set
+    u = m.inputs(qs.V_SET, qs.W_SET)
+    now = profile(m)
+    p = m.parameters(CRAB)
+    x = m.states(qs.HEADING)
+    s = now.speed
+    s += m.balance("speed", "signal", unit="m/s", value=s).effort
+    w_d = now.curvature * now.speed + now.turn + u.w_set
     w_d += m.balance("yaw_rate", "signal", unit="rad/s", value=w_d).effort
-    phi_d = m.state(HEADING)
+    phi_d = x.heading
     m.derivative(phi_d, w_d)
-    course = phi_d + crab
-    xd_d = speed * ca.cos(course) + v_set * ca.cos(phi_d)
-    yd_d = speed * ca.sin(course) + v_set * ca.sin(phi_d)
-    m.output(V_D, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d)
-    m.output(W_D, w_d)
-    m.output(XD_D, xd_d)
-    m.output(YD_D, yd_d)
-    m.output(PHI_D, phi_d)
+    chi = phi_d + p.crab
+    xd_d = s * ca.cos(chi) + u.v_set * ca.cos(phi_d)
+    yd_d = s * ca.sin(chi) + u.v_set * ca.sin(phi_d)
+    m.output(qs.V_D, ca.cos(phi_d) * xd_d + ca.sin(phi_d) * yd_d)
+    m.output(qs.W_D, w_d)
+    m.output(qs.XD_D, xd_d)
+    m.output(qs.YD_D, yd_d)
+    m.output(qs.PHI_D, phi_d)

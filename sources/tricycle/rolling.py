@@ -12,25 +12,31 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import tricycle as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import PHI, POSE_PHI, POSE_X, POSE_Y, RATIO, STEER, W_Z, L, R, V, W, X, Y
 
-LEVEL = 0
-SOLVER = Solver("rk4", 0.02)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 0.02))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    told, w = m.input(STEER), m.input(W)
-    w += m.balance("speed", "signal", unit="rad/s", value=w).effort
-    delta = m.parameter(RATIO) * told
+    u = m.inputs(qs.STEER, qs.W)
+    p = m.parameters(qs.RATIO, qs.R, qs.L)
+    x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
+    w = u.w + m.balance("speed", "signal", unit="rad/s", value=u.w).effort
+    delta = p.ratio * u.steer
     delta += m.balance("steer", "signal", unit="rad", value=delta).effort
-    driven = m.parameter(R) * w
-    v, w_z = driven * ca.cos(delta), driven * ca.sin(delta) / m.parameter(L)
-    x, y, phi = m.state(POSE_X), m.state(POSE_Y), m.state(POSE_PHI)
-    m.derivative(x, v * ca.cos(phi))
-    m.derivative(y, v * ca.sin(phi))
-    m.derivative(phi, w_z)
-    for quantity, value in ((X, x), (Y, y), (PHI, phi), (V, v), (W_Z, w_z)):
+    driven = p.r * w
+    v, w_z = driven * ca.cos(delta), driven * ca.sin(delta) / p.l
+    m.derivative(x.pose_x, v * ca.cos(x.pose_phi))
+    m.derivative(x.pose_y, v * ca.sin(x.pose_phi))
+    m.derivative(x.pose_phi, w_z)
+    for quantity, value in (
+        (qs.X, x.pose_x),
+        (qs.Y, x.pose_y),
+        (qs.PHI, x.pose_phi),
+        (qs.V, v),
+        (qs.W_Z, w_z),
+    ):
         m.output(quantity, value)

@@ -17,15 +17,14 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_arm as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 5
 # The last link on its gear swings at 1 kHz, sqrt(K/J) = 6e3 1/s; RK4 is stable up to 2.8e4 1/s.
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=5, solver=Solver("rk4", 1e-4))
 K = Quantity(
     "K",
     "N.m/rad",
@@ -70,31 +69,31 @@ QD_LINK = Quantity("qd_link", "rad/s", "speeds of the links behind the gears", s
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount = at_rest(read_mount(m))
-    tau, added = m.input(TAU), m.input(J_ADDED)
-    stiffness, damping = m.parameter(K), m.parameter(D)
-    theta, thetad = m.state(ANGLE), m.state(SPEED)
-    twist, rate = m.state(TWIST), m.state(TWIST_RATE)
-    q, qd = theta - twist, thetad - rate
-    hub = added + m.parameter(J_HUB)
-    driving = tau + joint_efforts(m, thetad, theta, tau)
+    u = m.inputs(qs.TAU, qs.J_ADDED)
+    p = m.parameters(K, D, J_HUB)
+    x = m.states(qs.ANGLE, qs.SPEED, TWIST, TWIST_RATE)
+    theta, thetad = x.angle, x.speed
+    q, qd = theta - x.twist, thetad - x.twist_rate
+    hub = u.J_added + p.J_hub
+    driving = u.tau + joint_efforts(m, thetad, theta, u.tau)
     gear = m.balance(
-        "gear", "compliance", deflection=twist, rate=rate, stiffness=stiffness, damping=damping
+        "gear", "compliance", deflection=x.twist, rate=x.twist_rate, stiffness=p.K, damping=p.D
     )
-    through = stiffness * twist + damping * rate - gear.effort
+    through = p.K * x.twist + p.D * x.twist_rate - gear.effort
     arm = links(m, mount, q, qd)
     output = m.parameter(J_OUT) * ca.SX.ones(6)
     dynamics = arm.accelerate(through, output)
     acceleration = (driving - through) / hub
     m.derivative(theta, thetad)
-    m.derivative(twist, rate)
+    m.derivative(x.twist, x.twist_rate)
     m.derivative(thetad, acceleration)
-    m.derivative(rate, acceleration - dynamics.acceleration)
-    output_motion(m, mount, theta, thetad, arm.posture, tau)
+    m.derivative(x.twist_rate, acceleration - dynamics.acceleration)
+    output_motion(m, mount, theta, thetad, arm.posture, u.tau)
     m.output(Q_LINK, q)
     m.output(QD_LINK, qd)
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
     kinetic, potential = arm.energy()
     m.stored_energy(kinetic + potential + ca.dot(output, qd**2) / 2)
-    m.stored_energy(ca.dot(hub, thetad**2) / 2 + ca.dot(stiffness, twist**2) / 2)
-    m.loss("gears", ca.dot(damping, rate**2))
+    m.stored_energy(ca.dot(hub, thetad**2) / 2 + ca.dot(p.K, x.twist**2) / 2)
+    m.loss("gears", ca.dot(p.D, x.twist_rate**2))

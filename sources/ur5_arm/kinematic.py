@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .. import ur5_arm as qs
+from ..component import Fidelity
 from ..laws.rigid_chain import Posture
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, chain, joint_efforts, output_motion, output_wrench, read_mount
 
-LEVEL = 0
+FIDELITY = Fidelity(level=0)
 J_LINK = Quantity(
     "J_link",
     "kg.m2",
@@ -34,12 +35,14 @@ J_LINK = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount = read_mount(m)
-    tau, rotor = m.input(TAU), m.input(J_ADDED)
-    inertia = m.parameter(J_LINK) + rotor
-    q, qd = m.state(ANGLE), m.state(SPEED)
+    u = m.inputs(qs.TAU, qs.J_ADDED)
+    p = m.parameters(J_LINK)
+    x = m.states(qs.ANGLE, qs.SPEED)
+    inertia = p.J_link + u.J_added
+    q, qd = x.angle, x.speed
     m.derivative(q, qd)
-    m.derivative(qd, (tau + joint_efforts(m, qd, q, tau)) / inertia)
-    output_motion(m, mount, q, qd, Posture(chain(m), q), tau)
+    m.derivative(qd, (u.tau + joint_efforts(m, qd, q, u.tau)) / inertia)
+    output_motion(m, mount, q, qd, Posture(chain(m), q), u.tau)
     zero = ca.SX.zeros(6)
     output_wrench(m, at_rest(mount), ca.SX.zeros(6, 6), zero, zero)
     m.stored_energy(ca.dot(inertia, qd**2) / 2)

@@ -7,33 +7,13 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import ur5_arm as qs
 from ..laws.rigid_chain import Chain, ForwardDynamics, Posture, standard_dh, upper_triangle
 from ..laws.rotation import product, quaternion_rate, rotation_matrix, rotation_vector
 from ..model import SX, Model
-from . import (
-    ARM_BIAS,
-    ARM_INERTIA,
-    GRAVITY,
-    JOINT,
-    MOUNT_ACCELERATION,
-    MOUNT_ANGULAR_ACCELERATION,
-    MOUNT_FORCE,
-    MOUNT_MOMENT,
-    MOUNT_POSITION,
-    MOUNT_QUATERNION,
-    MOUNT_RATE,
-    MOUNT_ROTATION,
-    MOUNT_TRANSLATION,
-    MOUNT_VELOCITY,
-    QD,
-    TOOL_POSITION,
-    TOOL_ROTATION,
-    WRENCH,
-    Q,
-)
 
 
-class Mount(NamedTuple):
+class MountMotion(NamedTuple):
     """Motion of the mount: pose in the world, twist and acceleration in its own axes."""
 
     position: SX
@@ -44,25 +24,33 @@ class Mount(NamedTuple):
     angular_acceleration: SX
 
 
-def read_mount(m: Model) -> Mount:
+def read_mount(m: Model) -> MountMotion:
     """Declare the inputs that say how the mount moves."""
-    return Mount(
-        m.input(MOUNT_POSITION),
-        m.input(MOUNT_QUATERNION),
-        m.input(MOUNT_VELOCITY),
-        m.input(MOUNT_RATE),
-        m.input(MOUNT_ACCELERATION),
-        m.input(MOUNT_ANGULAR_ACCELERATION),
+    u = m.inputs(
+        qs.MOUNT_POSITION,
+        qs.MOUNT_QUATERNION,
+        qs.MOUNT_VELOCITY,
+        qs.MOUNT_RATE,
+        qs.MOUNT_ACCELERATION,
+        qs.MOUNT_ANGULAR_ACCELERATION,
+    )
+    return MountMotion(
+        u.mount_position,
+        u.mount_quaternion,
+        u.mount_velocity,
+        u.mount_rate,
+        u.mount_acceleration,
+        u.mount_angular_acceleration,
     )
 
 
-def at_rest(mount: Mount) -> Mount:
+def at_rest(mount: MountMotion) -> MountMotion:
     """The same pose without motion."""
     zero = ca.SX.zeros(3)
-    return Mount(mount.position, mount.quaternion, zero, zero, zero, zero)
+    return MountMotion(mount.position, mount.quaternion, zero, zero, zero, zero)
 
 
-def move_mount(m: Model, mount: Mount) -> None:
+def move_mount(m: Model, mount: MountMotion) -> None:
     """Tell the energy test how the mount's pose and velocity follow from its twist."""
     m.input_rate(mount.position, rotation_matrix(mount.quaternion) @ mount.velocity)
     m.input_rate(mount.quaternion, quaternion_rate(mount.quaternion, mount.rate))
@@ -102,7 +90,7 @@ class Links:
         tool_twist: velocity and angular velocity of the flange, in its axes.
     """
 
-    mount: Mount
+    mount: MountMotion
     posture: Posture
     qd: SX
     gravity: SX
@@ -133,9 +121,10 @@ class Links:
         return self.posture.kinetic_energy(rates, velocities), -ca.dot(self.gravity, moment)
 
 
-def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
+def links(m: Model, mount: MountMotion, q: SX, qd: SX) -> Links:
     """Build the chain of the device and open the balances of gravity and of the tool."""
-    level = ca.vertcat(0, 0, -m.parameter(GRAVITY))
+    p = m.parameters(qs.GRAVITY)
+    level = ca.vertcat(0, 0, -p.gravity)
     tilted = level + m.balance("base", "gravity", value=level).effort
     rotation = rotation_matrix(mount.quaternion)
     gravity = rotation.T @ tilted
@@ -157,7 +146,9 @@ def links(m: Model, mount: Mount, q: SX, qd: SX) -> Links:
     return Links(mount, posture, qd, gravity, tool.effort, ca.vertcat(velocity, rate))
 
 
-def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torque: SX) -> None:
+def output_motion(
+    m: Model, mount: MountMotion, q: SX, qd: SX, posture: Posture, torque: SX
+) -> None:
     """Output joint motion and tool pose and bind the port of the joints.
 
     `q`, `qd` belong to the gear outputs, `posture` to the links.
@@ -165,17 +156,17 @@ def output_motion(m: Model, mount: Mount, q: SX, qd: SX, posture: Posture, torqu
     position, _ = posture.flange()
     rotation = rotation_matrix(mount.quaternion)
     attitude = product(mount.quaternion, posture.flange_quaternion())
-    m.output(Q, q)
-    m.output(QD, qd)
-    m.output(TOOL_POSITION, mount.position + rotation @ position)
-    m.output(TOOL_ROTATION, rotation_vector(attitude))
-    m.port(JOINT, torque, qd)
+    m.output(qs.Q, q)
+    m.output(qs.QD, qd)
+    m.output(qs.TOOL_POSITION, mount.position + rotation @ position)
+    m.output(qs.TOOL_ROTATION, rotation_vector(attitude))
+    m.port(qs.JOINT, torque, qd)
 
 
-def output_wrench(m: Model, mount: Mount, inertia: SX, bias: SX, wrench: SX) -> None:
+def output_wrench(m: Model, mount: MountMotion, inertia: SX, bias: SX, wrench: SX) -> None:
     """Output the wrench and what it consists of; bind the ports of the mount."""
-    m.output(WRENCH, wrench)
-    m.output(ARM_INERTIA, upper_triangle(inertia))
-    m.output(ARM_BIAS, bias)
-    m.port(MOUNT_TRANSLATION, m.output(MOUNT_FORCE, wrench[:3]), mount.velocity)
-    m.port(MOUNT_ROTATION, m.output(MOUNT_MOMENT, wrench[3:]), mount.rate)
+    m.output(qs.WRENCH, wrench)
+    m.output(qs.ARM_INERTIA, upper_triangle(inertia))
+    m.output(qs.ARM_BIAS, bias)
+    m.port(qs.MOUNT_TRANSLATION, m.output(qs.MOUNT_FORCE, wrench[:3]), mount.velocity)
+    m.port(qs.MOUNT_ROTATION, m.output(qs.MOUNT_MOMENT, wrench[3:]), mount.rate)

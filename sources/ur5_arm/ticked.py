@@ -20,14 +20,13 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_arm as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 
-LEVEL = 2
-SOLVER = Solver("rk4", 1e-3)
+FIDELITY = Fidelity(level=2, solver=Solver("rk4", 1e-3))
 T = Quantity("T", "s", "period of the ticks", start=5e-4, minimum=1e-6, variability="fixed")
 HELD_SPEED = Quantity("held_speed", "rad/s", "joint speeds from one tick to the next", size=6)
 HELD_ACCELERATION = Quantity(
@@ -38,23 +37,24 @@ HELD_ACCELERATION = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount = at_rest(read_mount(m))
-    tau, rotor = m.input(TAU), m.input(J_ADDED)
-    period = m.parameter(T)
-    tick = m.clock("mechanics", period)
-    q, speed = m.state(ANGLE), m.state(SPEED)
-    qd, qdd = m.discrete(HELD_SPEED), m.discrete(HELD_ACCELERATION)
-    effort = joint_efforts(m, qd, q, tau)
+    u = m.inputs(qs.TAU, qs.J_ADDED)
+    p = m.parameters(T)
+    x = m.states(qs.ANGLE, qs.SPEED)
+    z = m.discretes(HELD_SPEED, HELD_ACCELERATION)
+    q, qd, qdd = x.angle, z.held_speed, z.held_acceleration
+    tick = m.clock("mechanics", p.T)
+    effort = joint_efforts(m, qd, q, u.tau)
     arm = links(m, mount, q, qd)
-    dynamics = arm.accelerate(tau + effort, rotor)
-    m.update(tick, qd, qd + period * dynamics.acceleration)
+    dynamics = arm.accelerate(u.tau + effort, u.J_added)
+    m.update(tick, qd, qd + p.T * dynamics.acceleration)
     m.update(tick, qdd, dynamics.acceleration)
     m.derivative(q, qd)
-    m.derivative(speed, qdd)
-    output_motion(m, mount, q, qd, arm.posture, tau)
+    m.derivative(x.speed, qdd)
+    output_motion(m, mount, q, qd, arm.posture, u.tau)
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
-    kinetic, potential = replace(arm, qd=speed).energy()
-    stored = kinetic + potential + ca.dot(rotor, speed**2) / 2
-    rate = ca.jtimes(stored, ca.vertcat(q, speed), ca.vertcat(qd, qdd))
+    kinetic, potential = replace(arm, qd=x.speed).energy()
+    stored = kinetic + potential + ca.dot(u.J_added, x.speed**2) / 2
+    rate = ca.jtimes(stored, ca.vertcat(q, x.speed), ca.vertcat(qd, qdd))
     m.stored_energy(stored)
-    m.supply(rate - ca.dot(tau + effort, qd) - ca.dot(arm.load, arm.tool_twist))
+    m.supply(rate - ca.dot(u.tau + effort, qd) - ca.dot(arm.load, arm.tool_twist))

@@ -25,15 +25,13 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_arm as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ANGLE, J_ADDED, SPEED, TAU
 from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
 from .ticked import HELD_ACCELERATION, HELD_SPEED, T
 
-LEVEL = 3
-SOLVER = Solver("rk4", 1e-3)
 COMPLIANCES = tuple(3e-5 * 1.5**k for k in range(12))
 """Compliances of gears, 3e-5 to 2.6e-3 rad/(N.m), close enough together that the oscillation of a
 damped joint at one of them resembles that in between."""
@@ -65,9 +63,14 @@ HELD_RATE = Quantity("held_rate", "rad/s", "rates of the twist from one tick to 
 HELD_TWISTING = Quantity(
     "held_twisting", "rad/s2", "accelerations of the twist at the last tick", size=6
 )
-NAME, SOFT, PLACES = "elastic", (C, T_D), tuple(f"joint_{i + 1}" for i in range(6))
-LIMITS: dict[str, dict[str, float]] = {"ticked": {}, "ticked_elastic": {}}
-"""Fidelities that no compliance at an element gives, and what has to be set for that."""
+FIDELITY = Fidelity(
+    level=3,
+    solver=Solver("rk4", 1e-3),
+    limits={"ticked": {}, "ticked_elastic": {}},
+    soft=(C, T_D),
+    called="elastic",
+    places=tuple(f"joint_{i + 1}" for i in range(6)),
+)
 J_LEAST = (0.08, 0.3, 0.07, 7e-3, 3e-3, 1.3e-4)
 """Least inertia [kg.m2] that a joint has to move, all others free, in any pose of the UR5."""
 NO_SPRING = 0.01
@@ -78,46 +81,46 @@ none without compliance, where nothing twists."""
 def equations(m: Model) -> None:
     """Collect the equations."""
     mount = at_rest(read_mount(m))
-    tau, hub = m.input(TAU), m.input(J_ADDED)
-    compliance, period = m.parameter(C), m.parameter(T)
-    tick = m.clock("mechanics", period)
-    theta, speed = m.state(ANGLE), m.state(SPEED)
-    twist, rate = m.state(TWIST), m.state(TWIST_RATE)
-    thetad, thetadd = m.discrete(HELD_SPEED), m.discrete(HELD_ACCELERATION)
-    twistd, twistdd = m.discrete(HELD_RATE), m.discrete(HELD_TWISTING)
-    driving = tau + joint_efforts(m, thetad, theta, tau)
-    q, qd = theta - twist, thetad - twistd
+    u = m.inputs(qs.TAU, qs.J_ADDED)
+    p = m.parameters(C, T)
+    x = m.states(qs.ANGLE, qs.SPEED, TWIST, TWIST_RATE)
+    z = m.discretes(HELD_SPEED, HELD_ACCELERATION, HELD_RATE, HELD_TWISTING)
+    theta, thetad, thetadd = x.angle, z.held_speed, z.held_acceleration
+    twistd, twistdd = z.held_rate, z.held_twisting
+    tick = m.clock("mechanics", p.T)
+    driving = u.tau + joint_efforts(m, thetad, theta, u.tau)
+    q, qd = theta - x.twist, thetad - twistd
     arm = links(m, mount, q, qd)
 
-    limit = period**2 / ca.SX(J_LEAST)
-    declared = m.parameter(T_D)
-    damping = declared + period / (1 + (compliance / limit) ** 2)
+    limit = p.T**2 / ca.SX(J_LEAST)
+    t_d = m.parameter(T_D)
+    damping = t_d + p.T / (1 + (p.c / limit) ** 2)
     # the hub eliminated: the links feel it through the spring as an inertia and a torque
-    stiff = damping * period / (compliance * hub + damping * period)
-    carried = stiff * hub
-    passed = stiff * driving + carried * (twist / damping + twistd) / period
+    stiff = damping * p.T / (p.c * u.J_added + damping * p.T)
+    carried = stiff * u.J_added
+    passed = stiff * driving + carried * (x.twist / damping + twistd) / p.T
     dynamics = arm.accelerate(passed, carried)
     torque = passed - carried * dynamics.acceleration
-    twisting = ((compliance * torque - twist) / damping - twistd) / period
+    twisting = ((p.c * torque - x.twist) / damping - twistd) / p.T
     turning = dynamics.acceleration + twisting
-    m.update(tick, thetad, thetad + period * turning)
+    m.update(tick, thetad, thetad + p.T * turning)
     m.update(tick, thetadd, turning)
-    m.update(tick, twistd, twistd + period * twisting)
+    m.update(tick, twistd, twistd + p.T * twisting)
     m.update(tick, twistdd, twisting)
     m.derivative(theta, thetad)
-    m.derivative(speed, thetadd)
-    m.derivative(twist, twistd)
-    m.derivative(rate, twistdd)
-    output_motion(m, mount, theta, thetad, arm.posture, tau)
+    m.derivative(x.speed, thetadd)
+    m.derivative(x.twist, twistd)
+    m.derivative(x.twist_rate, twistdd)
+    output_motion(m, mount, theta, thetad, arm.posture, u.tau)
     locked = arm.posture.mass_properties().matrix()
     output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
-    kinetic, potential = replace(arm, qd=speed - rate).energy()
-    stiffness = compliance / (compliance**2 + (NO_SPRING * limit) ** 2)
-    springs = ca.dot(stiffness, twist**2) / 2
-    stored = kinetic + potential + ca.dot(hub, speed**2) / 2 + springs
-    states = ca.vertcat(theta, speed, twist, rate)
+    kinetic, potential = replace(arm, qd=x.speed - x.twist_rate).energy()
+    stiffness = p.c / (p.c**2 + (NO_SPRING * limit) ** 2)
+    springs = ca.dot(stiffness, x.twist**2) / 2
+    stored = kinetic + potential + ca.dot(u.J_added, x.speed**2) / 2 + springs
+    states = ca.vertcat(theta, x.speed, x.twist, x.twist_rate)
     rates = ca.jtimes(stored, states, ca.vertcat(thetad, thetadd, twistd, twistdd))
-    heat = ca.dot(declared * stiffness, rate**2)
+    heat = ca.dot(t_d * stiffness, x.twist_rate**2)
     m.stored_energy(stored)
     m.loss("gears", heat)
     m.supply(rates + heat - ca.dot(driving, thetad) - ca.dot(arm.load, arm.tool_twist))

@@ -8,30 +8,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from .. import ur5_drive as qs
 from ..model import SX, Model
-from . import (
-    CURRENT,
-    ETA,
-    F_SENSOR,
-    I_MEASURED,
-    J_B,
-    J_M,
-    JOINT,
-    K_T,
-    L_A,
-    Q_MEASURED,
-    Q_SET,
-    QD,
-    QD_SET,
-    R_A,
-    SENSED,
-    TAU,
-    B,
-    I,
-    N,
-    Q,
-    U,
-)
 
 
 class Servo(NamedTuple):
@@ -59,15 +37,14 @@ def effort(m: Model, name: str, kind: str, unit: str = "", **signals: SX) -> SX:
 
 def read(m: Model) -> Servo:
     """Declare the inputs and let effects disturb command and sensors."""
-    q_set, qd_set = m.input(Q_SET), m.input(QD_SET)
-    q, qd = m.input(Q), m.input(QD)
-    m.input_rate(q, qd)
-    command = ca.vertcat(q_set, qd_set)
+    u = m.inputs(qs.Q_SET, qs.QD_SET, qs.Q, qs.QD)
+    m.input_rate(u.q, u.qd)
+    command = ca.vertcat(u.q_set, u.qd_set)
     command = command + m.balance("command", "bundle", value=command).effort
-    reading = q + effort(m, "encoder", "signal", "rad", value=q)
-    speed = qd + effort(m, "speed_sensor", "signal", "rad/s", value=qd)
-    m.output(Q_MEASURED, reading)
-    return Servo(command[:6], command[6:], reading, speed, q, qd)
+    reading = u.q + effort(m, "encoder", "signal", "rad", value=u.q)
+    speed = u.qd + effort(m, "speed_sensor", "signal", "rad/s", value=u.qd)
+    m.output(qs.Q_MEASURED, reading)
+    return Servo(command[:6], command[6:], reading, speed, u.q, u.qd)
 
 
 class Winding(NamedTuple):
@@ -83,35 +60,35 @@ class Winding(NamedTuple):
 
 def winding(m: Model, qd: SX, voltage: SX) -> Winding:
     """Declare the windings, L i' = u - R i - K_t N qd, with their losses and stored energy."""
-    current = m.state(CURRENT)
-    resistance, inductance, constant = m.parameter(R_A), m.parameter(L_A), m.parameter(K_T)
-    ratio = m.parameter(N)
-    emf = constant * ratio
+    p = m.parameters(qs.R_A, qs.L_A, qs.K_T, qs.N)
+    x = m.states(qs.CURRENT)
+    emf = p.K_t * p.N
     disturbance = effort(
         m,
         "winding",
         "winding",
-        current=current,
-        speed=ratio * qd,
+        current=x.current,
+        speed=p.N * qd,
         voltage=voltage,
-        resistance=resistance,
-        emf_constant=constant,
+        resistance=p.R_a,
+        emf_constant=p.K_t,
     )
-    m.derivative(current, (voltage - resistance * current - emf * qd + disturbance) / inductance)
-    m.supply(ca.dot(voltage, current))
-    m.stored_energy(ca.dot(inductance, current**2) / 2)
-    m.loss("winding", ca.dot(resistance, current**2))
-    m.output(I, current)
-    m.output(U, voltage)
-    output_current(m, current)
-    return Winding(ratio, current, resistance, inductance, emf, disturbance)
+    m.derivative(x.current, (voltage - p.R_a * x.current - emf * qd + disturbance) / p.L_a)
+    m.supply(ca.dot(voltage, x.current))
+    m.stored_energy(ca.dot(p.L_a, x.current**2) / 2)
+    m.loss("winding", ca.dot(p.R_a, x.current**2))
+    m.output(qs.I, x.current)
+    m.output(qs.U, voltage)
+    output_current(m, x.current)
+    return Winding(p.N, x.current, p.R_a, p.L_a, emf, disturbance)
 
 
 def output_current(m: Model, current: SX) -> None:
     """Current sensors of first order."""
-    sensed = m.state(SENSED)
-    m.derivative(sensed, 2 * math.pi * m.parameter(F_SENSOR) * (current - sensed))
-    m.output(I_MEASURED, sensed + effort(m, "current_sensor", "signal", "A", value=sensed))
+    p = m.parameters(qs.F_SENSOR)
+    x = m.states(qs.SENSED)
+    m.derivative(x.sensed, 2 * math.pi * p.f_sensor * (current - x.sensed))
+    m.output(qs.I_MEASURED, x.sensed + effort(m, "current_sensor", "signal", "A", value=x.sensed))
 
 
 def gear(
@@ -130,18 +107,18 @@ def gear(
         acting: current that acts as torque, if it is not the winding's own; the power in between
             counts as supplied.
     """
-    eta, friction = m.parameter(ETA), m.parameter(B)
-    friction = friction + effort(m, "friction", "coefficient", "N.m.s/rad", value=friction)
+    p = m.parameters(qs.ETA, qs.B, qs.J_M)
+    friction = p.b + effort(m, "friction", "coefficient", "N.m.s/rad", value=p.b)
     motor = coils.emf * (coils.current if acting is None else acting)
-    share = factor(eta, motor * servo.speed)
+    share = factor(p.eta, motor * servo.speed)
     driving = share * motor
     torque = driving - friction * servo.speed
     torque = torque + effort(
         m, "joint", "rotation", velocity=servo.speed, angle=servo.angle, load=driving
     )
-    m.output(TAU, torque)
-    m.output(J_B, coils.ratio**2 * m.parameter(J_M))
-    m.port(JOINT, torque, servo.speed)
+    m.output(qs.TAU, torque)
+    m.output(qs.J_B, coils.ratio**2 * p.J_m)
+    m.port(qs.JOINT, torque, servo.speed)
     m.loss("gears", ca.dot((1 - share) * motor, servo.speed))
     m.loss("bearings", ca.dot(friction, servo.speed**2))
     if acting is not None:

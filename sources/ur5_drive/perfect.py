@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_drive as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import ETA, J_B, J_M, JOINT, K_T, R_A, TAU, I, N, U
 from .gearmotor import effort, output_current, read
 
-LEVEL = 0
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-4))
 K = Quantity(
     "k",
     "N.m/rad",
@@ -46,16 +45,16 @@ D = Quantity(
 def equations(m: Model) -> None:
     """Collect the equations."""
     servo = read(m)
-    ratio, constant = m.parameter(N), m.parameter(K_T)
-    hold = m.parameter(K) * (servo.q_set - servo.q) + m.parameter(D) * (servo.qd_set - servo.qd)
+    p = m.parameters(qs.N, qs.K_T, K, D, qs.ETA, qs.R_A)
+    hold = p.k * (servo.q_set - servo.q) + p.d * (servo.qd_set - servo.qd)
     torque = hold + effort(
         m, "joint", "rotation", velocity=servo.speed, angle=servo.angle, load=hold
     )
-    current = hold / (m.parameter(ETA) * ratio * constant)
-    m.output(TAU, torque)
-    m.output(I, current)
-    m.output(U, m.parameter(R_A) * current + constant * ratio * servo.speed)
-    output_current(m, current)
-    m.output(J_B, ratio**2 * m.parameter(J_M))
-    m.port(JOINT, torque, servo.speed)
+    i = hold / (p.eta * p.N * p.K_t)
+    m.output(qs.TAU, torque)
+    m.output(qs.I, i)
+    m.output(qs.U, p.R_a * i + p.K_t * p.N * servo.speed)
+    output_current(m, i)
+    m.output(qs.J_B, p.N**2 * m.parameter(qs.J_M))
+    m.port(qs.JOINT, torque, servo.speed)
     m.supply(ca.dot(hold, servo.speed))

@@ -18,15 +18,14 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_drive as qs
+from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from . import INTEGRAL, KD, KI, KP, U_MAX
 from .gearmotor import gear, read, winding
 
-LEVEL = 3
 # The 2 kHz sensor is the fastest: 1.26 time constants per step, where RK4 is stable up to 2.8.
-SOLVER = Solver("rk4", 1e-4)
+FIDELITY = Fidelity(level=3, solver=Solver("rk4", 1e-4))
 T = Quantity("T", "s", "period of the servo", start=5e-4, minimum=1e-6, variability="fixed")
 VOLTAGE = Quantity("voltage", "V", "terminal voltages, held by the servo", size=6, nominal=10.0)
 MEAN_CURRENT = Quantity("mean_current", "A", "mean currents of the present period", size=6)
@@ -35,19 +34,18 @@ MEAN_CURRENT = Quantity("mean_current", "A", "mean currents of the present perio
 def equations(m: Model) -> None:
     """Collect the equations."""
     servo = read(m)
-    period, limit = m.parameter(T), m.parameter(U_MAX)
-    tick = m.clock("servo", period)
-    voltage, integral = m.discrete(VOLTAGE), m.discrete(INTEGRAL)
-    mean = m.discrete(MEAN_CURRENT)
+    p = m.parameters(T, qs.U_MAX, qs.KP, qs.KD, qs.KI)
+    z = m.discretes(VOLTAGE, qs.INTEGRAL, MEAN_CURRENT)
+    tick = m.clock("servo", p.T)
     error = servo.q_set - servo.q
-    wanted = m.parameter(KP) * error + integral + m.parameter(KD) * (servo.qd_set - servo.qd)
-    set_voltage = ca.fmax(-limit, ca.fmin(wanted, limit))
-    m.update(tick, voltage, set_voltage)
-    m.update(tick, integral, integral + m.parameter(KI) * error * period)
-    coils = winding(m, servo.speed, voltage)
+    wanted = p.Kp * error + z.integral + p.Kd * (servo.qd_set - servo.qd)
+    set_voltage = ca.fmax(-p.u_max, ca.fmin(wanted, p.u_max))
+    m.update(tick, z.voltage, set_voltage)
+    m.update(tick, z.integral, z.integral + p.Ki * error * p.T)
+    coils = winding(m, servo.speed, z.voltage)
     driving = set_voltage - coils.emf * servo.speed + coils.disturbance
     final = driving / coils.resistance
-    periods = period * coils.resistance / coils.inductance
+    periods = p.T * coils.resistance / coils.inductance
     share = -ca.expm1(-periods) / periods
-    m.update(tick, mean, final + (coils.current - final) * share)
-    gear(m, servo, coils, lambda eta, power: eta, acting=mean)
+    m.update(tick, z.mean_current, final + (coils.current - final) * share)
+    gear(m, servo, coils, lambda eta, power: eta, acting=z.mean_current)

@@ -18,14 +18,13 @@ import math
 
 import casadi as ca
 
-from ..component import Solver
+from .. import ur5_drive as qs
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import INTEGRAL, KD, KI, KP, U_MAX
 from .gearmotor import Servo, gear, read, winding
 
-LEVEL = 1
-SOLVER = Solver("rodas3", 1e-3)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3", 1e-3))
 T_F = Quantity(
     "T_f", "s", "filter time of the derivative", start=1 / (2 * math.pi * 400), minimum=1e-6
 )
@@ -34,14 +33,14 @@ FILTERED = Quantity("filtered", "rad", "state: filtered angle errors", size=6, n
 
 def control(m: Model, servo: Servo) -> SX:
     """Voltages of the continuous PID."""
-    integral, filtered = m.state(INTEGRAL), m.state(FILTERED)
+    p = m.parameters(T_F, qs.KI, qs.U_MAX, qs.KP, qs.KD)
+    x = m.states(qs.INTEGRAL, FILTERED)
     error = servo.q_set - servo.q
-    change = (error - filtered) / m.parameter(T_F)
-    m.derivative(integral, m.parameter(KI) * error)
-    m.derivative(filtered, change)
-    limit = m.parameter(U_MAX)
-    wanted = m.parameter(KP) * error + integral + m.parameter(KD) * change
-    return ca.fmax(-limit, ca.fmin(wanted, limit))
+    change = (error - x.filtered) / p.T_f
+    m.derivative(x.integral, p.Ki * error)
+    m.derivative(x.filtered, change)
+    wanted = p.Kp * error + x.integral + p.Kd * change
+    return ca.fmax(-p.u_max, ca.fmin(wanted, p.u_max))
 
 
 def equations(m: Model) -> None:

@@ -16,14 +16,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import SX, Model
 from ..quantity import Quantity
 from .gearmotor import gear, read, winding
 from .servo import control
 
-LEVEL = 2
-SOLVER = Solver("rodas3", 1e-4)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3", 1e-4))
 P_0 = Quantity("P_0", "W", "power over which the efficiency changes side", start=0.5, minimum=1e-6)
 
 
@@ -31,9 +30,9 @@ def equations(m: Model) -> None:
     """Collect the equations."""
     servo = read(m)
     coils = winding(m, servo.speed, control(m, servo))
-    blend = m.parameter(P_0)
+    p = m.parameters(P_0)
 
     def factor(eta: SX, power: SX) -> SX:
-        return eta ** ca.tanh(power / blend)
+        return eta ** ca.tanh(power / p.P_0)
 
     gear(m, servo, coils, factor)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.bristle import STICK
 from ..laws.contact import SMALL
 from ..laws.floor import MU_D, MU_S
@@ -28,8 +28,7 @@ from ..model import SX, Model
 from ..quantity import Quantity
 from .wheel import Contact, wheel
 
-LEVEL = 4
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=4, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 V_S = Quantity(
     "v_s", "m/s", "slip velocity over which static friction falls", start=0.02, minimum=1e-6
 )
@@ -49,25 +48,24 @@ LOAD_FLOOR = 1.0
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    mu_s, mu_d, v_s = m.parameter(MU_S), m.parameter(MU_D), m.parameter(V_S)
-    stiffness, damping, kappa = m.parameter(K_T), m.parameter(D_T), m.parameter(KAPPA)
-    z_x, z_y = m.state(Z_X), m.state(Z_Y)
+    p = m.parameters(MU_S, MU_D, V_S, K_T, D_T, KAPPA)
+    x = m.states(Z_X, Z_Y)
 
     def friction(c: Contact) -> tuple[SX, SX]:
-        patch = m.balance("mu", "coefficient", unit="1", value=mu_s, x=c.x, y=c.y)
+        patch = m.balance("mu", "coefficient", unit="1", value=p.mu_s, x=c.x, y=c.y)
         square = c.s_x**2 + c.s_y**2
-        mu = (mu_d + (mu_s - mu_d) * ca.exp(-square / v_s**2)) * (1 + patch.effort / mu_s)
-        largest = mu * ca.fmax(c.f_n, LOAD_FLOOR) / stiffness
-        used = ca.sqrt(z_x**2 + z_y**2 + SMALL) / largest
-        x = ca.fmax(0, ca.fmin((used - STICK) / (1 - STICK), 1))
-        sliding = x**2 * (3 - 2 * x) * ca.sqrt(square + SMALL) / largest
-        decay = sliding + kappa * ca.sqrt(c.rolling**2 + SMALL)
-        m.derivative(z_x, c.s_x - decay * z_x)
-        m.derivative(z_y, c.s_y - decay * z_y)
-        stuck = damping * ca.fmax(0, 1 - used)
-        deflection = z_x**2 + z_y**2
-        m.stored_energy(stiffness * deflection / 2)
-        m.loss("slip", stiffness * decay * deflection + stuck * square)
-        return -stiffness * z_x - stuck * c.s_x, -stiffness * z_y - stuck * c.s_y
+        mu = (p.mu_d + (p.mu_s - p.mu_d) * ca.exp(-square / p.v_s**2)) * (1 + patch.effort / p.mu_s)
+        largest = mu * ca.fmax(c.f_n, LOAD_FLOOR) / p.k_t
+        used = ca.sqrt(x.z_x**2 + x.z_y**2 + SMALL) / largest
+        blend = ca.fmax(0, ca.fmin((used - STICK) / (1 - STICK), 1))
+        sliding = blend**2 * (3 - 2 * blend) * ca.sqrt(square + SMALL) / largest
+        decay = sliding + p.kappa * ca.sqrt(c.rolling**2 + SMALL)
+        m.derivative(x.z_x, c.s_x - decay * x.z_x)
+        m.derivative(x.z_y, c.s_y - decay * x.z_y)
+        stuck = p.d_t * ca.fmax(0, 1 - used)
+        deflection = x.z_x**2 + x.z_y**2
+        m.stored_energy(p.k_t * deflection / 2)
+        m.loss("slip", p.k_t * decay * deflection + stuck * square)
+        return -p.k_t * x.z_x - stuck * c.s_x, -p.k_t * x.z_y - stuck * c.s_y
 
     wheel(m, friction, elastic=True)

@@ -14,24 +14,23 @@ Source: Johnson, Contact Mechanics, 1985, ch. 8 (creep of rolling bodies); the l
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import contact
 from ..laws.floor import MU
 from ..model import SX, Model
 from .rolling import creep_coefficients
 from .wheel import Contact, wheel
 
-LEVEL = 1
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=1, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    mu = m.parameter(MU)
+    p = m.parameters(MU)
 
     def friction(c: Contact) -> tuple[SX, SX]:
-        patch = m.balance("mu", "coefficient", unit="1", value=mu, x=c.x, y=c.y)
+        patch = m.balance("mu", "coefficient", unit="1", value=p.mu, x=c.x, y=c.y)
         c_x, c_y = creep_coefficients(m, c)
-        return contact.creep(c.s_x, c.s_y, c_x, c_y, (mu + patch.effort) * c.f_n)
+        return contact.creep(c.s_x, c.s_y, c_x, c_y, (p.mu + patch.effort) * c.f_n)
 
     wheel(m, friction)

@@ -12,15 +12,14 @@ Source: digital twin paper (pure rolling); Johnson, Contact Mechanics, 1985, ch.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws.contact import creep_coefficient
 from ..laws.floor import REST, V_CREEP
 from ..model import SX, Model
 from ..quantity import Quantity
 from .wheel import Contact, wheel
 
-LEVEL = 0
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 C_X = Quantity(
     "c_x",
     "m/(N.s)",
@@ -36,12 +35,12 @@ C_Y = Quantity(
 
 def creep_coefficients(m: Model, c: Contact) -> tuple[SX, SX]:
     """Creep coefficients of a contact, with what effects add."""
-    rest, v_creep = m.parameter(REST), m.parameter(V_CREEP)
+    p = m.parameters(REST, V_CREEP)
 
     def coefficient(name: str, quantity: Quantity) -> SX:
         value = m.parameter(quantity)
         balance = m.balance(name, "coefficient", unit="m/(N.s)", value=value, speed=c.rolling)
-        return creep_coefficient(value, rest, c.rolling, v_creep) + balance.effort
+        return creep_coefficient(value, p.rest, c.rolling, p.v_creep) + balance.effort
 
     c_y = coefficient("creep_y", C_Y)
     return coefficient("creep_x", C_X), c_y

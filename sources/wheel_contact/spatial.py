@@ -11,13 +11,12 @@ Source: digital twin paper, Contact block; MathWorks, Spatial Contact Force.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..model import Model
 from .stick_slip import stick_slip
 from .wheel import wheel
 
-LEVEL = 3
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=3, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 
 
 def equations(m: Model) -> None:

@@ -15,13 +15,12 @@ velocity); the blending is ours, MathWorks does not publish its own.
 
 from __future__ import annotations
 
-from ..component import Solver
+from ..component import Fidelity, Solver
 from ..laws import floor
 from ..model import SX, Model
 from .wheel import Contact, Friction, wheel
 
-LEVEL = 2
-SOLVER = Solver("rodas3_adaptive", 1e-3, 1e-5)
+FIDELITY = Fidelity(level=2, solver=Solver("rodas3_adaptive", 1e-3, 1e-5))
 
 
 def stick_slip(m: Model) -> Friction:

@@ -13,39 +13,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from .. import wheel_contact as qs
 from ..laws.contact import SMALL, normal_force, rolling_resistance
 from ..model import SX, Model
 from ..quantity import Quantity
-from . import (
-    ANGLE,
-    AXLE,
-    C_RR,
-    F_N,
-    F_X,
-    F_Y,
-    F_Z,
-    HUB_X,
-    HUB_Y,
-    HUB_Z,
-    J_ADDED,
-    J_W,
-    M_Z,
-    PHI,
-    SPEED,
-    T_TURN,
-    TAU,
-    V_X,
-    V_Y,
-    V_Z,
-    W_RR,
-    W_Z,
-    X_W,
-    Y_W,
-    YAW,
-    R,
-    W,
-    Z,
-)
 
 K = Quantity("k", "N/m", "normal stiffness of tread and floor", start=1e5, minimum=1.0, nominal=1e5)
 B = Quantity("b", "N.s/m", "normal damping", start=1500.0, minimum=0.0, nominal=1e3)
@@ -93,70 +64,67 @@ def wheel(
         computes_normal: the normal force comes from the height of the wheel, not from `f_n`.
         elastic: `friction` stores energy and reports its losses itself.
     """
-    torque, added = m.input(TAU), m.input(J_ADDED)
-    v_x, v_y, v_z, w_z = m.input(V_X), m.input(V_Y), m.input(V_Z), m.input(W_Z)
-    height, given = m.input(Z), m.input(F_N)
-    x_w, y_w = m.input(X_W), m.input(Y_W)
-    r, inertia = m.parameter(R), m.parameter(J_W)
-    c_rr, w_rr = m.parameter(C_RR), m.parameter(W_RR)
-    angle, speed = m.state(ANGLE), m.state(SPEED)
+    u = m.inputs(qs.TAU, qs.J_ADDED, qs.V_X, qs.V_Y, qs.V_Z, qs.W_Z, qs.Z, qs.F_N, qs.X_W, qs.Y_W)
+    p = m.parameters(qs.R, qs.J_W, qs.C_RR, qs.W_RR, qs.T_TURN)
+    x = m.states(qs.ANGLE, qs.SPEED)
+    phi, w = x.angle, x.speed
 
-    runout = m.balance("radius", "coefficient", unit="m", value=r, angle=angle)
-    radius = r + runout.effort
-    slope = ca.jacobian(radius, angle)  # of an eccentric wheel, else structurally 0
+    runout = m.balance("radius", "coefficient", unit="m", value=p.r, angle=phi)
+    r = p.r + runout.effort
+    slope = ca.jacobian(r, phi)  # of an eccentric wheel, else structurally 0
     toe = m.balance("toe", "coefficient", unit="rad", value=0).effort
-    direction = toe - m.parameter(T_TURN) * w_z
+    direction = toe - p.t_turn * u.w_z
     cos, sin = ca.cos(direction), ca.sin(direction)
 
     if computes_normal:
-        m.input_rate(height, v_z)
-        k, b, width = m.parameter(K), m.parameter(B), m.parameter(WIDTH)
-        f_n, energy, loss = normal_force(radius - height, slope * speed - v_z, k, b, width)
+        m.input_rate(u.z, u.v_z)
+        law = m.parameters(K, B, WIDTH)
+        f_n, energy, loss = normal_force(r - u.z, slope * w - u.v_z, law.k, law.b, law.width)
         m.stored_energy(energy)
         m.loss("normal", loss)
         lift = slope * f_n
-        m.port(HUB_Z, f_n, v_z)
+        m.port(qs.HUB_Z, f_n, u.v_z)
     else:
-        f_n, lift = given, 0
-        m.port(HUB_Z, 0, v_z)  # a rigid floor: the given force does no work
+        f_n, lift = u.f_n, 0
+        m.port(qs.HUB_Z, 0, u.v_z)  # a rigid floor: the given force does no work
 
-    s_x = cos * v_x + sin * v_y - radius * speed
-    s_y = cos * v_y - sin * v_x
-    along, across = friction(Contact(s_x, s_y, f_n, radius * speed, x_w, y_w))
+    s_x = cos * u.v_x + sin * u.v_y - r * w
+    s_y = cos * u.v_y - sin * u.v_x
+    along, across = friction(Contact(s_x, s_y, f_n, r * w, u.x_w, u.y_w))
     if not elastic:
         m.loss("slip", -(along * s_x + across * s_y))
-    resistance = rolling_resistance(c_rr, f_n, radius, speed, w_rr)
-    m.loss("rolling", resistance * speed)
+    resistance = rolling_resistance(p.c_rr, f_n, r, w, p.w_rr)
+    m.loss("rolling", resistance * w)
 
     axle = m.balance(
         "axle",
         "rotation",
-        velocity=speed,
-        angle=angle,
-        load=torque,
+        velocity=w,
+        angle=phi,
+        load=u.tau,
         normal=f_n,
-        radius=radius,
+        radius=r,
     )
     floor = m.balance(
         "floor",
         "pivot",
-        spin=w_z,
-        rolling=ca.sqrt((radius * speed) ** 2 + SMALL),
+        spin=u.w_z,
+        rolling=ca.sqrt((r * w) ** 2 + SMALL),
         normal=f_n,
     )
-    m.derivative(angle, speed)
+    m.derivative(phi, w)
     m.derivative(
-        speed,
-        (torque - radius * along - resistance - lift + axle.effort) / (inertia + added),
+        w,
+        (u.tau - r * along - resistance - lift + axle.effort) / (p.J_w + u.J_added),
     )
-    f_x = m.output(F_X, cos * along - sin * across)
-    f_y = m.output(F_Y, sin * along + cos * across)
-    m.output(F_Z, f_n)
-    m_z = m.output(M_Z, floor.effort)
-    m.output(W, speed)
-    m.output(PHI, angle)
-    m.stored_energy((inertia + added) * speed**2 / 2)
-    m.port(AXLE, torque, speed)
-    m.port(HUB_X, f_x, v_x)
-    m.port(HUB_Y, f_y, v_y)
-    m.port(YAW, m_z, w_z)
+    f_x = m.output(qs.F_X, cos * along - sin * across)
+    f_y = m.output(qs.F_Y, sin * along + cos * across)
+    m.output(qs.F_Z, f_n)
+    m_z = m.output(qs.M_Z, floor.effort)
+    m.output(qs.W, w)
+    m.output(qs.PHI, phi)
+    m.stored_energy((p.J_w + u.J_added) * w**2 / 2)
+    m.port(qs.AXLE, u.tau, w)
+    m.port(qs.HUB_X, f_x, u.v_x)
+    m.port(qs.HUB_Y, f_y, u.v_y)
+    m.port(qs.YAW, m_z, u.w_z)

@@ -11,24 +11,24 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..component import Solver
+from .. import wheel_mixer as qs
+from ..component import Fidelity, Solver
 from ..model import Model
-from . import TRACK, V_SET, W_L, W_R, W_SET, R
 
-LEVEL = 0
-SOLVER = Solver("rodas3_adaptive", 0.05, 1e-6)
+FIDELITY = Fidelity(level=0, solver=Solver("rodas3_adaptive", 0.05, 1e-6))
 """Implicit, so that a short lag needs no short steps."""
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    command = ca.vertcat(m.input(V_SET), m.input(W_SET))
+    u = m.inputs(qs.V_SET, qs.W_SET)
+    p = m.parameters(qs.R, qs.TRACK)
+    command = ca.vertcat(u.v_set, u.w_set)
     command += m.balance("command", "bundle", value=command).effort
     v, w = ca.vertsplit(command)
     v += m.balance("forward", "signal", unit="m/s", value=v).effort
     w += m.balance("turn", "signal", unit="rad/s", value=w).effort
-    r, track = m.parameter(R), m.parameter(TRACK)
-    speeds = ca.vertcat(v - track * w / 2, v + track * w / 2) / r
+    speeds = ca.vertcat(v - p.track * w / 2, v + p.track * w / 2) / p.r
     speeds += m.balance("wheels", "signal", unit="rad/s", value=speeds, wheels=speeds).effort
-    m.output(W_L, speeds[0])
-    m.output(W_R, speeds[1])
+    m.output(qs.W_L, speeds[0])
+    m.output(qs.W_R, speeds[1])

@@ -94,7 +94,7 @@ STRENGTH = Quantity("strength", "1", "test", start=1.0, strength=True)
 
 def with_tool(law: object) -> Oracle:
     """`rigid_moving` of the UR5 with a law of the test on its tool."""
-    component, equations, _ = fidelity("ur5_arm", "rigid_moving")
+    component, equations = fidelity("ur5_arm", "rigid_moving")
     effect = Effect("test", "test", ("body",), STRENGTH)
     model = Model(
         component,

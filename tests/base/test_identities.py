@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sources.function import Oracle
-from sources.model import Variable
+from sources.model import Declared
 from sources.variant import build_model
 
 pytestmark = pytest.mark.slow
@@ -53,7 +53,7 @@ EFFECTS = [
 def random_values(oracle: Oracle, rng: np.random.Generator) -> dict[str, float]:
     """States and inputs around their start values, in units of their nominal magnitude."""
 
-    def drawn(v: Variable) -> float:
+    def drawn(v: Declared) -> float:
         return v.start + rng.normal() * (v.quantity.nominal or 1.0) / 2
 
     model = oracle.model

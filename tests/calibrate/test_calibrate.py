@@ -9,7 +9,6 @@ from cosim.calibrate.estimate import channel_rms
 from cosim.calibrate.fit import fit
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
-from cosim.calibrate.validate import check_machines
 from cosim.errors import FmuCallError
 
 
@@ -146,18 +145,3 @@ def test_sensitivity(noisy, truth) -> None:
     estimate = fit(problem, truth, robust=False, polish=False)
     values = local(estimate)
     assert values["Kp_v"] > values["b"] > 0.0
-
-
-@pytest.mark.slow
-def test_two_machines_in_one_set(noisy, truth, short) -> None:
-    problem = noisy(4)
-    other = truth.copy()
-    other[problem.index("K_t")] = 0.0975
-    random = np.random.default_rng(5)
-    data = short.simulate(other, "stairs")
-    data = data + random.normal(size=data.shape) * short.sigma
-    mixed = problem.with_data({"stairs": data})
-    found = check_machines(fit(mixed, polish=False))
-    assert found and all(f.kind == "machine" for f in found)
-    assert "K_t" in {f.column for f in found}
-    assert not check_machines(fit(problem, polish=False))

@@ -113,7 +113,7 @@ def test_run_json(command: Command, tmp_path: Path) -> None:
     content = json.loads(done.out)
     assert list(content) == [
         "scenario", "variants", "algorithm", "step", "simulated_s", "wall_s", "fmu_steps",
-        "energy_residual_J", "comparison", "checks", "files",
+        "energy_residual_J", "comparison", "checks", "notes", "files",
     ]  # fmt: skip
     assert content["scenario"] == "motor_bench/ST1" and content["step"] == 1e-3
     assert content["variants"]["gearbox"] == "gearbox.lab_bench/lossy"

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from cosim import archives, markup, ssp
+from cosim import ssp
 from cosim.errors import FmuFileError, InputError, ScenarioError
 from cosim.fmu.archive import open_fmu
-from cosim.limits import DATA, UNPACKED
+from cosim.reading import archives, markup
+from cosim.reading.limits import DATA, UNPACKED
 from tests.small_fmus import T3, Y3, fmi2, fmi3, pack
 
 LARGE = 40_000_000

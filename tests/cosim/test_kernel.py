@@ -27,7 +27,7 @@ SINE = Function(lambda t: 20.0 * np.sin(30.0 * t))
 @pytest.fixture(scope="module", autouse=True)
 def library() -> Path:
     return build_kernel(
-        kernel.SOURCE, kernel.cache_folder() / kernel.library_name(), host_platform()
+        kernel.SOURCES, kernel.cache_folder() / kernel.library_name(), host_platform()
     )
 
 
@@ -158,14 +158,37 @@ def test_mixed_types_and_versions(algorithm: str, affine: Path, foreign3: Path) 
     assert np.ptp(recording["disc.w"]) > 0.0
 
 
-def test_numbers_are_cut_to_integers(affine: Path) -> None:
-    system = System("cut")
+def test_numbers_that_are_whole_up_to_rounding_become_integers(affine: Path) -> None:
+    system = System("rounded")
     system.add("a", str(affine))
     system.add("b", str(affine))
     system.connect("a.y", "b.n")
-    values = Table([0.0, 0.1, 0.2, 0.3], [2.9, -2.9, 0.0, 2147483646.9], extend=True)
+    values = Table(
+        [0.0, 0.1, 0.2, 0.3], [2.9999999999999996, -2.0 - 1e-10, 0.0, 2147483646.0], extend=True
+    )
     recording = both(system, 0.5, step=0.1, inputs={"a.u": values}, record=["b.next", "b.n"])
-    assert recording["b.next"].tolist() == [3.0, 3.0, 3.0, -1.0, 1.0, 2147483647.0]
+    assert recording["b.next"].tolist() == [4.0, 4.0, 4.0, -1.0, 1.0, 2147483647.0]
+
+
+@pytest.mark.parametrize("value", [0.4, 2.9999, -0.5, 1e9 + 0.5])
+def test_numbers_that_are_not_whole_do_not_become_integers(value: float, affine: Path) -> None:
+    system = System("fraction")
+    system.add("a", str(affine))
+    system.add("b", str(affine))
+    system.connect("a.y", "b.n")
+    error = errors(
+        system, 1.0, "jacobi", inputs={"a.u": Table([0.0, 0.3], [1.0, value], extend=True)}
+    )
+    assert f"setting n from a.y: {value!r} is no whole number, and type Int32" in str(error)
+
+
+@pytest.mark.parametrize("value", [0.4, 2.0, -1.0])
+def test_numbers_that_are_no_truth_value(value: float, affine: Path) -> None:
+    system = System("truth")
+    system.add("b", str(affine))
+    signal = Table([0.0, 0.3], [1.0, value], extend=True)
+    error = errors(system, 1.0, "jacobi", inputs={"b.on": signal})
+    assert f"setting on from table: {value!r} is neither true (1) nor false (0)" in str(error)
 
 
 def test_signed_zero(affine: Path) -> None:
@@ -335,7 +358,7 @@ def test_a_state_that_is_not_finite(algorithm: str, fmi: int) -> None:
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(3e9, "3e+09"), (-2147483649.0, "-2.14748e+09"), (2147483648.0, "2.14748e+09")],
+    [(3e9, "3000000000.0"), (-2147483649.0, "-2147483649.0"), (2147483648.0, "2147483648.0")],
 )
 def test_numbers_that_do_not_fit_an_integer(value: float, shown: str, affine: Path) -> None:
     system = System("unfit")
@@ -345,16 +368,18 @@ def test_numbers_that_do_not_fit_an_integer(value: float, shown: str, affine: Pa
     error = errors(
         system, 1.0, "jacobi", inputs={"a.u": Table([0.0, 0.3], [1.0, value], extend=True)},
     )  # fmt: skip
-    assert f"b (affine): setting n: {shown} does not fit type Int32 at t = 0.4 s" in str(error)
+    assert f"b (affine): setting n from a.y: {shown} does not fit type Int32 at t = 0.4 s" in str(
+        error
+    )
 
 
 def test_not_a_number_does_not_fit_an_integer(affine: Path, drifter: Path) -> None:
     system = System("unfit")
     system.add("source", str(drifter))
     system.add("b", str(affine))
-    system.connect("source.y", "b.n")
+    system.connect("source.y", "b.n", factor=10.0)  # time, so a whole number of tenths
     error = errors(system, 1.0, "jacobi", record=["b.next"])
-    assert "setting n: nan does not fit type Int32" in str(error)
+    assert "setting n from source.y: nan is no whole number" in str(error)
 
 
 STOP3 = """

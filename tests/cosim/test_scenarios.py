@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cosim.errors import InputError, ScenarioError, UnknownNameError, VariantError
+from cosim.running.runner import run
 from cosim.scenario import scenario
 from cosim.scenario.checks import circle_radius
-from cosim.scenario.runner import run
 from cosim.system.variants import apply, change
 
 SYSTEM = """
@@ -72,7 +72,7 @@ def test_run_and_files(folder: Path, provider, tmp_path: Path) -> None:
     content = json.loads((tmp_path / "out" / "result.json").read_text())
     assert list(content) == [
         "scenario", "variants", "algorithm", "step", "simulated_s", "wall_s", "fmu_steps",
-        "energy_residual_J", "comparison", "checks", "files",
+        "energy_residual_J", "comparison", "checks", "notes", "files",
     ]  # fmt: skip
     assert set(content["comparison"]["w"]) == {"unit", "rms", "max", "reference"}
     assert content["comparison"]["w"]["unit"] == "rad/s"
@@ -199,6 +199,8 @@ def test_apply_to_instance_component_or_slot() -> None:
     assert both["right"] == "gearbox.mir250/elastic+coulomb+backlash"
     slot = apply({"base": HERE["base"]}, {"wheel_contact": "brush"})
     assert slot == {"base": "mobile_base/six_dof[wheel_contact=brush]+payload@body"}
+    two = apply({"base": "mobile_base/six_dof[wheel_contact=brush,x=y]"}, {"wheel_contact": "a"})
+    assert two == {"base": "mobile_base/six_dof[wheel_contact=a,x=y]"}
     with pytest.raises(UnknownNameError, match=r"'wheel' is no instance, component or slot"):
         apply({"base": "x.fmu"}, {"wheel": "brush"})
 

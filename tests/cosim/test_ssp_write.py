@@ -185,8 +185,8 @@ def test_steps_of_inputs_come_at_their_time(tmp_path: Path) -> None:
 
 
 def test_a_scenario_with_logged_inputs(tmp_path: Path) -> None:
+    from cosim.running.runner import run_scenario
     from cosim.scenario import scenario
-    from cosim.scenario.runner import run_scenario
 
     file, _ = scenario.find("motor_bench")
     original = replace(file.scenario("ST1"), duration=0.6, record=None, references={}, checks=())

@@ -29,7 +29,7 @@ def provider() -> Built:
 @pytest.fixture(scope="session", autouse=True)
 def library() -> Path:
     return build_kernel(
-        kernel.SOURCE, kernel.cache_folder() / kernel.library_name(), host_platform()
+        kernel.SOURCES, kernel.cache_folder() / kernel.library_name(), host_platform()
     )
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import AlgebraicLoopError, StepError
-from cosim.master.algebraic_loops import invert
 from cosim.master.master import Master
+from cosim.master.newton import invert
 from cosim.system.system import System
 
 EXECUTORS = ["python", "c"]
@@ -67,8 +67,10 @@ def arm_and_base(provider) -> System:
 
 
 def test_arm_and_base_diverge_by_plain_exchange(provider, monkeypatch) -> None:
-    monkeypatch.setattr("cosim.master.algebraic_loops.ITERATIONS", 0)
-    monkeypatch.setattr("cosim.master.execution.PATIENCE", 1000)  # ended early by runaway values
+    monkeypatch.setattr("cosim.master.newton.ITERATIONS", 0)
+    monkeypatch.setattr(
+        "cosim.master.initialization.PATIENCE", 1000
+    )  # ended early by runaway values
     with pytest.raises(AlgebraicLoopError, match="algebraic loop"):
         Master(arm_and_base(provider), step=1e-3, executor="python").run(1e-3)
 

@@ -179,7 +179,7 @@ def test_step_control_stops_at_changes_of_inputs_and_takes_long_steps_at_rest(pr
 
 
 def test_step_control_gives_up_with_the_recording(provider, monkeypatch) -> None:
-    monkeypatch.setattr("cosim.master.step_control.SHORTEST", 0.3)
+    monkeypatch.setattr("cosim.master.algorithms.adaptive.SHORTEST", 0.3)
     master = Master(drive(provider), "adaptive", 1e-3, options={"tolerance": 1e-6})
     with pytest.raises(StepError, match="misses the tolerance 1e-06 of the step control") as caught:
         master.run(0.01, inputs=INPUTS)

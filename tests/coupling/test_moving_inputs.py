@@ -70,7 +70,7 @@ def test_executors_agree_where_only_some_inputs_can_move(
     assert runs[0].values.tobytes() == runs[1].values.tobytes()
     assert runs[0].bond_energy == runs[1].bond_energy
     plan = Master(third, algorithm, 1e-3, options={"extrapolation": order}).compile([], SIGNALS)
-    movers = {plan.means[a].instance for op, a, _ in plan.step.tolist() if op == Op.RAMP}
+    movers = {plan.means[a].instance for op, a, _ in plan.step.tolist() if op == Op.SET_DERIVATIVES}
     assert {plan.layout.instances[index] for index in movers} == {"load"}
 
 

@@ -9,7 +9,7 @@ from sources.function import Oracle
 from sources.tools.crawler_identification import LAWS, Turns, leave_one_set_out, predict
 from sources.tools.slip_laws import (
     CANDIDATES,
-    Candidate,
+    LawCandidate,
     OuterSkid,
     left_out,
     nested,
@@ -51,7 +51,7 @@ def test_figures_of_the_page() -> None:
 @pytest.mark.slow
 def test_choosing_a_law_is_worth_no_more_than_a_constant() -> None:
     score, chosen = nested(PART, E2[MOVING], E3[MOVING], PAPER)
-    constant = left_out(Candidate(("1",)), PART, E2[MOVING], E3[MOVING], PAPER)
+    constant = left_out(LawCandidate(("1",)), PART, E2[MOVING], E3[MOVING], PAPER)
     assert score.error * 100 == pytest.approx(3.34, abs=0.0051)  # printed to a hundredth
     assert constant.error * 100 == pytest.approx(3.27, abs=0.0051)
     assert len({str(law) for law in chosen.values()}) == 4  # another one in each fold
@@ -60,15 +60,15 @@ def test_choosing_a_law_is_worth_no_more_than_a_constant() -> None:
 def test_the_same_folds_as_the_older_evaluation() -> None:
     name = "e2 = a + b (w2 - w3), e3 = 0"
     old = leave_one_set_out(LAWS[name], PART, E2[MOVING], E3[MOVING], PAPER)
-    new = left_out(Candidate(("1", "(w2 - w3)")), PART, E2[MOVING], E3[MOVING], PAPER)
+    new = left_out(LawCandidate(("1", "(w2 - w3)")), PART, E2[MOVING], E3[MOVING], PAPER)
     got = rms(new.e2), rms(new.e3), rms(new.radius), rms(new.w_z)
     assert got == pytest.approx((old.e2, old.e3, old.R_S, old.w_z), rel=1e-9)  # rounding
 
 
 @pytest.mark.parametrize(
-    "law", [Candidate(("1", "w2"), ("sum",)), Candidate(("K",)), OuterSkid()], ids=str
+    "law", [LawCandidate(("1", "w2"), ("sum",)), LawCandidate(("K",)), OuterSkid()], ids=str
 )
-def test_a_law_is_found_in_turns_that_follow_it(law: Candidate | OuterSkid) -> None:
+def test_a_law_is_found_in_turns_that_follow_it(law: LawCandidate | OuterSkid) -> None:
     # shifts that the law itself gives, at speeds of 5 sets: nothing is left on the set left out
     e2, e3 = law.fitted(PART, E2[MOVING], E3[MOVING])(TURNS)
     w_z, radius = predict(TURNS, e2, e3, PAPER)

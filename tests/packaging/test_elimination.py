@@ -9,11 +9,12 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from sources.packaging import native, runtime
+from sources.packaging import c_functions, native, runtime
 from sources.packaging.build import host_platform
 from sources.packaging.elimination import Elimination, eliminate
 
@@ -125,7 +126,7 @@ def same(a: float, b: float) -> bool:
 
 def in_python(name: str) -> Callable[..., float]:
     """What the generated Python calls: a guarded function where Python's own raises."""
-    return getattr(runtime, f"_{name}", None) or getattr(math, name)
+    return getattr(c_functions, f"_{name}", None) or getattr(math, name)
 
 
 @pytest.mark.parametrize("name", ["div", *BINARY])
@@ -151,13 +152,14 @@ def test_sign_is_that_of_casadi(a: float) -> None:
     import casadi as ca
 
     x = ca.SX.sym("x")
-    assert same(runtime._sign(a), float(ca.Function("f", [x], [ca.sign(x)])(a)))
+    assert same(c_functions._sign(a), float(ca.Function("f", [x], [ca.sign(x)])(a)))
 
 
-def test_run_time_needs_only_the_standard_library() -> None:
+@pytest.mark.parametrize("module", [c_functions, runtime])
+def test_run_time_needs_only_the_standard_library(module: ModuleType) -> None:
     """Its text goes into every python FMU, where nothing of ours is installed."""
     code = "import sys; sys.modules['numpy'] = sys.modules['casadi'] = None\n"
-    source = Path(runtime.__file__).read_text(encoding="utf-8")
+    source = Path(str(module.__file__)).read_text(encoding="utf-8")
     result = subprocess.run(
         [sys.executable, "-I", "-c", code + source], capture_output=True, text=True, check=False
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from cosim.scenario.runner import Result, run
+from cosim.running.runner import Result, run
 from tests.fmus import fmu
 
 

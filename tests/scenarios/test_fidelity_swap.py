@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cosim.scenario.runner import run
+from cosim.running.runner import run
 from cosim.scenario.scenario import find
 from cosim.system.variants import component
 from sources.variant import fidelities

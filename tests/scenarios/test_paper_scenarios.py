@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cosim.scenario.plots import plot_overview
-from cosim.scenario.runner import run
+from cosim.running.plots import plot_overview
+from cosim.running.runner import run
 from cosim.scenario.scenario import find, scenario_files
 from tests.scenarios.running import PROVIDER, whole
 

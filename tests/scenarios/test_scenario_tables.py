@@ -9,7 +9,7 @@ import pytest
 
 from cosim.data.comparison import circle
 from cosim.errors import InputError, ScenarioError
-from cosim.scenario.runner import run
+from cosim.running.runner import run
 from cosim.scenario.scenario import find
 from tests.scenarios.running import PROVIDER
 

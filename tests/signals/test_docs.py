@@ -6,9 +6,9 @@ import re
 
 import pytest
 
+from cosim.spec.units import parse
 from sources import tables
 from sources.effect import KINDS
-from sources.units import parse
 from sources.variant import build_model, components, effects, fidelities
 
 COMPONENTS = sorted(components())

@@ -13,9 +13,9 @@ import pytest
 import cosim
 from cosim.errors import UnknownNameError, ValueRangeError
 from cosim.study import run_study, study_from
-from cosim.study.compute import Line, StudyChangedError
+from cosim.study.compute import GroupRunner, StudyChangedError
 from cosim.study.picture import _points
-from cosim.study.planning import make_plan
+from cosim.study.planning import plan_study
 from tests.cosim_fmus import rewrite
 from tests.coupling.faulty import MODES
 from tests.study.conftest import BASE
@@ -255,13 +255,13 @@ def test_an_fmu_that_changes_during_the_study_is_noticed(
     folder.mkdir()
     for path in faulty.iterdir():
         (folder / path.name).write_bytes(path.read_bytes())
-    plan = make_plan(failing(folder, "error"), provider)
+    plan = plan_study(failing(folder, "error"), provider)
     task = next(iter(plan.tasks.values()))
-    Line(task.group, plan.provider, None).close()
+    GroupRunner(task.group, plan.provider, None).close()
     with (folder / "faulty.fmu").open("ab") as file:
         file.write(b"\0")
     with pytest.raises(StudyChangedError, match="pair: FMU of good, FMU of bad is not what"):
-        Line(task.group, plan.provider, None)
+        GroupRunner(task.group, plan.provider, None)
 
 
 def test_building_meanwhile_does_not_change_the_study(

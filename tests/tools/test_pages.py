@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -41,6 +42,50 @@ def test_pages_of_results_are_up_to_date(name: str) -> None:
     assert (ROOT / name).read_text(encoding="utf-8") == wanted, message
 
 
+FIGURE = re.compile(r"(\d[\d.]*) (N\.m|kg|%|mm|mrad|ms)")
+PARTS = {"%": ("", 1e-2), "mm": ("m", 1e-3), "mrad": ("rad", 1e-3), "ms": ("s", 1e-3)}
+
+
+def is_rounded(figure: str, unit: str, effect: str) -> bool:
+    """Whether a figure is a rounded one of the estimates `name value [interval] unit`."""
+    base, factor = PARTS.get(unit, (unit, 1.0))
+    digits = len(figure.partition(".")[2])
+    estimates = re.findall(r"(-?\d[\d.e-]*) \[[^]]*\] ?([\w./]*)", effect)
+    return any(
+        of == base and f"{abs(float(value)) / factor:.{digits}f}" == figure
+        for value, of in estimates
+    )
+
+
+def found_in_readme(text: str) -> list[list[str]]:
+    """Rows (logs, before, what was found, after) of the README's table."""
+    section = text.split("## From logs to the missing effect")[1].split("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line[:1] == "|"]
+    return rows[2:]
+
+
+def disagreements(text: str) -> Iterator[str]:
+    """Cells of the README's table that are not what `results/data_sets.toml` says."""
+    (table,) = (t for t in tables.results()["data_sets"]["table"] if t["name"] == "sets")
+    known = {row[1]: row for row in table["rows"]}
+    for logs, before, sentence, after in found_in_readme(text):
+        _, _, _, effect, *wanted = known[logs.split()[-1]]
+        if [before, after] != wanted:
+            yield f"{logs}: {before} and {after} instead of {wanted}"
+        for figure, unit in FIGURE.findall(sentence):
+            if not is_rounded(figure, unit, effect):
+                yield f"{logs}: {figure} {unit} is not in {effect}"
+
+
+def test_the_readme_says_what_the_results_say() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(found_in_readme(text)) > 5
+    assert all(FIGURE.search(sentence) for _, _, sentence, _ in found_in_readme(text))
+    assert not list(disagreements(text))
+    assert len(list(disagreements(text.replace("1.51 kg", "1.52 kg")))) == 1
+    assert len(list(disagreements(text.replace("2.5–14", "2.5–13")))) == 1
+
+
 def test_a_page_that_quotes_other_figures_is_noticed() -> None:
     table = "\n".join(
         ["<!-- results: data_sets/time -->", "| set | s |", "<!-- end of results -->", "rest"]
@@ -68,6 +113,19 @@ def test_a_ragged_row_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_links_lead_somewhere(path: Path) -> None:
     assert not list(broken(path))
+
+
+def imports(text: str) -> Iterator[tuple[str, str]]:
+    """Modules and names of ours that a page imports in its examples."""
+    for module, names in re.findall(r"from (cosim[\w.]*) import ([\w, ]+)", text):
+        yield from ((module, name) for name in names.split(", "))
+
+
+def test_what_pages_import_is_there() -> None:
+    wanted = {item for path in PAGES for item in imports(path.read_text(encoding="utf-8"))}
+    assert ("cosim.diagnose", "diagnose") in wanted and len(wanted) > 5
+    gone = [item for item in wanted if not hasattr(importlib.import_module(item[0]), item[1])]
+    assert not gone
 
 
 def test_a_link_to_nothing_is_found(tmp_path: Path) -> None:

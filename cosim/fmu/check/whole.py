@@ -13,9 +13,9 @@ import zipfile
 from pathlib import Path
 from typing import Literal
 
-from ... import archives, markup
 from ...errors import FmuFileError
-from ...limits import TEXT, UNPACKED
+from ...reading import archives, markup
+from ...reading.limits import TEXT, UNPACKED
 from ..description import parse_description
 from ..metadata import ENTRY, parse_metadata
 from .content import check_binaries, check_entries, check_folders, check_sources

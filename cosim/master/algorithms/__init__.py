@@ -10,11 +10,13 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import UnknownNameError, listing
-from ...system.system import System
-from ..plan import Plan
+
+if TYPE_CHECKING:  # the command line asks for names only
+    from ...system.system import System
+    from ..plan import Plan
 
 
 def names() -> list[str]:

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops, reached
-from ..extrapolation import means, ramps
+from ..extrapolation import means, set_derivatives
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 
 
@@ -49,7 +49,12 @@ def compile_plan(
         step.append(copy)
         if spans[index][0] < spans[index][1]:
             step.append((Op.EXTRAPOLATE, *spans[index]))
-        step += [set_, *ramps(extrapolated, spans, index), (Op.STEP, index), (Op.GET, index)]
+        step += [
+            set_,
+            *set_derivatives(extrapolated, spans, index),
+            (Op.STEP, index),
+            (Op.GET, index),
+        ]
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "gauss_seidel",

@@ -16,12 +16,25 @@ approximation techniques for co-simulation methods, 2016.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import FmuCallError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import positive, refuse_without_states, smooth
-from ..plan import Iteration, Op, Plan, final_operations, initial_sweep, lay_out, operations
+from ..interpreter import Interpreter
+from ..newton import Newton
+from ..plan import Op, Plan, decoded, final_operations, initial_sweep, lay_out, operations
+from ..rollback import Checkpoint, restore, saved
+
+Vector = NDArray[np.float64]
+FIXED_POINT = 12
+"""Repetitions before Newton's method takes over."""
 
 
 def compile_plan(
@@ -36,9 +49,110 @@ def compile_plan(
         "iterated",
         layout,
         initial_sweep(system, layout),
-        operations([(Op.EXTERNAL,), *fresh, (Op.RECORD,), (Op.ITERATE,)]),
+        operations([(Op.EXTERNAL,), *fresh, (Op.RECORD,)]),
         final_operations(fresh),
         tuple(loop for _, loop in loops),
         operations(fresh),
-        iteration=Iteration(positive("tolerance", tolerance), smooth(system, layout)),
+        stepper=partial(
+            Iterated, tolerance=positive("tolerance", tolerance), smooth=smooth(system, layout)
+        ),
     )
+
+
+class Iterated:
+    """A `plan.Stepper` whose inputs are the means of begin and end values.
+
+    Args:
+        run: what steps.
+        tolerance: relative change of exchanged values at which they count as settled.
+        smooth: per copy, whether its values are continuous in time.
+    """
+
+    def __init__(self, run: Interpreter, tolerance: float, smooth: NDArray[np.bool_]) -> None:
+        self.run, self.tolerance = run, tolerance
+        self.sources = np.unique(run.layout.copy_source[smooth])
+        self.newton = Newton(self.sources.size, tolerance)
+        self.before, self.sweep = decoded(run.plan.step), decoded(run.plan.solving)
+        self.held = np.zeros(0)
+        self.repetitions = 0
+
+    def advance(self, last: int) -> None:
+        """Go on up to a communication point."""
+        run = self.run
+        while run.index < last:
+            for op, a, b in self.before:
+                run.do(op, a, b)
+            self.step()
+            run.index += 1
+
+    def restart(self) -> None:
+        """Forget what earlier steps were like."""
+        self.newton.valid[0] = 0
+
+    def steps(self) -> int:
+        """Steps of the whole system that were made, repeated ones too."""
+        return self.repetitions
+
+    def report(self) -> Mapping[str, Any]:
+        """Nothing to say."""
+        return {}
+
+    def step(self) -> None:
+        """One communication step."""
+        run = self.run
+        begin = run.values.copy()
+        with saved(run) as before:
+            end = begin[self.sources].tolist()
+            settled = not self.newton.valid[0] and self.fixed_point(before, begin, end)
+            if not settled:
+                end = begin[self.sources].tolist()
+                settled = self.newton.solve(lambda z: self.attempt(before, begin, z), end)
+            if not settled:
+                raise FmuCallError(
+                    f"{run.system.name}: the step of {run.step:.9g} s does not "
+                    "settle, neither by repetition nor by Newton's method; take a smaller "
+                    "communication step"
+                )
+        run.account(self.held[run.layout.bond_input - self.input_slots.start])
+
+    @property
+    def input_slots(self) -> slice:
+        """Where inputs stand among the values."""
+        inputs = self.run.layout.inputs
+        return slice(int(inputs[0, 0]), int(inputs[-1, 1]))
+
+    def fixed_point(self, before: Checkpoint, begin: Vector, end: list[float]) -> bool:
+        """Repeat the step with the end values of the last repetition; whether that settled."""
+        last = np.inf
+        for _ in range(FIXED_POINT):
+            found = self.attempt(before, begin, end)
+            size = max(
+                (abs(a - b) / max(1.0, abs(b)) for a, b in zip(found, end, strict=True)),
+                default=0.0,
+            )
+            end[:] = found
+            if size <= self.tolerance:
+                return True
+            if not size < last:
+                return False
+            last = size
+        return False
+
+    def attempt(self, before: Checkpoint, begin: Vector, end: list[float]) -> list[float]:
+        """End values of a step with inputs from given end values."""
+        run, layout = self.run, self.run.layout
+        restore(run, before)
+        self.repetitions += 1
+        values = run.values
+        values[self.sources] = 0.5 * (begin[self.sources] + np.array(end))
+        values[layout.copy_target] = (
+            values[layout.copy_source] * layout.copy_gain + layout.copy_offset
+        )
+        self.held = values[self.input_slots].copy()
+        for op in (Op.SET, Op.STEP, Op.GET):
+            for index in range(len(run.instances)):
+                run.do(op, index, 0)
+        for op, a, b in self.sweep:
+            run.do(op, a, b)
+        found: list[float] = values[self.sources].tolist()
+        return found

@@ -24,7 +24,7 @@ from collections.abc import Mapping, Sequence
 
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops, reached
-from ..extrapolation import factors, means, ramps, side_by_side, without_parts
+from ..extrapolation import factors, means, set_derivatives, side_by_side, without_parts
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 
 
@@ -56,7 +56,7 @@ def compile_plan(
             step.append((Op.EXTRAPOLATE, 0, len(extrapolated)))
         step += [(Op.SET, index) for index in everyone]
         for index in everyone:
-            step += ramps(extrapolated, spans, index)
+            step += set_derivatives(extrapolated, spans, index)
         step += [(op, index) for op in (Op.STEP, Op.GET) for index in everyone]
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(

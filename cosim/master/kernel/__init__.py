@@ -1,4 +1,4 @@
-"""The compiled executor of plans: finds its library and binds a run to it.
+"""The compiled executor of plans: finds its library and binds a run to it; `stepper` uses it.
 
 The library is part of an installed wheel; in a checkout it is compiled into the cache when FMUs are
 built. Without one, runs use the executor in Python, which gives the same numbers, bit for bit.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import hashlib
+import math
 import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,28 +23,30 @@ from numpy.typing import NDArray
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
 from ...spec import cache
-from ..algebraic_loops import Newton
-from ..input_derivatives import Ramps
+from ..input_derivatives import InputDerivatives
+from ..interpreter import Interpreter
 from ..plan import Op, Plan
 
-SOURCE = Path(__file__).with_name("kernel.c")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
+"""Of the library; the first is compiled and includes the others."""
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
-    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
-    "Boolean",
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
+    "Boolean", "Boolean2",
 )  # fmt: skip
-_TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Boolean2": 6}
+_TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
 
 
 class _Call(ct.Structure):
     _fields_ = (
         ("component", _P), ("function", _P), ("references", _P), ("buffer", _P), ("slots", _P),
         ("n_references", _I64), ("n_values", _I64), ("type", _I32), ("version", _I32),
+        ("warned", _I64),
     )  # fmt: skip
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P))
+    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64))
 
 
 class _Instruction(ct.Structure):
@@ -75,7 +78,7 @@ class _Mean(ct.Structure):
     )  # fmt: skip
 
 
-class _Ramp(ct.Structure):
+class _Derivatives(ct.Structure):
     _fields_ = (
         ("component", _P), ("function", _P), ("references", _P), ("orders", _P), ("values", _P),
         ("n", _I64),
@@ -85,15 +88,15 @@ class _Ramp(ct.Structure):
 class _Run(ct.Structure):
     _fields_ = (
         ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
-        ("n_instructions", _I64), ("times", _P), ("step", _D), ("external", _P),
+        ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
         ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
         ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
         ("past", _P), ("n_means", _I64),
-        ("average", _P), ("slope", _P), ("curve", _P), ("ramps", _P),
+        ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
         ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
-        ("failed_ramp", _I64),
+        ("failed_derivatives", _I64),
     )  # fmt: skip
 
 
@@ -116,21 +119,22 @@ class _Code(IntEnum):
     EXTRAPOLATE = 13
     SUBSTEP = 14
     HOLD = 15
-    RAMP = 16
+    SET_DERIVATIVES = 16
 
 
-UNFIT = 7
+UNFIT = 8
 """Status of a set call that was not made, because a number does not fit the variable's type."""
-UNSETTLED = 8
+UNSETTLED = 9
 """Status of an algebraic loop that has no solution or does not settle."""
-TOO_LONG, TOO_LARGE = 9, 10
+TOO_LONG, TOO_LARGE = 10, 11
 """Statuses of a run that took more than its limit, and of one that ran away."""
-_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Ramp)
+_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
 
 
 def library_name() -> str:
-    """File name of the library for this source and this machine."""
-    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    """File name of the library for these sources and this machine."""
+    content = b"\0".join(path.read_bytes() for path in SOURCES)
+    digest = hashlib.sha256(content).hexdigest()[:16]
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
         platform.machine().lower(), platform.machine().lower()
     )
@@ -159,7 +163,7 @@ def _load(path: str) -> Any:
 
 def find() -> Path | None:
     """The library, None if this machine has none."""
-    for folder in (SOURCE.parent / "lib", cache_folder()):
+    for folder in (SOURCES[0].parent / "lib", cache_folder()):
         path = folder / library_name()
         if path.is_file():
             return path
@@ -170,51 +174,28 @@ class Kernel:
     """A run bound to the compiled executor.
 
     Args:
-        plan: what to do in a communication step.
-        instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
-        values: the run's array of values, which the blocks view.
-        times, external: communication points and the external inputs there.
-        rows: where observed values go.
-        bond_energy: where the bonds' energy goes.
-        newtons: one per algebraic loop.
-        history, past: of extrapolated inputs, and how many values it has before the first step.
-        ramps: derivatives of the inputs that move within a step.
-        bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
+        bound: the run, whose arrays it works on.
+        plan: what to do in a communication step, if not the run's own plan.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        instances: Sequence[Instance],
-        outputs: Sequence[Block],
-        inputs: Sequence[Block],
-        values: NDArray[np.float64],
-        times: NDArray[np.float64],
-        step: float,
-        external: NDArray[np.float64],
-        rows: NDArray[np.float64],
-        bond_energy: NDArray[np.float64],
-        every: int,
-        newtons: Sequence[Newton] = (),
-        history: NDArray[np.float64] | None = None,
-        past: NDArray[np.int64] | None = None,
-        ramps: Ramps | None = None,
-        bond_mean: Sequence[int] = (),
-    ) -> None:
+    def __init__(self, bound: Interpreter, plan: Plan | None = None) -> None:
         path = find()
         if path is None:
             raise FileNotFoundError(library_name())
         self._library = _load(str(path))
-        layout = plan.layout
-        self._keep: list[Any] = [instances, outputs, inputs]
+        plan = plan or bound.plan
+        layout, instances = plan.layout, bound.instances
+        self._keep: list[Any] = [bound]
+        self._made: dict[type[ct.Structure], Any] = {}
+        self._bound = bound
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
         self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
         calls: list[_Call] = []
         spans: dict[tuple[Op, int], tuple[int, int]] = {}
         for op, blocks, slots in (
-            (Op.SET, inputs, layout.inputs),
-            (Op.GET, outputs, layout.outputs),
+            (Op.SET, bound.inputs, layout.inputs),
+            (Op.GET, bound.outputs, layout.outputs),
         ):
             for index, (instance, block) in enumerate(zip(instances, blocks, strict=True)):
                 first = len(calls)
@@ -225,12 +206,13 @@ class Kernel:
         self.run = _Run(
             members=self._structures(_Member, (_member(instance) for instance in instances)),
             calls=self._structures(_Call, calls),
-            values=self._array(values),
-            times=self._array(times),
-            step=step,
-            external=self._array(external),
+            values=self._array(bound.values),
+            times=self._array(bound.times),
+            step=bound.step,
+            end=float(bound.times[-1]),
+            external=self._array(bound.external),
             external_slot=self._array(layout.external),
-            n_external=external.shape[1],
+            n_external=bound.external.shape[1],
             copies=self._structures(
                 _Copy,
                 zip(
@@ -242,30 +224,30 @@ class Kernel:
                 _Copy,
                 zip(
                     layout.record_gain.tolist(), layout.record_offset.tolist(),
-                    layout.record_source.tolist(), range(rows.shape[1]), strict=True,
+                    layout.record_source.tolist(), range(bound.rows.shape[1]), strict=True,
                 ),
             ),
-            n_record=rows.shape[1],
-            every=every,
-            rows=self._array(rows),
+            n_record=bound.rows.shape[1],
+            every=bound.every,
+            rows=self._array(bound.rows),
             terms=self._structures(
                 _Term,
                 zip(
                     layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
                     layout.bond_output.tolist(), layout.bond_input.tolist(),
                     layout.bond_index.tolist(),
-                    bond_mean or [-1] * len(layout.bond_sign), strict=True,
+                    bound.bond_mean, strict=True,
                 ),
             ),
-            bond_energy=self._array(bond_energy),
+            bond_energy=self._array(bound.bond_energy),
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
-        told = self._ramps(ramps) if ramps is not None else {}
+        told = self._derivatives(bound.derivatives)
         instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
         loops = []
-        for loop, newton in zip(plan.loops, newtons, strict=True):
+        for loop, newton in zip(plan.loops, bound.newtons, strict=True):
             first = len(instructions)
             instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
             loops.append(
@@ -289,21 +271,22 @@ class Kernel:
             ),
         )
         self.run.n_means = len(plan.means)
-        if history is not None and past is not None:
-            self.run.history, self.run.past = self._array(history), self._array(past)
+        self.run.history, self.run.past = self._array(bound.history), self._array(bound.past)
 
-    def _ramps(self, ramps: Ramps) -> dict[tuple[int, int], tuple[int, int]]:
-        """Bind the calls of derivatives; per RAMP operation the first and behind the last."""
-        self.run.average = self._array(ramps.average)
-        self.run.slope, self.run.curve = self._array(ramps.slope), self._array(ramps.curve)
-        self._keep.append(ramps)
-        rows: list[_Ramp] = []
+    def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
+        """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
+        self.run.average = self._array(derivatives.average)
+        self.run.slope, self.run.curve = (
+            self._array(derivatives.slope),
+            self._array(derivatives.curve),
+        )
+        rows: list[_Derivatives] = []
         told = {}
-        for key, told_calls in ramps.calls.items():
+        for key, told_calls in derivatives.calls.items():
             for call in told_calls:
                 instance = self._instances[call.instance]
                 rows.append(
-                    _Ramp(
+                    _Derivatives(
                         instance.address, instance.functions["fmi2SetRealInputDerivatives"],
                         call.references.ctypes.data, call.orders.ctypes.data,
                         call.values.ctypes.data, call.references.size,
@@ -311,7 +294,7 @@ class Kernel:
                 )  # fmt: skip
                 self._told.append((instance, call.references))
             told[key] = (len(rows) - len(told_calls), len(rows))
-        self.run.ramps = self._structures(_Ramp, rows)
+        self.run.derivatives = self._structures(_Derivatives, rows)
         return told
 
     def _array(self, array: NDArray[Any]) -> int:
@@ -326,6 +309,7 @@ class Kernel:
         items = [row if isinstance(row, kind) else kind(*row) for row in rows]
         array = (kind * max(len(items), 1))(*items)
         self._keep.append(array)
+        self._made[kind] = array
         return ct.addressof(array)
 
     def _call(self, op: Op, instance: Instance, block: Block, part: Any, base: int) -> _Call:
@@ -355,6 +339,28 @@ class Kernel:
         """Begin again at the first communication point."""
         self.run.index = self.run.row = self.run.next_record = 0
 
+    def reached(self) -> float | None:
+        """The time that the failed step has reached, where the FMU says so [s]."""
+        instance = self._instances[self.run.failed_member]
+        if instance.binding.version != 3:
+            return None
+        return float(self._made[_Member][self.run.failed_member].reached)
+
+    def hand_over(self) -> None:
+        """Give the interpreter what it needs to go on within a step."""
+        terms = list(self._made[_Term])[: len(self._bound.previous)]
+        self._bound.previous = [term.previous for term in terms]
+        self._bound.held[:] = [term.held for term in terms]
+
+    def note_warnings(self) -> None:
+        """Tell the instances which of their calls returned warnings."""
+        for (op, instance, _), call in zip(self._parts, self._made[_Call], strict=False):
+            if call.warned:
+                instance.warned("getting values" if op is Op.GET else "setting values", math.nan)
+        for instance, member in zip(self._instances, self._made[_Member], strict=False):
+            if member.warned:
+                instance.warned("a step", math.nan)
+
     def failed(self) -> tuple[Op, Instance | None, Any]:
         """What failed: operation, instance and what it was about.
 
@@ -363,12 +369,12 @@ class Kernel:
         A recorded value that is not finite belongs to no instance.
         """
         call, member = int(self.run.failed_call), int(self.run.failed_member)
-        ramp = int(self.run.failed_ramp)
+        derivative = int(self.run.failed_derivatives)
         if call >= 0:
             return self._parts[call]
-        if ramp >= 0:
-            instance, references = self._told[ramp]
-            return Op.RAMP, instance, references
+        if derivative >= 0:
+            instance, references = self._told[derivative]
+            return Op.SET_DERIVATIVES, instance, references
         if member >= 0:
             return Op.STEP, self._instances[member], None
         return Op.RECORD, None, None
@@ -404,8 +410,8 @@ def _instructions(
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
             add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
-        elif op is Op.RAMP:
-            add(_Code.RAMP, *told[a, b])
+        elif op is Op.SET_DERIVATIVES:
+            add(_Code.SET_DERIVATIVES, *told[a, b])
         elif op is Op.SUBSTEP:
             found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
         elif op in (Op.SET, Op.GET):

@@ -1,15 +1,10 @@
-/* Executes a plan (see cosim/plan.py) in compiled code, bit for bit like the executor in Python.
+/* Executes a plan (see cosim/master/plan.py) in compiled code, bit for bit like the executor in Python.
 
    Nothing but arrays of numbers and addresses of FMU functions comes in; no Python object is touched,
    so the caller may release the interpreter lock and run several systems in threads. Compiled
    without fused multiply-add, because the Python executor rounds every product. */
 
 #define _POSIX_C_SOURCE 200809L /* clock_gettime */
-#include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
 #if defined(_WIN32)
 #include <windows.h>
 #define EXPORT __declspec(dllexport)
@@ -18,121 +13,22 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
-enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, RAMP };
-/* beyond the statuses of FMI */
-enum { TERMINATED = 5, NOT_FINITE = 6, UNFIT = 7, UNSETTLED = 8, TOO_LONG = 9, TOO_LARGE = 10 };
-enum { LOOK = 50, CHECK = 100 }; /* as in cosim/session.py */
-enum { PARTS = 1 << 16, ITERATIONS = 60 }; /* as in cosim/plan.py and cosim/loops.py */
-#define SETTLED 1e-10
-#define CONTRACTION 0.25
-#define INCREMENT 1e-6
+#include <float.h>
 
-/* One get or set call: n variables of one type of one instance. */
-typedef struct {
-  void *component;
-  void *function;           /* of the FMU */
-  const uint32_t *references;
-  void *buffer;             /* as the FMU sees the values */
-  const int64_t *slots;     /* where they stand in the run's values; null: the buffer is there */
-  size_t n_references, n_values;
-  int32_t type, version;
-} Call;
+#include "run.h"
 
-typedef struct {
-  void *component, *step;
-} Member;
+/* Whether a number is whole up to rounding, and fits: see cosim/fmu/values.py. */
+#define WHOLE(v) (fabs((v) - rint(v)) <= 1e-9 + 4.0 * DBL_EPSILON * fabs(v))
+#define SIGNED(bits, v) (WHOLE(v) && rint(v) >= -ldexp(1.0, bits - 1) && rint(v) < ldexp(1.0, bits - 1))
+#define UNSIGNED(bits, v) (WHOLE(v) && rint(v) >= 0.0 && rint(v) < ldexp(1.0, bits))
+#define TRUTH(v) (WHOLE(v) && (rint(v) == 0.0 || rint(v) == 1.0))
 
-/* What one operation does: with calls, members, copies from first to before last. */
-typedef struct {
-  int64_t operation, first, last;
-} Instruction;
-
-typedef struct {
-  double gain, offset;
-  int64_t source, target;
-} Copy;
-
-/* Power through one variable of a bond: sign * output of one end * input of the same end. */
-typedef struct {
-  double sign, previous, held; /* previous: the output at the beginning of the step */
-  int64_t output, input;
-  int64_t bond; /* terms of a bond follow each other */
-  int64_t mean; /* of the input if it moves within a step, else -1 */
-} Term;
-
-/* An algebraic loop, z = G(z), cut at some outputs: see cosim/loops.py. */
-typedef struct {
-  const int64_t *sources;    /* slots of z */
-  double *inverse;           /* of I - dG/dz */
-  int64_t *valid;            /* whether it is good for anything */
-  double *work;              /* 5 n + 2 n n numbers */
-  int64_t n, first, last;    /* instructions of a sweep */
-} Loop;
-
-/* An input that follows a polynomial through its source's values: see cosim/plan.py. */
-typedef struct {
-  double gain, offset;
-  int64_t source, target, order, ahead, moving, bonded;
-} Mean;
-
-/* One call that tells an FMU derivatives of its inputs: see cosim/ramps.py. */
-typedef struct {
-  void *component, *function;
-  const uint32_t *references;
-  const int32_t *orders;
-  const double *values;
-  size_t n;
-} Ramp;
-
-typedef struct {
-  const Member *members;
-  const Call *calls;
-  double *values;
-  const Instruction *instructions;
-  int64_t n_instructions;
-  const double *times;
-  double step;
-  const double *external; /* rows per communication point */
-  const int64_t *external_slot;
-  int64_t n_external;
-  const Copy *copies, *records;
-  int64_t n_record, every, row;
-  double *rows;
-  Term *terms;
-  double *bond_energy;
-  int64_t n_terms;
-  int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
-  int64_t index;       /* communication step under way */
-  int64_t next_record; /* the next one to be kept */
-  const Loop *loops;
-  const Mean *means;
-  double *history; /* per mean the source at the beginnings of this step and the three before */
-  const int64_t *past; /* how many of them there are before the first step */
-  int64_t n_means;
-  double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
-  const Ramp *ramps;
-  int64_t failed_loop, failed_call, failed_member, failed_ramp; /* -1: none; none of them: a recorded value is not finite */
-} Run;
-
-typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
-typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
-typedef int (*Ramp2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
-typedef int (*Step2)(void *, double, double, int);
-typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);
-
-/* Whether a double can be cut to an integer; not-a-number cannot. */
-#define ANY(v) (true)
-#define SIGNED(bits, v) (trunc(v) >= -ldexp(1.0, bits - 1) && trunc(v) < ldexp(1.0, bits - 1))
-#define UNSIGNED(bits, v) (trunc(v) >= 0.0 && trunc(v) < ldexp(1.0, bits))
-
-#define CONVERT(code, ctype, fits)                                                   \
+#define CONVERT(code, ctype, fits, rounded)                                          \
   case code:                                                                         \
     for (size_t i = 0; i < c->n_values; i++) {                                       \
       double *const v = values + c->slots[i];                                        \
       if (!into) *v = (double)((ctype *)c->buffer)[i];                               \
-      else if (fits) ((ctype *)c->buffer)[i] = (ctype)*v;                            \
+      else if (fits) ((ctype *)c->buffer)[i] = (ctype)(rounded);                     \
       else return UNFIT;                                                             \
     }                                                                                \
     break;
@@ -140,17 +36,17 @@ typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, doubl
 /* Move numbers between the run's values and the buffer of a call. */
 static int convert(const Call *c, double *values, int into) {
   switch (c->type) {
-    CONVERT(0, double, ANY(*v))
-    CONVERT(1, float, ANY(*v))
-    CONVERT(2, int8_t, SIGNED(8, *v))
-    CONVERT(3, uint8_t, UNSIGNED(8, *v))
-    CONVERT(4, int16_t, SIGNED(16, *v))
-    CONVERT(5, uint16_t, UNSIGNED(16, *v))
-    CONVERT(6, int32_t, SIGNED(32, *v))
-    CONVERT(7, uint32_t, UNSIGNED(32, *v))
-    CONVERT(8, int64_t, SIGNED(64, *v))
-    CONVERT(9, uint64_t, UNSIGNED(64, *v))
-    CONVERT(10, bool, ANY(*v))
+    CONVERT(0, double, true, *v)
+    CONVERT(1, float, !(fabs(*v) > FLT_MAX), *v)
+    CONVERT(2, int8_t, SIGNED(8, *v), rint(*v))
+    CONVERT(3, uint8_t, UNSIGNED(8, *v), rint(*v))
+    CONVERT(4, int16_t, SIGNED(16, *v), rint(*v))
+    CONVERT(5, uint16_t, UNSIGNED(16, *v), rint(*v))
+    CONVERT(6, int32_t, SIGNED(32, *v), rint(*v))
+    CONVERT(7, uint32_t, UNSIGNED(32, *v), rint(*v))
+    CONVERT(8, int64_t, SIGNED(64, *v), rint(*v)) /* enumerations of FMI 3 */
+    CONVERT(9, bool, TRUTH(*v), rint(*v))
+    CONVERT(10, int32_t, TRUTH(*v), rint(*v)) /* booleans of FMI 2 */
   }
   return 0;
 }
@@ -162,47 +58,58 @@ static inline int access_call(const Call *c) {
 }
 
 /* Calls whose buffers are part of the run's values; the first that failed, or null. */
-static const Call *call2(const Call *c, const Call *end, int *status) {
+static Call *call2(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
     if (*status > 1) return c;
+    c->warned |= *status;
   }
   return 0;
 }
 
-static const Call *call3(const Call *c, const Call *end, int *status) {
+static Call *call3(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
     if (*status > 1) return c;
+    c->warned |= *status;
   }
   return 0;
 }
 
-static const Call *call_converted(const Call *c, const Call *end, double *values, int set, int *status) {
+static Call *call_converted(Call *c, const Call *end, double *values, int set, int *status) {
   for (; c < end; c++) {
     if (set && c->slots && (*status = convert(c, values, 1))) return c;
     *status = access_call(c);
     if (*status > 1) return c;
+    c->warned |= *status;
     if (!set && c->slots) convert(c, values, 0);
   }
   return 0;
 }
 
-static const Member *step2(const Member *m, const Member *end, double t, double h, int *status) {
+/* A step that does not end beyond the end of the run by rounding. */
+static double bounded(const Run *run, double t, double h) {
+  if (t + h > run->end)
+    for (h = run->end - t; t + h > run->end;) h = nextafter(h, 0.0);
+  return h;
+}
+
+static Member *step2(Member *m, const Member *end, double t, double h, int *status) {
   for (; m < end; m++) {
     *status = ((Step2)m->step)(m->component, t, h, 1);
     if (*status > 1) return m;
+    m->warned |= *status;
   }
   return 0;
 }
 
-static const Member *step3(const Member *m, const Member *end, double t, double h, int *status) {
+static Member *step3(Member *m, const Member *end, double t, double h, int *status) {
   bool event = false, stop = false, early = false;
-  double last = 0;
   for (; m < end; m++) {
-    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &last);
+    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
     if (*status <= 1 && stop) *status = TERMINATED;
     if (*status > 1) return m;
+    m->warned |= *status;
   }
   return 0;
 }
@@ -296,127 +203,29 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   }
 }
 
-static const Ramp *ramp(const Ramp *r, const Ramp *end, int *status) {
+static const Derivatives *set_derivatives(const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
-    *status = ((Ramp2)r->function)(r->component, r->references, r->n, r->orders, r->values);
+    *status = ((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values);
     if (*status > 1) return r;
   }
   return 0;
 }
 
-static const Member *substep(const Run *run, const Member *m, int64_t code, int *status) {
+static Member *substep(const Run *run, Member *m, int64_t code, int *status) {
   const double parts = (double)(code / PARTS / 4), part = (double)(code / 4 % PARTS);
-  const double t = run->times[run->index] + part * run->step / parts, h = run->step / parts;
+  const double t = run->times[run->index] + part * run->step / parts, h = bounded(run, t, run->step / parts);
   return code % 4 == 2 ? step2(m, m + 1, t, h, status) : step3(m, m + 1, t, h, status);
 }
 
-static int execute(Run *run, int64_t first, int64_t last);
-
-/* G(z), once around a loop. */
-static int sweep(Run *run, const Loop *loop, const double *z, double *value) {
-  for (int64_t i = 0; i < loop->n; i++) run->values[loop->sources[i]] = z[i];
-  const int status = execute(run, loop->first, loop->last);
-  if (status > 1) return status;
-  for (int64_t i = 0; i < loop->n; i++) value[i] = run->values[loop->sources[i]];
-  return 0;
-}
-
-static double larger(double a, double b) { return b > a ? b : a; }
-
-/* Gauss-Jordan elimination with partial pivoting of n rows of 2 n numbers; whether it worked. */
-static int invert(double *rows, int64_t n) {
-  for (int64_t k = 0; k < n; k++) {
-    int64_t best = k;
-    for (int64_t i = k + 1; i < n; i++)
-      if (fabs(rows[2 * n * i + k]) > fabs(rows[2 * n * best + k])) best = i;
-    const double pivot = rows[2 * n * best + k];
-    if (!(1e-13 < fabs(pivot) && fabs(pivot) < INFINITY)) return 0;
-    for (int64_t j = 0; j < 2 * n; j++) {
-      const double other = rows[2 * n * k + j];
-      rows[2 * n * k + j] = rows[2 * n * best + j];
-      rows[2 * n * best + j] = other;
-    }
-    for (int64_t j = 0; j < 2 * n; j++) rows[2 * n * k + j] /= pivot;
-    for (int64_t i = 0; i < n; i++) {
-      const double factor = rows[2 * n * i + k];
-      if (i == k || factor == 0.0) continue;
-      for (int64_t j = 0; j < 2 * n; j++) rows[2 * n * i + j] -= factor * rows[2 * n * k + j];
-    }
-  }
-  return 1;
-}
-
-/* The inverse of I - dG/dz by differences around z, where G(z) = value. */
-static int difference(Run *run, const Loop *loop, const double *z, const double *value, double *moved, double *there,
-                      double *rows) {
-  const int64_t n = loop->n;
-  for (int64_t j = 0; j < n; j++) {
-    const double increment = INCREMENT * larger(1.0, fabs(z[j]));
-    for (int64_t i = 0; i < n; i++) moved[i] = z[i];
-    moved[j] += increment;
-    const int status = sweep(run, loop, moved, there);
-    if (status > 1) return status;
-    for (int64_t i = 0; i < n; i++) {
-      rows[2 * n * i + j] = (i == j ? 1.0 : 0.0) - (there[i] - value[i]) / increment;
-      rows[2 * n * i + n + j] = i == j ? 1.0 : 0.0;
-    }
-  }
-  *loop->valid = invert(rows, n);
-  if (!*loop->valid) return UNSETTLED;
-  for (int64_t i = 0; i < n; i++)
-    for (int64_t j = 0; j < n; j++) loop->inverse[n * i + j] = rows[2 * n * i + n + j];
-  return 0;
-}
-
-/* The change of z for a rest G(z) - z, and its relative size. */
-static double newton_step(const Loop *loop, const double *z, const double *value, double *change) {
-  double size = 0.0;
-  for (int64_t i = 0; i < loop->n; i++) {
-    double total = 0.0;
-    for (int64_t j = 0; j < loop->n; j++) total += loop->inverse[loop->n * i + j] * (value[j] - z[j]);
-    change[i] = total;
-    const double relative = fabs(total) / larger(1.0, fabs(z[i]));
-    if (!(relative <= size)) size = relative;
-  }
-  return size;
-}
-
-/* Newton's method with a Jacobian that is kept as long as it contracts. */
-static int solve(Run *run, const Loop *loop) {
-  const int64_t n = loop->n;
-  double *const z = loop->work, *const value = z + n, *const change = value + n, *const moved = change + n;
-  double *const there = moved + n, *const rows = there + n;
-  double last = 0.0;
-  run->failed_loop = loop - run->loops;
-  for (int64_t i = 0; i < n; i++) z[i] = run->values[loop->sources[i]];
-  for (int iteration = 0; iteration < ITERATIONS; iteration++) {
-    int status = sweep(run, loop, z, value);
-    if (status > 1) return status;
-    const int renewed = !*loop->valid;
-    if (renewed && (status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
-    double size = newton_step(loop, z, value, change);
-    if (size <= SETTLED && !renewed) {
-      for (int64_t i = 0; i < n; i++) run->values[loop->sources[i]] = z[i];
-      return 0;
-    }
-    if (!renewed && last > 0.0 && !(size <= CONTRACTION * last)) {
-      if ((status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
-      size = newton_step(loop, z, value, change);
-    }
-    if (!(size < INFINITY)) break;
-    for (int64_t i = 0; i < n; i++) z[i] += change[i];
-    last = size;
-  }
-  *loop->valid = 0;
-  return UNSETTLED;
-}
+#include "newton.c"
 
 /* Instructions from first to before last; 0 or the status that ended them. */
 static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
-  const Call *const calls = run->calls, *call = 0;
-  const Member *const members = run->members, *member = 0;
-  const Ramp *ramped = 0;
+  Call *const calls = run->calls, *call = 0;
+  Member *const members = run->members, *member = 0;
+  const double now = run->times[run->index], size = bounded(run, now, run->step);
+  const Derivatives *refused = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
     switch (in->operation) {
@@ -444,10 +253,10 @@ static int execute(Run *run, int64_t first, int64_t last) {
       call = call_converted(calls + in->first, calls + in->last, run->values, in->operation == CONVERT_SET, &status);
       break;
     case STEP2:
-      member = step2(members + in->first, members + in->last, run->times[run->index], run->step, &status);
+      member = step2(members + in->first, members + in->last, now, size, &status);
       break;
     case STEP3:
-      member = step3(members + in->first, members + in->last, run->times[run->index], run->step, &status);
+      member = step3(members + in->first, members + in->last, now, size, &status);
       break;
     case ENERGY:
       if (in->first == 1) add_energy(run, 1);
@@ -475,8 +284,8 @@ static int execute(Run *run, int64_t first, int64_t last) {
     case EXTRAPOLATE:
       extrapolate(run, in->first, in->last);
       break;
-    case RAMP:
-      ramped = ramp(run->ramps + in->first, run->ramps + in->last, &status);
+    case SET_DERIVATIVES:
+      refused = set_derivatives(run->derivatives + in->first, run->derivatives + in->last, &status);
       break;
     case SUBSTEP:
       member = substep(run, members + in->first, in->last, &status);
@@ -485,7 +294,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
     if (status > 1) {
       run->failed_call = call ? call - calls : -1;
       run->failed_member = member ? member - members : -1;
-      run->failed_ramp = ramped ? ramped - run->ramps : -1;
+      run->failed_derivatives = refused ? refused - run->derivatives : -1;
       return status;
     }
   }
@@ -533,6 +342,6 @@ EXPORT int cosim_run_within(Run *run, int64_t last, double limit, double most) {
 /* The layout that this library was compiled for, to be compared with the caller's. */
 EXPORT int64_t cosim_size(int what) {
   const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term),
-                          sizeof(Loop), sizeof(Mean), sizeof(Ramp)};
+                          sizeof(Loop), sizeof(Mean), sizeof(Derivatives)};
   return (int64_t)sizes[what];
 }

@@ -17,17 +17,18 @@ from ..data.recording import Recording
 from ..errors import StepError, UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
-from ..master.master import Master, Outline
+from ..master.master import Master
+from ..master.outline import Outline
 from ..master.session import Session
+from ..scenario import scenario as scenarios
+from ..scenario.checks import CheckResult, evaluate
+from ..scenario.scenario import Scenario
 from ..ssp import read_scenario
 from ..system.provider import Provider
 from ..system.system import System
 from ..system.variants import apply
-from . import scenario as scenarios
-from .checks import CheckResult, evaluate
-from .comparison_table import Quantity, overview
+from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
-from .scenario import Scenario
 
 Vector = NDArray[np.float64]
 
@@ -112,7 +113,7 @@ class Result:
         }
 
     @property
-    def overview(self) -> list[Quantity]:
+    def overview(self) -> list[ComparedQuantity]:
         """What the runs say of the same quantities, side by side."""
         return overview(
             {
@@ -144,6 +145,7 @@ class Result:
                 for key, item in run.comparisons.items()
             },
             "checks": [{**check.to_dict(), "name": name} for name, check in self.checks.items()],
+            "notes": list(dict.fromkeys(n for run in self.runs.values() for n in run.notes)),
             "files": [str(path) for path in self.files],
         }
 
@@ -265,7 +267,7 @@ class Prepared:
             checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
             wall_s=wall_s,
             fmu_steps=int(recording.provenance["fmu_steps"]),
-            notes=self.notes,
+            notes=(*self.notes, *recording.notes),
         )
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.signals import Signal, as_signal
+from ..data.signals import Signal, SignalVector, as_signal
 from ..errors import ScenarioError, UnknownNameError, listing
-from ..ssp.read import Experiment, Package, read_package
-from ..ssp.write import write
+from ..scenario.scenario import Scenario
 from ..system.provider import Provider
 from ..system.variants import apply
-from .scenario import Scenario
+from .read import Experiment, Package, read_package
+from .write import write
 
 Vector = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def read_scenario(
     ssd: str = "SystemStructure.ssd",
     duration: float | None = None,
     step: float | None = None,
-    inputs: Mapping[str, Signal | float] | None = None,
+    inputs: Mapping[str, Signal | SignalVector | float] | None = None,
 ) -> Scenario:
     """A scenario from an SSP package, as `cosim run` takes it.
 
@@ -96,10 +96,15 @@ def read_scenario(
     )
 
 
-def drive(package: Package, inputs: Mapping[str, Signal | float]) -> dict[str, Signal]:
+def drive(
+    package: Package, inputs: Mapping[str, Signal | SignalVector | float]
+) -> dict[str, Signal | SignalVector]:
     """Signals of open inputs, from signals of connectors of the root system (or of inputs)."""
-    found: dict[str, Signal] = {}
+    found: dict[str, Signal | SignalVector] = {}
     for name, driver in inputs.items():
+        if isinstance(driver, SignalVector):
+            found[name] = driver
+            continue
         signal = as_signal(driver)
         if name in package.inputs:
             for terminal in package.inputs[name]:

@@ -10,11 +10,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .checks import Check, CheckResult
+from ..scenario.checks import Check, CheckResult
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ComparedQuantity:
     """One quantity over the runs.
 
     Attributes:
@@ -76,7 +76,7 @@ Outcomes = Mapping[str, tuple[tuple[Check, CheckResult], ...]]
 """Run -> its checks with their outcomes."""
 
 
-def overview(outcomes: Outcomes) -> list[Quantity]:
+def overview(outcomes: Outcomes) -> list[ComparedQuantity]:
     """The quantities of all runs, in the order of the checks."""
     found: dict[str, list[tuple[str, Check, CheckResult]]] = {}
     for run, pairs in outcomes.items():
@@ -86,7 +86,7 @@ def overview(outcomes: Outcomes) -> list[Quantity]:
     return [_quantity(name, items) for name, items in found.items()]
 
 
-def _quantity(name: str, items: list[tuple[str, Check, CheckResult]]) -> Quantity:
+def _quantity(name: str, items: list[tuple[str, Check, CheckResult]]) -> ComparedQuantity:
     marks: dict[str, float] = {}
     for run, check, _ in items:
         if check.expected is not None:
@@ -95,7 +95,7 @@ def _quantity(name: str, items: list[tuple[str, Check, CheckResult]]) -> Quantit
             marks[run] = check.high
     known = any(check.expected is not None for _, check, _ in items)
     relative = any(check.relative for _, check, _ in items)
-    return Quantity(
+    return ComparedQuantity(
         name=name,
         unit=items[0][2].measured_unit,
         reference=next((check.reference for _, check, _ in items if check.reference), "expected"),

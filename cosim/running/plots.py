@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +14,13 @@ from ..data.comparison import Comparison, Reference, convert_reference
 from ..data.recording import Recording
 from ..errors import UnknownNameError
 from ..files import atomic
+from ..scenario.axes import Axes
 from ..spec.units import conversion, parse
+from .comparison_table import ComparedQuantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as MatplotlibAxes
     from matplotlib.figure import Figure
-
-    from .comparison_table import Quantity
 
 Vector = NDArray[np.float64]
 MEASURED = {"color": "black", "linewidth": 2.2, "alpha": 0.55}
@@ -30,75 +29,8 @@ PATH_HEIGHT = 4.2
 """Height of the axes of paths [inch]."""
 SPREAD = 100.0
 """Ratio of largest to smallest value of an overview from which its scale is logarithmic."""
-_KEYS = {
-    "label", "signals", "paths", "comparisons", "names", "unit", "minus", "after", "before",
-}  # fmt: skip
 _LINES = ("-", "--", "-.", ":")
 _MARKERS = ("o", "s", "^", "D", "v", "x")
-
-
-@dataclass(frozen=True)
-class Axes:
-    """One axes of a plot.
-
-    Attributes:
-        label: of the vertical axis, without unit.
-        signals: drawn over time (vectors too).
-        paths: pairs of signals, drawn one over the other with equal scales.
-        comparisons: names of comparisons whose differences are drawn over time.
-        names: in the legend, for signals, paths or comparisons in order.
-        unit: to convert to, "" for the signals' own.
-        minus: signal that is subtracted from all, "" for none.
-        after, before: times between which it is drawn [s].
-    """
-
-    label: str
-    signals: tuple[str, ...]
-    paths: tuple[tuple[str, str], ...]
-    comparisons: tuple[str, ...]
-    names: tuple[str, ...]
-    unit: str
-    minus: str
-    after: float
-    before: float
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Signals that have to be recorded for it."""
-        names = (*self.signals, *(name for pair in self.paths for name in pair))
-        return (*names, self.minus) if self.minus else names
-
-
-def read_axes(entry: Mapping[str, Any]) -> Axes:
-    """One axes from its table in a scenario.
-
-    Raises:
-        ValueError: incomplete or contradictory.
-    """
-    what = f"plot {entry.get('label', '')!r}"
-    unknown = sorted(set(entry) - _KEYS)
-    if unknown:
-        raise ValueError(f"{what} has no key {unknown[0]!r}; one of {', '.join(sorted(_KEYS))}")
-    signals = tuple(entry.get("signals", ()))
-    paths = tuple((str(pair[0]), str(pair[1])) for pair in entry.get("paths", ()))
-    comparisons = tuple(entry.get("comparisons", ()))
-    names = tuple(str(name) for name in entry.get("names", ()))
-    if bool(signals) + bool(paths) + bool(comparisons) != 1:
-        raise ValueError(f"{what}: give signals, or paths (pairs of signals), or comparisons")
-    lines = len(signals or paths or comparisons)
-    if names and len(names) != lines:
-        raise ValueError(f"{what}: {len(names)} names for {lines} lines")
-    return Axes(
-        label=str(entry.get("label", "")),
-        signals=signals,
-        paths=paths,
-        comparisons=comparisons,
-        names=names,
-        unit=str(entry.get("unit", "")),
-        minus=str(entry.get("minus", "")),
-        after=float(entry.get("after", float("-inf"))),
-        before=float(entry.get("before", float("inf"))),
-    )
 
 
 # -- one run ---------------------------------------------------------------------------------------
@@ -292,7 +224,7 @@ def _draw_comparisons(
 
 
 def plot_overview(
-    quantities: Sequence[Quantity], title: str, path: Path | str | None = None
+    quantities: Sequence[ComparedQuantity], title: str, path: Path | str | None = None
 ) -> Figure:
     """Draw one axes per quantity: expected values (or limits) and those of each case over runs."""
     from matplotlib.figure import Figure

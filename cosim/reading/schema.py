@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from .errors import ScenarioError
+from ..errors import ScenarioError
 
 Check = Callable[[Any, str], None]
 """Takes a value and its place for the error text; raises ScenarioError."""

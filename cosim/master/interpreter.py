@@ -1,0 +1,315 @@
+"""The executor in Python, the reference: each operation of a plan is a few lines of Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
+from ..fmu.exchange import Block
+from ..fmu.instance import Instance
+from .input_derivatives import InputDerivatives, bend
+from .newton import Newton
+from .objects import ObjectPassing
+from .outline import Outline
+from .plan import PARTS, Loop, Mean, Op, decoded
+
+Vector = NDArray[np.float64]
+
+
+class Interpreter:
+    """The FMUs of a run, the values that they exchange, and what each operation does to them.
+
+    Args:
+        outline: of the run.
+        stack: ends the FMUs' instances.
+
+    Attributes:
+        values, objects: one per slot of the plan's layout.
+        instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
+        index: communication point at which the run stands.
+        rows, row: recorded values, and how many rows there are.
+        bond_energy: energy that went over each bond [J].
+        newtons: one per algebraic loop.
+        history, past: of extrapolated inputs, and how many values it has before the first step.
+        derivatives: derivatives of the inputs that move within a step.
+        bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
+    """
+
+    def __init__(self, outline: Outline, stack: ExitStack) -> None:
+        self.outline, self.system, self.step = outline, outline.system, outline.step
+        self.plan, self.layout = outline.plan, outline.plan.layout
+        self.external, self.times, self.every = outline.external, outline.times, outline.every
+        self.values = np.zeros(len(self.layout.names))
+        self.objects = np.full(len(self.layout.names), None, dtype=object)
+        self.instances: list[Instance] = []
+        self.outputs: list[Block] = []
+        self.inputs: list[Block] = []
+        for index, member in enumerate(self.system.members.values()):
+            # interpreted FMUs report their exceptions only when they may log
+            chatty = member.description.can("needsExecutionTool")
+            instance = stack.enter_context(Instance(member.fmu, member.name, logging=chatty))
+            instance.set(member.parameters)
+            self.instances.append(instance)
+            for blocks, spans, names in (
+                (self.outputs, self.layout.outputs, self.layout.fetched),
+                (self.inputs, self.layout.inputs, self.layout.given),
+            ):
+                span = slice(*spans[index].tolist())
+                variables = [member.description.variables[name] for name in names[index]]
+                blocks.append(Block(instance, variables, self.values[span], self.objects[span]))
+        origins = {c.target: c.source for c in self.system.connections}
+        origins.update({name: signal.text for name, signal in outline.signals.items()})
+        for block, owner in zip(self.inputs, self.system.members, strict=True):
+            block.origins = [origins.get(f"{owner}.{name}", "") for name in block.names]
+        self.passing = ObjectPassing(self.layout, outline.observed, outline.objects)
+        self.rows = np.empty((outline.count // self.every + 1, len(outline.observed)))
+        self.row = self.index = 0
+        self.bond_energy = np.zeros(len(self.layout.bonds))
+        self.previous: list[float] = [0.0] * len(self.layout.bond_output)
+        self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
+        self.history = np.zeros((len(self.plan.means), 4))
+        self.past = np.zeros(1, dtype=np.int64)
+        self.derivatives = InputDerivatives(self.plan, self.instances)
+        self.held = np.zeros(len(self.layout.bond_input))
+        moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
+        self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
+        self.started = False
+
+    @cached_property
+    def instants(self) -> list[float]:
+        """Communication points as the executor in Python takes them: a compiled one needs none."""
+        return list(self.times.tolist())
+
+    def communication_step(self, step: Sequence[tuple[Op, int, int]], begin: int = 0) -> None:
+        """The operations of one communication step, from the one numbered `begin`.
+
+        Raises:
+            EndRequest: an FMU asked to end the simulation. If it went to the end of the step, the
+                others have done so, too, and the run stands there.
+        """
+        end = None
+        for op, a, b in step[begin:]:
+            try:
+                self.do(op, a, b)
+            except EndRequest as request:
+                if op is not Op.STEP or request.time < self.instants[self.index + 1]:
+                    raise
+                end = end or request
+        self.index += 1
+        if end is not None:
+            raise end
+
+    def restart(self) -> None:
+        """Return to the state before initialization, with the system's values set again."""
+        self.values[:] = 0.0
+        self.bond_energy[:] = 0.0
+        self.previous = [0.0] * len(self.layout.bond_output)
+        self.index = self.row = 0
+        self.passing.restart()
+        self.past[0] = 0
+        self.started = False
+        for newton in self.newtons:
+            newton.valid[0] = 0
+        for instance, member in zip(self.instances, self.system.members.values(), strict=True):
+            instance.reset()
+            instance.set(member.parameters)
+
+    def size(self, time: float, step: float) -> float:
+        """A step that does not end beyond the end of the run by rounding."""
+        if time + step > self.instants[-1]:
+            step = self.instants[-1] - time
+            while time + step > self.instants[-1]:
+                step = math.nextafter(step, 0.0)
+        return step
+
+    # -- operations ------------------------------------------------------------------------------
+
+    def do(self, op: Op, a: int, b: int) -> None:
+        """One operation of a plan."""
+        layout, values = self.layout, self.values
+        match op:
+            case Op.SET:
+                self.inputs[a].set()
+            case Op.GET:
+                self.outputs[a].get()
+            case Op.STEP:
+                time = self.instants[self.index]
+                self.instances[a].step(time, self.size(time, self.step))
+            case Op.COPY:
+                values[layout.copy_target[a:b]] = (
+                    values[layout.copy_source[a:b]] * layout.copy_gain[a:b]
+                    + layout.copy_offset[a:b]
+                )
+                if self.passing:
+                    self.passing.copy(self.values, self.objects, a, b)
+            case Op.EXTERNAL:
+                values[layout.external] = self.external[self.index]
+                if self.passing:
+                    self.passing.drive(self.objects, self.index)
+            case Op.RECORD:
+                self.record()
+            case Op.ENERGY:
+                self.account(self.held if a == 1 else values[layout.bond_input])
+            case Op.HOLD:
+                self.held = values[layout.bond_input]
+                for term, index in enumerate(self.bond_mean):
+                    if index >= 0:
+                        self.held[term] = self.derivatives.average[index]
+            case Op.SOLVE:
+                self.solve(a)
+            case Op.NOTE:
+                self.history[:, 1:] = self.history[:, :-1].copy()
+                self.history[:, 0] = [values[mean.source] for mean in self.plan.means]
+            case Op.EXTRAPOLATE:
+                for index in range(a, b):
+                    self.extrapolate(index, self.plan.means[index])
+            case Op.SET_DERIVATIVES:
+                self.derivatives.tell(a, b)
+            case Op.SUBSTEP:
+                parts, part = divmod(b, PARTS)
+                time = self.instants[self.index] + part * self.step / parts
+                self.instances[a].step(time, self.size(time, self.step / parts))
+
+    def extrapolate(self, index: int, mean: Mean) -> None:
+        """Let an input follow the polynomial through the last values of its source."""
+        past = self.history[index].tolist()
+        if mean.bonded or not mean.moving:
+            average = self.mean(mean, past) * mean.gain + mean.offset
+            self.derivatives.average[index] = average
+        if not mean.moving:
+            self.values[mean.target] = average
+            return
+        slope, curve = self.slopes(mean, past)
+        self.values[mean.target] = past[0] * mean.gain + mean.offset
+        self.derivatives.slope[index], self.derivatives.curve[index] = (
+            slope * mean.gain,
+            curve * mean.gain,
+        )
+
+    def slopes(self, mean: Mean, past: list[float]) -> tuple[float, float]:
+        """Derivatives at the begin of the step of the polynomial through the last values."""
+        now, inverse = float(self.values[mean.source]), 1.0 / self.step
+        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
+        if order == 0:
+            return 0.0, 0.0
+        if order == 1:
+            return (now - past[0] if mean.ahead else past[0] - past[1]) * inverse, 0.0
+        half, square = 0.5 * inverse, inverse * inverse
+        if mean.ahead:
+            second = bend(now, *past[:3])
+            return (2.0 * (now - past[0]) - second) * half, second * square
+        second = bend(*past)
+        return (2.0 * (past[0] - past[1]) + second) * half, second * square
+
+    def mean(self, mean: Mean, past: list[float]) -> float:
+        """Mean over the step of the polynomial through the last values of a source."""
+        now = float(self.values[mean.source])
+        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
+        if mean.ahead:
+            if order == 1:
+                return 0.5 * (now + past[0])
+            return 0.5 * (now + past[0]) - bend(now, *past[:3]) / 12.0
+        if order == 0:
+            return past[0]
+        if order == 1:
+            return 1.5 * past[0] - 0.5 * past[1]
+        return past[0] + 0.5 * (past[0] - past[1]) + 5.0 * bend(*past) / 12.0
+
+    def record(self) -> None:
+        """Keep observed values if it is their turn; note outputs for the energy of bonds."""
+        layout, values = self.layout, self.values
+        self.previous = values[layout.bond_output].tolist()
+        if self.index % self.every:
+            return
+        self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+        if self.passing:
+            self.passing.keep(self.objects)
+
+    def keep(self, row: Vector) -> None:
+        """Add a row to the recording."""
+        if not np.isfinite(row).all():
+            name = self.outline.observed[int(np.flatnonzero(~np.isfinite(row))[0])]
+            value = row[self.outline.observed.index(name)]
+            raise FmuCallError(f"{name} became {value} without an error of its FMU")
+        self.rows[self.row] = row
+        self.row += 1
+
+    def account(self, held: Vector) -> None:
+        """Trapezoid of output times held input, in a fixed order of summation."""
+        layout = self.layout
+        outputs = self.values[layout.bond_output].tolist()
+        inputs = held.tolist()
+        half = 0.5 * self.step
+        for term, bond in enumerate(layout.bond_index.tolist()):
+            mean = self.previous[term] + outputs[term]
+            self.bond_energy[bond] += layout.bond_sign[term] * inputs[term] * mean * half
+
+    # -- algebraic loops -------------------------------------------------------------------------
+
+    def solve(self, index: int) -> None:
+        """Solve an algebraic loop."""
+        loop, newton, values = self.plan.loops[index], self.newtons[index], self.values
+        sweep = decoded(loop.sweep)
+
+        def around(z: list[float]) -> list[float]:
+            values[loop.sources] = z
+            for op, a, b in sweep:
+                self.do(op, a, b)
+            found: list[float] = values[loop.sources].tolist()
+            return found
+
+        z = values[loop.sources].tolist()
+        if not newton.valid[0] and not self.started:
+            around(z)
+            jacobian = self.around_derivative(loop)
+            if jacobian is not None:
+                newton.keep(jacobian)
+        if not newton.solve(around, z):
+            raise self.unsolved(index)
+        values[loop.sources] = z  # the solution; solving again then changes nothing
+
+    def around_derivative(self, loop: Loop) -> Vector | None:
+        """dG/dz of a loop from the FMUs' directional derivatives; None if one has none."""
+        layout = self.layout
+        members = dict.fromkeys(a for op, a, _ in loop.sweep.tolist() if op == Op.GET)
+        for a in members:
+            instance = self.instances[a]
+            if not instance.description.can("providesDirectionalDerivatives"):
+                return None
+        jacobian = np.zeros((loop.sources.size, loop.sources.size))
+        for column in range(loop.sources.size):
+            tangent = np.zeros(self.values.size)
+            tangent[loop.sources[column]] = 1.0
+            for a in members:
+                first, last = layout.copies[a]
+                targets, sources = layout.copy_target[first:last], layout.copy_source[first:last]
+                tangent[targets] = tangent[sources] * layout.copy_gain[first:last]
+                seeded = [int(slot) for slot in targets if tangent[slot] != 0.0]
+                fetched = range(*layout.outputs[a].tolist())
+                if not seeded:
+                    tangent[fetched.start : fetched.stop] = 0.0
+                    continue
+                name = len(layout.instances[a]) + 1
+                tangent[fetched.start : fetched.stop] = self.instances[a].directional_derivative(
+                    [layout.names[slot][name:] for slot in fetched],
+                    [layout.names[slot][name:] for slot in seeded],
+                    tangent[seeded],
+                )
+            jacobian[:, column] = tangent[loop.sources]
+        return jacobian if np.isfinite(jacobian).all() else None
+
+    def unsolved(self, index: int) -> AlgebraicLoopError:
+        """The error for a loop without a solution."""
+        names = ", ".join(self.layout.names[slot] for slot in self.plan.loops[index].sources)
+        return AlgebraicLoopError(
+            f"{self.system.name}: an algebraic loop has no solution that Newton's method "
+            f"finds (unknown: {names}) at t = {self.instants[self.index]:.9g} s\n"
+            f"algebraic loop:\n{self.plan.loops[index].text}\n"
+            "Take a component with a state in the loop (an elastic gearbox, a compliant contact)"
+        )

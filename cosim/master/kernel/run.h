@@ -1,0 +1,110 @@
+/* What a run is made of, as arrays of numbers and addresses; `__init__.py` has the same structures. */
+
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
+enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
+/* beyond the statuses of FMI */
+enum { TERMINATED = 6, NOT_FINITE = 7, UNFIT = 8, UNSETTLED = 9, TOO_LONG = 10, TOO_LARGE = 11 };
+enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
+enum { PARTS = 1 << 16 };        /* as in cosim/master/plan.py */
+
+/* One get or set call: n variables of one type of one instance. */
+typedef struct {
+  void *component;
+  void *function;           /* of the FMU */
+  const uint32_t *references;
+  void *buffer;             /* as the FMU sees the values */
+  const int64_t *slots;     /* where they stand in the run's values; null: the buffer is there */
+  size_t n_references, n_values;
+  int32_t type, version;
+  int64_t warned; /* whether the FMU has returned a warning */
+} Call;
+
+typedef struct {
+  void *component, *step;
+  double reached; /* the time at which an FMU of FMI 3 says that it stands */
+  int64_t warned;
+} Member;
+
+/* What one operation does: with calls, members, copies from first to before last. */
+typedef struct {
+  int64_t operation, first, last;
+} Instruction;
+
+typedef struct {
+  double gain, offset;
+  int64_t source, target;
+} Copy;
+
+/* Power through one variable of a bond: sign * output of one end * input of the same end. */
+typedef struct {
+  double sign, previous, held; /* previous: the output at the beginning of the step */
+  int64_t output, input;
+  int64_t bond; /* terms of a bond follow each other */
+  int64_t mean; /* of the input if it moves within a step, else -1 */
+} Term;
+
+/* An algebraic loop, z = G(z), cut at some outputs: see cosim/master/algebraic_loops.py. */
+typedef struct {
+  const int64_t *sources;    /* slots of z */
+  double *inverse;           /* of I - dG/dz */
+  int64_t *valid;            /* whether it is good for anything */
+  double *work;              /* 5 n + 2 n n numbers */
+  int64_t n, first, last;    /* instructions of a sweep */
+} Loop;
+
+/* An input that follows a polynomial through its source's values: see cosim/master/plan.py. */
+typedef struct {
+  double gain, offset;
+  int64_t source, target, order, ahead, moving, bonded;
+} Mean;
+
+/* One call that tells an FMU derivatives of its inputs: see cosim/master/input_derivatives.py. */
+typedef struct {
+  void *component, *function;
+  const uint32_t *references;
+  const int32_t *orders;
+  const double *values;
+  size_t n;
+} Derivatives;
+
+typedef struct {
+  Member *members;
+  Call *calls;
+  double *values;
+  const Instruction *instructions;
+  int64_t n_instructions;
+  const double *times;
+  double step, end; /* the time at which the run ends */
+  const double *external; /* rows per communication point */
+  const int64_t *external_slot;
+  int64_t n_external;
+  const Copy *copies, *records;
+  int64_t n_record, every, row;
+  double *rows;
+  Term *terms;
+  double *bond_energy;
+  int64_t n_terms;
+  int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
+  int64_t index;       /* communication step under way */
+  int64_t next_record; /* the next one to be kept */
+  const Loop *loops;
+  const Mean *means;
+  double *history; /* per mean the source at the beginnings of this step and the three before */
+  const int64_t *past; /* how many of them there are before the first step */
+  int64_t n_means;
+  double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
+  const Derivatives *derivatives;
+  int64_t failed_loop, failed_call, failed_member, failed_derivatives; /* -1: none; none of them: a recorded value is not finite */
+} Run;
+
+typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
+typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
+typedef int (*SetDerivatives2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
+typedef int (*Step2)(void *, double, double, int);
+typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);

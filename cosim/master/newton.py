@@ -1,0 +1,133 @@
+"""Newton's method for z = G(z), with a Jacobian that is kept as long as it contracts:
+
+    (I - dG/dz) (z_new - z) = G(z) - z
+
+Plain numbers and a fixed order of summation, so that compiled code can do the same, bit for bit.
+
+Source: Kelley, Solving nonlinear equations with Newton's method, 2003 (chord method).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+ITERATIONS = 60
+"""Newton iterations before a loop is said not to settle."""
+SETTLED = 1e-10
+"""Newton step, relative to max(1, |z|), at which a loop counts as solved."""
+CONTRACTION = 0.25
+"""The Jacobian is renewed when a Newton step is longer than this times the one before."""
+INCREMENT = 1e-6
+"""Of differences, relative to max(1, |z|)."""
+
+
+class Newton:
+    """Solves z = G(z), keeping the inverse of I - dG/dz.
+
+    Attributes:
+        inverse: n x n.
+        valid: one number, whether `inverse` is good for anything.
+    """
+
+    def __init__(self, n: int, tolerance: float = SETTLED) -> None:
+        self.n, self.tolerance = n, tolerance
+        self.inverse = np.zeros((n, n))
+        self.valid = np.zeros(1, dtype=np.int64)
+
+    def keep(self, jacobian: Vector) -> bool:
+        """Take dG/dz; False if I - dG/dz is singular."""
+        inverse = invert((np.eye(self.n) - jacobian).tolist())
+        self.valid[0] = inverse is not None
+        if inverse is not None:
+            self.inverse[:] = inverse
+        return inverse is not None
+
+    def solve(self, function: Callable[[list[float]], list[float]], z: list[float]) -> bool:
+        """Find z = G(z) from the guess `z`, which is overwritten; the last call was of G(z).
+
+        Returns:
+            Whether it settled.
+        """
+        last = 0.0
+        for _ in range(ITERATIONS):
+            value = function(z)
+            rest = [a - b for a, b in zip(value, z, strict=True)]
+            renewed = False
+            if not self.valid[0]:
+                if not self.difference(function, z, value):
+                    return False
+                renewed = True
+            size, change = self.newton_step(rest, z)
+            if size <= self.tolerance and not renewed:
+                return True
+            if not renewed and last > 0.0 and not size <= CONTRACTION * last:
+                if not self.difference(function, z, value):
+                    return False
+                size, change = self.newton_step(rest, z)
+            if not size < np.inf:
+                self.valid[0] = 0
+                return False
+            for i in range(self.n):
+                z[i] += change[i]
+            last = size
+        self.valid[0] = 0
+        return False
+
+    def newton_step(self, rest: list[float], z: list[float]) -> tuple[float, list[float]]:
+        """The change of z and its relative size."""
+        size, change = 0.0, []
+        for i, row in enumerate(self.inverse.tolist()):
+            total = 0.0
+            for factor, item in zip(row, rest, strict=True):
+                total += factor * item
+            change.append(total)
+            relative = abs(total) / max(1.0, abs(z[i]))
+            if not relative <= size:  # so that nan counts as large
+                size = relative
+        return size, change
+
+    def difference(
+        self, function: Callable[[list[float]], list[float]], z: list[float], value: list[float]
+    ) -> bool:
+        """Renew the Jacobian by differences around z."""
+        n = self.n
+        matrix = [[0.0] * n for _ in range(n)]
+        for j in range(n):
+            moved = list(z)
+            increment = INCREMENT * max(1.0, abs(z[j]))
+            moved[j] += increment
+            there = function(moved)
+            for i in range(n):
+                matrix[i][j] = (1.0 if i == j else 0.0) - (there[i] - value[i]) / increment
+        inverse = invert(matrix)
+        self.valid[0] = inverse is not None
+        if inverse is not None:
+            self.inverse[:] = inverse
+        return inverse is not None
+
+
+def invert(matrix: list[list[float]]) -> list[list[float]] | None:
+    """Inverse by Gauss-Jordan elimination with partial pivoting, None if there is none."""
+    n = len(matrix)
+    rows = [list(row) + [1.0 if i == j else 0.0 for j in range(n)] for i, row in enumerate(matrix)]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(rows[i][k]) > abs(rows[best][k]):
+                best = i
+        pivot = rows[best][k]
+        if not 1e-13 < abs(pivot) < np.inf:
+            return None
+        rows[k], rows[best] = rows[best], rows[k]
+        for j in range(2 * n):
+            rows[k][j] /= pivot
+        for i in range(n):
+            factor = rows[i][k]
+            if i != k and factor != 0.0:
+                for j in range(2 * n):
+                    rows[i][j] -= factor * rows[k][j]
+    return [row[n:] for row in rows]

@@ -1,0 +1,140 @@
+"""A run before any FMU exists: everything checked, the inputs tabulated, the plan compiled."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.recording import Recording
+from ..data.signals import Signal
+from ..system.system import System
+from .plan import Plan
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """All that an execution needs to know.
+
+    Attributes:
+        system: the graph.
+        scenario: name that recordings carry.
+        options: of the algorithm.
+        step: communication step [s].
+        tolerance: relative tolerance handed to the FMUs, None for their own.
+        executor: `c`, `python` or `auto`.
+        plan: of the algorithm.
+        times: communication points [s].
+        observed: full scalar names of what is recorded.
+        every: every n-th communication point is recorded.
+        signals: scalar input -> what drives it.
+        external: values of the driven inputs, one row per communication point.
+        objects: per column of `external` whose values travel as objects, one per communication
+            point.
+    """
+
+    system: System
+    scenario: str
+    options: Mapping[str, Any]
+    step: float
+    tolerance: float | None
+    executor: str
+    plan: Plan
+    times: Vector
+    observed: tuple[str, ...]
+    every: int
+    signals: Mapping[str, Signal]
+    external: Vector
+    objects: Mapping[int, Sequence[Any]]
+
+    @property
+    def count(self) -> int:
+        """Communication steps."""
+        return self.times.size - 1
+
+    def recording(
+        self,
+        rows: Vector,
+        bond_energy: Mapping[str, float],
+        how: Mapping[str, Any],
+        error: str = "",
+        *,
+        objects: Mapping[str, Sequence[Any]] | None = None,
+        notes: Sequence[str] = (),
+    ) -> Recording:
+        """A recording of this run.
+
+        Args:
+            rows: recorded values, one row per recorded communication point that was reached.
+            bond_energy: per power bond [J].
+            how: what else its provenance says of how it was run.
+            error: what ended it early.
+            objects: recorded values that travel as objects.
+            notes: what else is to be known.
+        """
+        return Recording(
+            time=self.times[:: self.every][: len(rows)].copy(),
+            values=rows.copy(),
+            names=self.observed,
+            units={name: self.system.unit(name) for name in self.observed},
+            provenance={
+                **self._provenance(),
+                "inputs": {name: signal.text for name, signal in self.signals.items()},
+                **how,
+            },
+            bond_energy=dict(bond_energy),
+            error=error,
+            objects={
+                name: _column(self.system.declaration(name).type, items[: len(rows)])
+                for name, items in (objects or {}).items()
+            },
+            notes=tuple(notes),
+        )
+
+    def _provenance(self) -> dict[str, Any]:
+        return {
+            "system": self.system.name,
+            "scenario": self.scenario,
+            "algorithm": self.plan.algorithm,
+            "options": {key: _plain(value) for key, value in self.options.items()},
+            "step_s": self.step,
+            "instances": {
+                member.name: {
+                    "reference": member.reference,
+                    "model": member.description.name,
+                    "fmi": member.description.fmi,
+                    "file": member.fmu.path.name,
+                    "sha256": member.fmu.digest,
+                    "tool": member.description.tool,
+                    "parameters": dict(member.parameters),
+                }
+                for member in self.system.members.values()
+            },
+            "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
+            "versions": {name: _version(name) for name in ("cosim", "numpy")},
+        }
+
+
+def _column(type_: str, items: Sequence[Any]) -> NDArray[Any]:
+    """Recorded objects as an array of their type."""
+    kinds = {"Int64": np.int64, "UInt64": np.uint64}
+    return np.array(items, dtype=kinds.get(type_, object))
+
+
+def _plain(value: Any) -> Any:
+    return dict(value) if isinstance(value, Mapping) else value
+
+
+@lru_cache
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,1 @@
+"""Runs scenarios: checks, comparisons, tables and plots of what came out."""

@@ -1,0 +1,85 @@
+"""What drives the open inputs of a system, element by element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..data.signals import Constant, Signal, SignalVector, as_signal
+from ..errors import ConnectError, GraphError, UnknownNameError, listing
+from ..fmu.description import Variable
+from ..fmu.values import check_values
+from .system import System
+
+Driver = (
+    Signal
+    | SignalVector
+    | float
+    | str
+    | bytes
+    | Callable[[NDArray[np.float64]], ArrayLike]
+    | Sequence[Any]
+)
+"""What drives an input; a sequence has one driver per element of a vector input."""
+
+
+def spread(system: System, inputs: Mapping[str, Driver]) -> dict[str, Signal]:
+    """Signals by full scalar name.
+
+    Args:
+        system: whose inputs are driven.
+        inputs: open input or tunable parameter, whole or an element -> what drives it. One signal
+            for a vector drives all of its elements.
+
+    Raises:
+        UnknownNameError: neither an input nor a tunable parameter.
+        GraphError: it is driven already.
+        ConnectError: another number of signals than elements.
+        ValueRangeError: no item of an enumeration.
+    """
+    signals: dict[str, Signal] = {}
+    for name, driver in inputs.items():
+        _, variables = system.variables(name)
+        _check_causality(system, name, variables[0])
+        elements = system.elements(name)
+        drivers: list[Any] = [driver] * len(elements)
+        if isinstance(driver, SignalVector):
+            drivers = list(driver.signals)
+        elif isinstance(driver, (list, tuple)):
+            drivers = list(driver)
+        if len(drivers) != len(elements):
+            raise ConnectError(
+                f"input {name} has {len(elements)} elements, but {len(drivers)} signals are given"
+            )
+        for element, single in zip(elements, drivers, strict=True):
+            source = system.driver(element)
+            if source is not None:
+                raise GraphError(
+                    f"input {element} is already driven by {source}; drop the connection or the "
+                    "signal"
+                )
+            signals[element] = _named(system.declaration(element), element, as_signal(single))
+    return signals
+
+
+def _check_causality(system: System, name: str, variable: Variable) -> None:
+    tunable = variable.causality == "parameter" and variable.variability == "tunable"
+    if variable.causality != "input" and not tunable:
+        raise UnknownNameError(
+            f"{name} is not an input but a variable of causality {variable.causality!r} and "
+            f"variability {variable.variability!r} (signals drive inputs and tunable parameters); "
+            f"{listing(system.open_inputs(), name)}"
+        )
+
+
+def _named(declared: Variable, name: str, signal: Signal) -> Signal:
+    """A constant that names an item of an enumeration, as its number."""
+    if declared.items and isinstance(signal, Constant):
+        scalar = replace(declared, dimensions=())
+        (number,) = check_values(f"input {name}", [scalar], signal.value)
+        return Constant(number, signal.unit)
+    return signal
