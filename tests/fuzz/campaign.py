@@ -60,6 +60,7 @@ class Worker:
         self.folder = temporary()
         self.process: subprocess.Popen[bytes] | None = None
         self.rest = b""
+        self.answered = False
 
     def _start(self) -> subprocess.Popen[bytes]:
         folder = Path(self.folder.name)
@@ -99,6 +100,7 @@ class Worker:
                     first = self._lost(number, line is not None, statistics)
                     break
                 answer = json.loads(line)
+                self.answered = True
                 if "begun" in answer:
                     begun = answer["begun"]
                     continue
@@ -125,6 +127,11 @@ class Worker:
         if not died:
             self.process.kill()
         code = self.process.wait()
+        if not self.answered:
+            raise RuntimeError(
+                "the worker ends before its first answer, most likely as a reader refuses its good "
+                "files; run it by hand: python -m tests.fuzz.worker FOLDER 1"
+            )
         outcome = f"process ended with {code}" if died else f"took more than {LONGEST:g} s"
         statistics.add(number, outcome, LONGEST)
         self.close()
