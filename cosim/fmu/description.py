@@ -257,7 +257,9 @@ def _dimensions(element: ET.Element, starts: Mapping[int, Start]) -> tuple[int, 
         )
         for dimension in element.iterfind("Dimension")
     )
-    if found and min(found) < 0:
+    if not found:
+        return ()
+    if min(found) < 0:
         raise _Unsound(f"variable {element.get('name')!r} has {min(found)} elements")
     if excess := VALUES.excess(math.prod(found)):
         raise _Unsound(f"variable {element.get('name')!r}: {excess}")
@@ -273,13 +275,13 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
         if e.tag == "UInt64"
     }
     found: list[Variable] = []
-    total = 0
+    total, most = 0, VALUES.value()
     for element in elements:
         type_ = element.tag
         dimensions = _dimensions(element, structural)
         total += math.prod(dimensions) * (1 + len(element.findall("Alias")))
-        if excess := VALUES.excess(total):
-            raise _Unsound(f"its variables together: {excess}")
+        if total > most:
+            raise _Unsound(f"its variables together: {VALUES.excess(total)}")
         inner = element.findall("Start")  # of strings and binaries, one per element
         start = (
             tuple(value for item in inner for value in start_of(item.get("value"), type_))

@@ -255,6 +255,14 @@ def test_line_variable_and_severity() -> None:
     assert str(Finding("warning", "is odd", "mend it")) == "warning: is odd; mend it"
 
 
+def test_a_mistake_in_every_variable(tmp_path: Path) -> None:
+    same = "".join(REAL.format(name=f"v{i}", vr=i + 5, more="", real='unit="yd"')
+                   for i in range(1200))  # fmt: skip
+    findings = check(made(tmp_path, fmi2(U + Y + same)))
+    assert len(findings) == 1001
+    assert str(findings[-1]) == "error: has 200 more findings; mend these first"
+
+
 # -- archives --------------------------------------------------------------------------------------
 
 

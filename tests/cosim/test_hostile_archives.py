@@ -12,7 +12,7 @@ import pytest
 from cosim import ssp
 from cosim.errors import FmuFileError, InputError, ScenarioError
 from cosim.fmu.archive import open_fmu
-from cosim.reading import archives, markup
+from cosim.reading import archives, limits, markup
 from cosim.reading.limits import DATA, UNPACKED
 from tests.small_fmus import T3, Y3, fmi2, fmi3, pack
 
@@ -246,3 +246,12 @@ def test_ssp_packages_have_the_same_limits(tmp_path: Path, monkeypatch: pytest.M
 def test_names_of_entries() -> None:
     assert archives.fault("a/b.c") == "" and archives.fault("a..b/c") == ""
     assert archives.fault("a\0") == "has a zero byte in its name"
+
+
+def test_the_page_gives_the_limits() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "foreign_files.md").read_text(encoding="utf-8")
+    names = {2**30: "1 GiB", 100_000: "100 000", 2**24: "16 MiB", 10**6: "1 000 000"}
+    for item in vars(limits).values():
+        if isinstance(item, limits.Limit):
+            row = next(line for line in page.splitlines() if f"`{item.variable}`" in line)
+            assert row.endswith(f"| {names.get(item.default, '512 MiB')} |")

@@ -197,6 +197,8 @@ def _size(model: Model, variable: Declared, findings: Findings) -> None:
                     f"has a dimension by {other.name!r}, which has causality {other.causality}",
                     "refer to a structural parameter or constant", *where,
                 )  # fmt: skip
+    if variable.outer.find("Dimension") is None:
+        return
     size = size_of(model, variable)
     if size is not None and size < 1:
         findings.error("has a dimension that is not positive", "start with one element", *where)

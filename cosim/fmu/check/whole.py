@@ -28,6 +28,8 @@ from .variables import check_variables
 
 _BUILD = "sources/buildDescription.xml"
 _AGAIN = "build or fetch it again"
+MOST = 1000
+"""Findings that are given; more come from a mistake that is repeated in every variable."""
 _MORE = 100
 """Findings of the schema that are given; a description of another kind has one per element."""
 
@@ -56,7 +58,11 @@ def check(path: Path) -> list[Finding]:
     except OSError as error:
         about.error(f"cannot be read ({error.strerror})", _AGAIN)
     found = list(dict.fromkeys([*about.found, *found]))
-    return sorted(found, key=lambda finding: finding.severity != "error")
+    found.sort(key=lambda finding: finding.severity != "error")
+    if len(found) > MOST:
+        rest = Finding("error", f"has {len(found) - MOST} more findings", "mend these first")
+        found = [*found[:MOST], rest]
+    return found
 
 
 def _content(archive: zipfile.ZipFile, about: Findings) -> list[Finding]:
