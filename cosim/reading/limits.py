@@ -72,8 +72,8 @@ UNPACKED = Limit("COSIM_MAX_UNPACKED", 2**30)
 FILES = Limit("COSIM_MAX_FILES", 100_000, "files")
 """In an archive; an FMU that carries a Python environment has 30 000."""
 TEXT = Limit("COSIM_MAX_TEXT", 16 * 2**20)
-"""One XML, JSON or TOML file. 16 MiB of XML take up to half a gigabyte and some seconds; a variable of
-an FMU takes 200 bytes."""
+"""One XML, JSON or TOML file. 16 MiB of XML take up to half a gigabyte and some seconds; an FMU has
+200 bytes for each variable."""
 VALUES = Limit("COSIM_MAX_VALUES", 1_000_000, "values")
 """Of all variables of an FMU, elements of arrays counted one by one."""
 DATA = Limit("COSIM_MAX_DATA", 2**29)
