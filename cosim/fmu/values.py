@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ValueRangeError, listing
+from ..reading.schema import is_finite, shown
 from .attributes import INTEGERS
 from .description import Variable
 
@@ -144,9 +145,9 @@ def _checked(where: str, variable: Variable, value: Any) -> Any:
             )
         return found[0]
     if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
-        raise ValueRangeError(f"{where}: {name} = {value!r} is not a number")
-    if not math.isfinite(value):
-        raise ValueRangeError(f"{where}: {name} = {value} is not finite")
+        raise ValueRangeError(f"{where}: {name} = {shown(value)} is not a number")
+    if not is_finite(value):
+        raise ValueRangeError(f"{where}: {name} = {shown(value)} is not finite")
     number: Any = float(value)
     if type_ in INTEGERS:
         number = whole_number(value)
@@ -183,8 +184,8 @@ def _check_bounds(where: str, variable: Variable, number: Any) -> None:
     high = math.inf if variable.maximum is None else variable.maximum
     if not low <= number <= high:
         unit = f" {variable.symbol}" if variable.symbol not in ("", "1") else ""
-        shown = f"{number:.9g}" if isinstance(number, float) else str(number)
+        text = f"{number:.9g}" if isinstance(number, float) else str(number)
         raise ValueRangeError(
-            f"{where}: {variable.name} = {shown}{unit} is outside its bounds "
+            f"{where}: {variable.name} = {text}{unit} is outside its bounds "
             f"[{low:.9g}, {high:.9g}]{unit}"
         )

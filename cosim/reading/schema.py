@@ -47,12 +47,16 @@ def number(value: Any, where: str) -> None:
     """A finite number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise fail(where, value, "a number")
-    try:
-        finite = math.isfinite(value)
-    except OverflowError:  # a whole number beyond floating point
-        finite = False
-    if not finite:
+    if not is_finite(value):
         raise fail(where, value, "a finite number")
+
+
+def is_finite(value: Any) -> bool:
+    """Whether a number is finite in floating point, which whole numbers of 309 digits are not."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def floating(value: Any, where: str) -> None:

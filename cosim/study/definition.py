@@ -14,7 +14,7 @@ from typing import Any
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import places
-from ..reading.schema import shown
+from ..reading.schema import is_finite, shown
 
 KEYS = {
     "description", "scenario", "runs", "duration", "period", "algorithm", "step", "repeats",
@@ -182,11 +182,7 @@ class _Reader:
     def number(self, what: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.fail(f"{what} must be a number, not {value!r}")
-        try:
-            finite = math.isfinite(value)
-        except OverflowError:  # a whole number beyond floating point
-            finite = False
-        if not finite:
+        if not is_finite(value):
             raise self.fail(f"{what} = {shown(value)} must be finite")
         return float(value)
 

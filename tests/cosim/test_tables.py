@@ -11,6 +11,7 @@ from cosim.files import read_toml
 from cosim.scenario.scenario import read_scenario
 from cosim.study.definition import read_study
 from cosim.system.toml import read_system
+from tests.small_fmus import fmi2, pack
 
 SYSTEM = '[instances]\na = "a.fmu"\n'
 SCENARIO = 'system = "s.toml"\nduration = 1.0\nstep = 0.1\n'
@@ -136,3 +137,11 @@ def test_toml_that_harms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         read_toml(path)
     with pytest.raises(ScenarioError, match="is not TOML"):
         read_toml(Path("a\0b.toml"))
+
+
+def test_whole_numbers_beyond_floating_point(tmp_path: Path) -> None:
+    (tmp_path / "a.fmu").write_bytes(pack(tmp_path / "b.fmu", fmi2()).read_bytes())
+    path = tmp_path / "x.toml"
+    path.write_text(f"{SYSTEM}[parameters]\n'a.u' = 0x1{'0' * 400}\n")
+    with pytest.raises(InputError, match=r"x\.toml: x: a: u = 444624\d+ … is not finite"):
+        read_system(path).build(None)
