@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import struct
 import sys
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -14,6 +13,7 @@ from typing import Literal
 from ..errors import FmuFileError, InputError, PlatformError
 from ..reading import archives
 from ..reading.archives import DAMAGE, ArchiveError
+from ..reading.libraries import cut_short
 from ..reading.limits import TEXT, UNPACKED, VALUES
 from ..spec.cache import cache_folder
 from .description import Description, read_description
@@ -78,11 +78,10 @@ class Fmu:
         for folder in wanted:
             path = self.folder / "binaries" / folder / name
             if path.is_file():
-                size, needed = path.stat().st_size, _elf_size(path)
-                if size < needed:
+                if problem := cut_short(path):
                     raise FmuFileError(
-                        f"{self.path}: its binary binaries/{folder}/{name} is cut short: {size} "
-                        f"bytes of at least {needed}. Build or fetch it again"
+                        f"{self.path}: its binary binaries/{folder}/{name} {problem}. Build or "
+                        "fetch it again"
                     )
                 return path
         present = ", ".join(self.platforms()) or "none at all"
@@ -90,27 +89,6 @@ class Fmu:
             f"{self.path.name}: has no binary for this machine ({wanted[0]}); it has {present}. "
             "Build it for this platform ('cosim fmus build --platform all') or ask its supplier"
         )
-
-
-def _elf_size(path: Path) -> int:
-    """Bytes that the segments of a 64-bit ELF library reach to, 0 for other formats.
-
-    The loaders of the other formats refuse a library that is cut short; that of ELF maps it and the
-    process dies of a bus error.
-    """
-    with path.open("rb") as file:
-        header = file.read(64)
-        if len(header) < 64 or header[:6] != b"\x7fELF\x02\x01":
-            return 0
-        table = int(struct.unpack_from("<Q", header, 32)[0])
-        entry, count = (int(value) for value in struct.unpack_from("<HH", header, 54))
-        file.seek(table)
-        entries = file.read(entry * count)
-    needed = table + entry * count
-    for place in range(0, len(entries) - 39, entry):
-        offset, size = (int(struct.unpack_from("<Q", entries, place + at)[0]) for at in (8, 32))
-        needed = max(needed, offset + size)
-    return needed
 
 
 def unpacked(

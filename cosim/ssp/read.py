@@ -19,6 +19,7 @@ from ..data.signals import Signal
 from ..errors import listing
 from ..fmu.archive import Fmu
 from ..reading import markup
+from ..reading.limits import TEXT
 from ..system.system import System
 from ..system.toml import DeclaredConnection, SystemFile
 from . import flatten
@@ -385,18 +386,25 @@ class _Steps:
 
 def _signals(file: File, step: float) -> dict[str, Signal]:
     """Columns of a CSV file with a head such as `time [s],motor.w_ref [rad/s]`."""
-    with file.path.open(encoding="utf-8", newline="") as handle:
-        rows = list(csv.reader(handle))
+    if excess := TEXT.excess(file.path.stat().st_size):
+        raise file.error(excess)
     try:
+        with file.path.open(encoding="utf-8", newline="") as handle:
+            rows = list(csv.reader(handle))
         heads, numbers = rows[0], [[float(item) for item in row] for row in rows[1:]]
         columns = list(zip(*numbers, strict=True))
-    except (IndexError, ValueError) as error:
-        raise file.error(f"is not a table of numbers ({error})") from error
+        if len(columns) != len(heads) or not columns:
+            raise ValueError(f"{len(heads)} heads for {len(columns)} columns")
+    except (IndexError, ValueError, OSError, csv.Error) as error:
+        raise file.error(f"is not a table of numbers ({error}); export it again") from error
+    times = np.array(columns[0])
+    if not np.isfinite(numbers).all() or np.any(np.diff(times) < 0.0):
+        raise file.error("has times that go back, or numbers that are not finite; export it again")
     found: dict[str, Signal] = {}
     for head, column in zip(heads[1:], columns[1:], strict=True):
         name, _, unit = head.partition(" ")
         found[name] = _Steps(
-            np.array(columns[0]),
+            times,
             np.array(column),
             unit.strip("[]"),
             f"{file.name}:{name}",

@@ -413,3 +413,17 @@ def test_executors_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ValueRangeError, match=r"this machine has no kernel-.* compiles it"):
         Master(bench(), step=STEP, executor="c").run(STEP)
     assert len(Master(bench(), step=STEP).run(STEP)) == 2  # auto: the one in Python
+
+
+@pytest.mark.parametrize("length", [0, 5, 63, 2000])
+def test_a_library_that_was_cut_short_is_made_again(
+    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, length: int
+) -> None:
+    monkeypatch.setenv("COSIM_CACHE", str(tmp_path))
+    path = kernel.cache_folder() / kernel.library_name()
+    path.parent.mkdir(parents=True)
+    path.write_bytes(library.read_bytes())
+    assert kernel.find() == path
+    path.write_bytes(library.read_bytes()[:length])
+    assert kernel.find() is None  # so the builder compiles it again
+    assert not path.exists()

@@ -351,6 +351,10 @@ READERS = {
             lambda: _ssp("resources/p.ssm"),
         ),
         Reader(
+            "inputs", "resources/inputs.csv", lambda: [seeds.INPUTS.encode()], _csv, _resource,
+            lambda: {**_ssp(""), "SystemStructure.ssd": seeds.DRIVEN.encode()},
+        ),
+        Reader(
             "scenario", "scenario.toml", lambda: [seeds.SCENARIO.encode(), seeds.TABLE.encode()],
             TOML, _scenario, _scenario_files,
         ),

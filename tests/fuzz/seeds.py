@@ -115,6 +115,12 @@ SSD = ssd(
     ),
     '<ssd:DefaultExperiment startTime="0" stopTime="1"><ssd:Annotations/></ssd:DefaultExperiment>',
 )  # fmt: skip
+DRIVEN = SSD.replace(
+    "<ssd:Annotations/>",
+    '<ssd:Annotations><ssc:Annotation type="cosim"><c:Run xmlns:c="cosim" step="0.1" '
+    'inputs="resources/inputs.csv"/></ssc:Annotation></ssd:Annotations>',
+)
+INPUTS = "time [s],a.u [rad/s],b.w\n0.0,1.0,2.0\n0.1,1.5,2.0\n0.2,2.0,2.0\n"
 SYSTEM = """name = "pair"
 description = "two"
 

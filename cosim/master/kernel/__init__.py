@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...reading.libraries import cut_short
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
@@ -165,8 +166,10 @@ def find() -> Path | None:
     """The library, None if this machine has none."""
     for folder in (SOURCES[0].parent / "lib", cache_folder()):
         path = folder / library_name()
-        if path.is_file():
+        if path.is_file() and not cut_short(path):
             return path
+        if path.is_file() and folder == cache_folder():
+            path.unlink()  # so that it is compiled again
     return None
 
 
