@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, ScenarioError
+from .limits import TEXT
+from .schema import DEPTH, depth_of
 
 
 @contextlib.contextmanager
@@ -84,17 +86,37 @@ def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
+def is_file(path: Path) -> bool:
+    """Whether a file is there; a path that no file can have (a zero byte in it) is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
     Raises:
-        ScenarioError: missing or not TOML.
+        ScenarioError: missing, too large or not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        if excess := TEXT.excess(path.stat().st_size):
+            raise ScenarioError(f"{path}: {excess}")
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ScenarioError(f"{path}: there is no such file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: is not TOML ({error})") from error
+    except RecursionError:
+        raise ScenarioError(
+            f"{path}: its lists and tables lie too deep within each other"
+        ) from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except (
+        ValueError,
+        OverflowError,
+    ) as error:  # TOML and UTF-8, numbers of thousands of digits, impossible paths
+        raise ScenarioError(f"{path}: is not TOML ({error})") from error
+    if depth_of(content) > DEPTH:
+        raise ScenarioError(f"{path}: its lists and tables lie more than {DEPTH} deep")
+    return content

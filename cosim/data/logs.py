@@ -18,9 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing
-from ..files import read_toml
+from ..files import is_file, read_toml
+from ..limits import DATA
+from .matlab import read_matlab
+from .npz import read_npz
+from .parquet import read_table
 
 Vector = NDArray[np.float64]
+_CELL = 8
+"""Bytes of memory per byte of a CSV file: seven digits are a text of 56 and a pointer."""
 _HEAD = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
 
 
@@ -61,8 +67,17 @@ class Log:
 
 
 def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
-    with path.open(encoding="utf-8-sig", newline="") as handle:
-        rows = [row for row in csv.reader(handle) if row and not row[0].startswith("#")]
+    if excess := DATA.excess(_CELL * path.stat().st_size):
+        raise ScenarioError(f"{path}: {excess}")
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as handle:
+            rows = [row for row in csv.reader(handle) if row and not row[0].startswith("#")]
+    except (csv.Error, UnicodeError) as error:
+        raise ScenarioError(
+            f"{path}: is not a table of text ({error}); save it as CSV in UTF-8"
+        ) from error
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
     if not rows:
         raise ScenarioError(f"{path}: is empty")
     units, names = {}, []
@@ -71,6 +86,9 @@ def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
         name = match["name"] if match else head.strip()
         names.append(name)
         units[name] = match["unit"] if match else ""
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ScenarioError(f"{path}: has two columns {twice!r}; rename one of them")
     columns: dict[str, Vector] = {}
     for index, name in enumerate(names):
         texts = [row[index].strip() if index < len(row) else "" for row in rows[1:]]
@@ -83,17 +101,13 @@ def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
 
 def _parquet(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise ScenarioError(f"{path}: is not a Parquet file ({error})") from error
+    table = read_table(path)
     columns, units = {}, {}
     for item in table.schema:
         if pa.types.is_floating(item.type) or pa.types.is_integer(item.type):
             columns[item.name] = table[item.name].to_numpy().astype(np.float64)
-            units[item.name] = (item.metadata or {}).get(b"unit", b"").decode()
+            units[item.name] = (item.metadata or {}).get(b"unit", b"").decode(errors="replace")
     return columns, units
 
 
@@ -106,37 +120,29 @@ def _split(name: str, values: Vector) -> dict[str, Vector]:
     return {}
 
 
+def _numbers(arrays: Mapping[str, NDArray[Any]], path: Path) -> dict[str, Vector]:
+    """Arrays of numbers as columns.
+
+    Raises:
+        ScenarioError: two of one name.
+    """
+    columns: dict[str, Vector] = {}
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiub":
+            continue
+        for one, values in _split(name, array.astype(np.float64)).items():
+            if one in columns:
+                raise ScenarioError(f"{path}: has two columns {one!r}; rename one of the arrays")
+            columns[one] = values
+    return columns
+
+
 def _npz(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
-    try:
-        with np.load(path) as archive:
-            columns = {
-                one: values
-                for name in archive.files
-                if archive[name].dtype.kind in "fiub"
-                for one, values in _split(name, archive[name].astype(np.float64)).items()
-            }
-    except (ValueError, OSError, EOFError) as error:
-        raise ScenarioError(f"{path}: is not an npz archive of numbers ({error})") from error
-    return columns, {}
+    return _numbers(read_npz(path), path), {}
 
 
 def _mat(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
-    from scipy.io import loadmat
-
-    try:
-        content = loadmat(path, squeeze_me=True)
-    except (ValueError, OSError, NotImplementedError) as error:
-        raise ScenarioError(
-            f"{path}: is not a MATLAB file of version 7 or older ({error}); save it with -v7"
-        ) from error
-    columns = {
-        name: np.asarray(value, dtype=np.float64)
-        for name, value in content.items()
-        if not name.startswith("__")
-        and getattr(value, "ndim", 0) == 1
-        and value.dtype.kind in "fiub"
-    }
-    return columns, {}
+    return _numbers(read_matlab(path), path), {}
 
 
 _READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mat": _mat}
@@ -149,7 +155,7 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
         ScenarioError: missing or unreadable.
     """
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise ScenarioError(f"{path}: there is no such file")
     reader = _READERS.get(path.suffix)
     if reader is None:
@@ -211,7 +217,7 @@ class DataSet:
 
 def _sheet(folder: Path, name: str) -> dict[str, Any]:
     for place in (folder, folder.parent, folder.parent.parent):
-        if (place / name).is_file():
+        if is_file(place / name):
             return read_toml(place / name)
     raise ScenarioError(
         f"{folder / 'set.toml'}: the rig sheet {name!r} is not here nor in the two folders above"
@@ -226,7 +232,7 @@ def read_data_set(folder: Path | str) -> DataSet:
     """
     folder = Path(folder)
     table = read_toml(folder / "set.toml")
-    sheet = _sheet(folder, table["sheet"]) if "sheet" in table else {}
+    sheet = _sheet(folder, str(table["sheet"])) if "sheet" in table else {}
     try:
         runs = {
             entry["name"]: LoggedRun(
@@ -237,7 +243,9 @@ def read_data_set(folder: Path | str) -> DataSet:
         signals = sheet.get("signal", [])
         units = {entry["name"]: entry.get("unit", "") for entry in signals}
         noise = {entry["name"]: float(entry.get("noise_sigma", 0.0)) for entry in signals}
-    except (KeyError, TypeError, ValueError) as error:
+        if not all(isinstance(name, str) for name in (*runs, *units, *units.values())):
+            raise TypeError("a name or unit is no text")
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ScenarioError(f"{folder / 'set.toml'}: an entry is incomplete ({error})") from error
     return DataSet(
         folder,

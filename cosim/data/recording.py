@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
+from .parquet import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 _META = b"cosim"
+_KINDS = ("double", "int64", "uint64", "string", "binary")
 
 
 @dataclass(frozen=True)
@@ -211,22 +213,25 @@ def read_recording(path: Path | str) -> Recording:
     Raises:
         ScenarioError: missing, or not such a file.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = Path(path)
-    if not path.is_file():
-        raise ScenarioError(f"{path}: there is no such file")
-    try:
-        table = pq.read_table(path)
-    except pa.ArrowInvalid as error:
-        raise ScenarioError(f"{path}: is not a Parquet file ({error})") from error
+    table = read_table(path)
     metadata = table.schema.metadata or {}
     if _META not in metadata or "time" not in table.column_names:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
-    meta = json.loads(metadata[_META])
+    meta = _read_meta(path, metadata[_META])
     names = tuple(name for name in table.column_names if name != "time")
-    columns = [table[name].to_numpy() for name in names]
+    columns = []
+    for name in names:
+        column = table[name]
+        kind = str(column.type)
+        if kind not in _KINDS or column.null_count:
+            raise ScenarioError(
+                f"{path}: column {name!r} is of type {kind} with {column.null_count} gaps; a "
+                f"recording has columns of {', '.join(_KINDS)} without gaps: record it again"
+            )
+        columns.append(column.to_numpy())
+    if str(table["time"].type) != "double" or table["time"].null_count:
+        raise ScenarioError(f"{path}: its times are not floating-point numbers; record it again")
     objects = {
         name: column
         for name, column in zip(names, columns, strict=True)
@@ -248,3 +253,29 @@ def read_recording(path: Path | str) -> Recording:
         objects=objects,
         notes=tuple(meta.get("notes", ())),
     )
+
+
+def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
+    """What `Recording._meta` wrote.
+
+    Raises:
+        ScenarioError: something else.
+    """
+    meta: dict[str, Any]
+    try:
+        meta = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(
+            f"{path}: what it says about itself is not JSON ({error}); record it again"
+        ) from error
+    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str}
+    for key, kind in kinds.items():
+        if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
+            raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
+    if not all(isinstance(unit, str) for unit in meta["units"].values()) or not all(
+        isinstance(energy, (int, float)) for energy in meta["bond_energy_J"].values()
+    ):
+        raise ScenarioError(
+            f"{path}: its units are no texts, or its energies no numbers; record it again"
+        )
+    return meta

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import shutil
 import struct
 import sys
-import tempfile
-import zipfile
-import zlib
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
-from ..errors import FmuFileError, PlatformError
+from .. import archives
+from ..archives import DAMAGE, ArchiveError
+from ..errors import FmuFileError, InputError, PlatformError
+from ..limits import TEXT, UNPACKED, VALUES
 from ..spec.cache import cache_folder
-from .description import Description, read_description
+from .description import Description
+from .model_description import read_description
 
 
 def platform_folders(fmi: Literal[2, 3]) -> tuple[str, ...]:
@@ -114,58 +114,71 @@ def _elf_size(path: Path) -> int:
     return needed
 
 
-def unpacked_folder(kind: str, content: bytes) -> Path:
-    """Where an archive of this content is unpacked; `kind` is a folder of the cache."""
-    return cache_folder() / kind / hashlib.sha256(content).hexdigest()[:32]
+def unpacked(path: Path, kind: str, what: str, error: type[InputError]) -> tuple[Path, str]:
+    """Folder with the content of an archive, and the SHA-256 of the archive.
 
+    It is unpacked if it is not there yet, or no longer whole.
 
-def unpack(path: Path, folder: Path) -> None:
-    """Unpack an archive into a new folder, whole or not at all."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=".unpack-", dir=folder.parent))
+    Args:
+        path: of the archive.
+        kind: folder of the cache.
+        what: kind of archive in error texts, `an FMU`.
+        error: class of the errors.
+
+    Raises:
+        InputError: of that class: missing, damaged, too large, or with entries that do harm.
+    """
     try:
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(temporary)  # checks the CRC of each member
-        try:
-            temporary.rename(folder)
-        except OSError:
-            if not folder.is_dir():  # else another process was faster
-                raise
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        size = path.stat().st_size
+        if not path.is_file():
+            raise error(f"{path}: is not {what} archive but a folder or device")
+        if excess := UNPACKED.excess(size):
+            raise error(f"{path}: {excess}")
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError:
+        raise error(f"{path}: there is no such file") from None
+    except OSError as problem:
+        raise error(f"{path}: cannot be read ({problem.strerror})") from problem
+    except ValueError as problem:  # a zero byte in the path
+        raise error(f"{str(path)!r}: is no path ({problem})") from problem
+    folder = cache_folder() / kind / digest[:32]
+    try:
+        with archives.opened(path) as archive:
+            if not archives.intact(archives.members(archive), folder):
+                archives.unpack(archive, folder)
+    except ArchiveError as problem:
+        raise error(f"{path}: {problem}") from problem
+    except DAMAGE as problem:
+        raise error(
+            f"{path}: is not a complete {what.rpartition(' ')[2]} archive ({problem}); "
+            f"it has {size} bytes. Build or fetch it again"
+        ) from problem
+    except OSError as problem:
+        raise error(
+            f"{path}: cannot be unpacked into {folder.parent} ({problem}); "
+            "set COSIM_CACHE to a folder that can be written"
+        ) from problem
+    return folder, digest
 
 
 def open_fmu(path: Path | str) -> Fmu:
     """Unpack an .fmu into the cache (if it is not there yet) and read its description.
 
     Raises:
-        FmuFileError: missing, corrupt, truncated, or not an FMU.
+        FmuFileError: missing, corrupt, truncated, too large, or not an FMU.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise FmuFileError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise FmuFileError(f"{path}: cannot be read ({error.strerror})") from error
-    folder = unpacked_folder("unpacked", content)
-    if not folder.is_dir():
-        try:
-            unpack(path, folder)
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-            raise FmuFileError(
-                f"{path}: is not a complete FMU archive ({error}); "
-                f"it has {len(content)} bytes. Build or fetch it again"
-            ) from error
-        except OSError as error:
-            raise FmuFileError(
-                f"{path}: cannot be unpacked into {folder.parent} ({error}); "
-                "set COSIM_CACHE to a folder that can be written"
-            ) from error
-    return Fmu(path, hashlib.sha256(content).hexdigest(), folder, _described(folder, str(path)))
+    folder, digest = unpacked(path, "unpacked", "an FMU", FmuFileError)
+    return Fmu(path, digest, folder, _described(folder, str(path), _limits()))
+
+
+def _limits() -> tuple[int, int]:
+    """Limits that a description was read with; others may refuse it."""
+    return TEXT.value(), VALUES.value()
 
 
 @lru_cache(maxsize=256)
-def _described(folder: Path, where: str) -> Description:
+def _described(folder: Path, where: str, limits: tuple[int, int]) -> Description:
     """Description of an unpacked FMU; its folder is named after its content."""
     return read_description(folder, where)

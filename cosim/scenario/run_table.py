@@ -24,6 +24,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError, listing
+from ..files import is_file
+from ..limits import TEXT
+from ..schema import keyed
+from .shape import TABLE
 
 PLACE = re.compile(r"\{(\w+)\}")
 _KEYS = {"file", "name", "join", "columns"}
@@ -64,8 +68,11 @@ def table_runs(path: Path, entry: Any) -> dict[str, Row]:
         raise ScenarioError(
             f"{path}: [table] has no key {unknown[0]!r}; {listing(sorted(_KEYS), unknown[0])}"
         )
+    keyed(TABLE)(entry, f"{path}: [table]")
     rows = _rows(path.parent / entry["file"])
     if "join" in entry:
+        if not {"file", "on"} <= set(entry["join"]):
+            raise ScenarioError(f"{path}: [table] join needs file and on, the column to join by")
         file, on = path.parent / entry["join"]["file"], entry["join"]["on"]
         others = {row[on]: row for row in _rows(file) if on in row}
         lacking = [row.get(on) for row in rows if row.get(on) not in others]
@@ -80,10 +87,23 @@ def table_runs(path: Path, entry: Any) -> dict[str, Row]:
 
 
 def _rows(file: Path) -> list[Row]:
-    if not file.is_file():
+    if not is_file(file):
         raise ScenarioError(f"{file}: there is no such file")
-    with file.open(encoding="utf-8-sig", newline="") as handle:
-        return list(csv.DictReader(handle))
+    if excess := TEXT.excess(file.stat().st_size):
+        raise ScenarioError(f"{file}: {excess}")
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as handle:
+            rows = list(csv.DictReader(handle))
+    except (csv.Error, UnicodeError) as error:
+        raise ScenarioError(f"{file}: is not a CSV table in UTF-8 ({error})") from error
+    except OSError as error:
+        raise ScenarioError(f"{file}: cannot be read ({error.strerror})") from error
+    for number, row in enumerate(rows, 1):
+        if None in row or None in row.values():
+            raise ScenarioError(
+                f"{file}: row {number} has more or fewer cells than the head; correct it"
+            )
+    return rows
 
 
 # -- places ----------------------------------------------------------------------------------------
@@ -164,5 +184,5 @@ def _evaluate(what: str, text: str, row: Row, rows: list[Row]) -> float:
         return value(ast.parse(text, mode="eval").body)
     except SyntaxError:
         raise ScenarioError(f"{what}: {text!r} is not an expression") from None
-    except (ArithmeticError, ValueError, TypeError) as error:
+    except (ArithmeticError, ValueError, TypeError, RecursionError, MemoryError) as error:
         raise ScenarioError(f"{what}: {text!r} cannot be calculated ({error})") from None

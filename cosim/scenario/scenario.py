@@ -20,10 +20,12 @@ from ..data.signals import Constant, Signal, SignalVector, Table
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import places
+from ..limits import DATA
 from ..system.toml import SystemFile, read_system
 from .axes import Axes, read_axes
 from .checks import CHECK_KEYS, Check, read_check
 from .run_table import fill, table_runs
+from .shape import check_inside, check_outside
 
 KEYS = {
     "description", "question", "expected", "source", "system", "duration", "start", "step",
@@ -159,11 +161,13 @@ def read_scenario(path: Path | str, name: str = "") -> ScenarioFile:
     path = Path(path)
     table = read_toml(path)
     _only(path, table, KEYS, "a scenario")
+    check_outside(table, str(path))
     runs: dict[str, Mapping[str, Any]] = {}
     if "table" in table:
         runs.update({run: {"": row} for run, row in table_runs(path, table["table"]).items()})
     for run, changes in table.get("runs", {}).items():
         _only(path, changes, KEYS - {"runs", "table"}, f"run {run}")
+        check_outside(changes, f"{path}, run {run}")
         runs[run] = {**runs.get(run, {}), **changes}
     return ScenarioFile(name or path.parent.name, path, table, runs or {"": {}})
 
@@ -201,8 +205,11 @@ class _Reader:
         self.table = fill(str(file.path), _merge(base, changes), row)
 
     def fail(self, text: str) -> ScenarioError:
-        where = f"{self.file.path}" + (f", run {self.run}" if self.run else "")
-        return ScenarioError(f"{where}: {text}")
+        return ScenarioError(f"{self.where}: {text}")
+
+    @property
+    def where(self) -> str:
+        return f"{self.file.path}" + (f", run {self.run}" if self.run else "")
 
     def number(self, key: str, default: float | None = None) -> float:
         value = self.table.get(key, default)
@@ -212,6 +219,7 @@ class _Reader:
 
     def read(self) -> Scenario:
         table = self.table
+        check_inside(table, self.where)
         record = table.get("record", {})
         _only(self.file.path, record, {"signals", "period"}, "[record]")
         inputs: dict[str, Signal | SignalVector] = {}
@@ -383,7 +391,13 @@ class _Reader:
     def grid(self) -> Any:
         """Times of the recorded points."""
         period = self.optional(self.table.get("record", {}), "period") or self.number("step")
-        count = round(self.number("duration") / period)
+        count = self.number("duration") / period if period > 0.0 else -1.0
+        if not 0.0 <= count <= DATA.value() / 8:
+            raise self.fail(
+                f"duration = {self.number('duration'):g} s in periods of {period:g} s gives no "
+                "times; give a duration and a period (or step) above 0 that fit together"
+            )
+        count = round(count)
         return self.number("start", 0.0) + period * np.arange(count + 1, dtype=np.float64)
 
     def circle(self, name: str, entry: Any, signals: tuple[str, ...], text: str) -> Reference:

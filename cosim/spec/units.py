@@ -71,6 +71,8 @@ _SYMBOLS: dict[str, tuple[Exponents, float, float]] = {
 }
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXED = ("m", "s", "A", "N", "J", "W", "V", "ohm", "H", "F", "C", "T", "Hz", "Pa", "g", "rad")
+_HIGHEST = 20
+"""Power of a unit; FMI's own exponents stay below ten in all libraries known to us."""
 _FACTOR = re.compile(r"([A-Za-z%]+|1)(-?\d+)?")
 
 
@@ -111,6 +113,8 @@ def parse(symbol: str) -> Unit:
                 f"{', '.join(sorted(_SYMBOLS))} (with a prefix where usual), e.g. 'N.m.s/rad'"
             )
         power = sign * int(match[2] or 1)
+        if abs(power) > _HIGHEST:
+            raise UnitError(f"unit {symbol!r}: a power of {power} is no physical quantity")
         factor *= known[1] ** power
         if known[2]:
             if len(parts) > 1 or power != 1:

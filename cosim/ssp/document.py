@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import urllib.parse
 import xml.etree.ElementTree as ET
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from ..errors import InputError, ScenarioError
+from .. import markup
+from ..errors import ScenarioError
+from ..files import is_file
 from ..fmu import archive
-from ..fmu.description import read_units
+from ..fmu.model_description import read_units
 from ..spec.units import Unit
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -70,7 +70,10 @@ class File:
         Raises:
             ScenarioError: another kind of URI, outside the package, or not there.
         """
-        parts = urllib.parse.urlsplit(source)
+        try:
+            parts = urllib.parse.urlsplit(source)
+        except ValueError as error:  # brackets of an address of the network
+            raise self.error(f"{what} refers to {source!r}, which is no URI ({error})") from None
         if parts.scheme or parts.netloc:
             raise self.error(
                 f"{what} refers to {source!r}; only files inside the package can be read, so put "
@@ -86,7 +89,7 @@ class File:
             elif part != ".":
                 places.append(part)
         found = File(folder or self.folder, "/".join(places), f"{self.shown}: {source}")
-        if not found.path.is_file():
+        if not is_file(found.path):
             raise self.error(f"{what} refers to {source!r}, which the package does not hold")
         return found
 
@@ -97,8 +100,8 @@ class File:
             ScenarioError: not XML, or of another kind or version.
         """
         try:
-            element = ET.fromstring(self.path.read_bytes())
-        except (ET.ParseError, OSError) as error:
+            element = markup.read(self.path).root
+        except (markup.MarkupError, OSError) as error:
             raise self.error(f"cannot be read ({error})") from error
         self.check(element, root)
         return element
@@ -127,35 +130,12 @@ def open_package(path: Path, ssd: str = "SystemStructure.ssd") -> File:
         return File(path.parent, path.name, str(path))
     folder = path
     if not path.is_dir():
-        folder = _unpacked(path)
+        folder, _ = archive.unpacked(path, "ssp", "an SSP", ScenarioError)
     file = File(folder, ssd, f"{path}: {ssd}")
     if not file.path.is_file():
         present = ", ".join(sorted(item.name for item in folder.glob("*.ssd"))) or "no .ssd at all"
         raise ScenarioError(f"{path}: has no {ssd}; it has {present}")
     return file
-
-
-def _unpacked(path: Path) -> Path:
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise ScenarioError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    folder = archive.unpacked_folder("ssp", content)
-    if not folder.is_dir():
-        try:
-            archive.unpack(path, folder)
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-            raise ScenarioError(
-                f"{path}: is not a complete SSP archive ({error}); it has {len(content)} bytes"
-            ) from error
-        except OSError as error:
-            raise ScenarioError(
-                f"{path}: cannot be unpacked into {folder.parent} ({error}); "
-                "set COSIM_CACHE to a folder that can be written"
-            ) from error
-    return folder
 
 
 # -- elements --------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -14,14 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import markup
 from ..data.signals import Signal
+from ..errors import listing
 from ..fmu.archive import Fmu
 from ..system.system import System
 from ..system.toml import DeclaredConnection, SystemFile
 from . import flatten
 from .document import File, Structure, open_package, read_structure
 from .flatten import Net, shown
-from .values import Value, read_binding
+from .values import Scalar, Value, read_binding
 
 Vector = NDArray[np.float64]
 
@@ -62,7 +65,7 @@ class Package:
         experiment: how it is meant to be run.
         inputs, outputs: connectors of the root system -> variables of FMUs.
         signals: full names of inputs -> signals that came with the package.
-        ignored: parameters that match no variable (SSP lets them be ignored).
+        ignored: parameters of a set for several elements that match none in this one.
         elements: element of the package, `sub.motor` -> instance, `sub_motor`.
     """
 
@@ -202,6 +205,8 @@ class _Flat:
     def parameters(self) -> dict[str, Any]:
         """Full name -> value; enclosing systems win over what they hold, later over earlier."""
         found: dict[str, Any] = {}
+        used: dict[tuple[Path, str], list[bool]] = {}
+        unmatched: list[tuple[flatten.Path, str, Value]] = []
         places = [*self.net.components, *self.net.systems]
         for place in sorted(places, key=len, reverse=True):
             element = self.net.components.get(place) or self.net.systems[place]
@@ -210,11 +215,34 @@ class _Flat:
                 inside = fmu.folder if fmu else None
                 for name, value in read_binding(binding, shown(place), inside):
                     targets = self.targets(place, name)
+                    used.setdefault((value.file.path, value.origin), []).append(bool(targets))
                     if not targets:
-                        self.ignored.append(".".join((*place, name)))
+                        unmatched.append((place, name, value))
                     for route in targets:
                         self.assign(found, route, value)
+        for place, name, value in unmatched:
+            if not any(used[value.file.path, value.origin]):
+                names = self.names_in(place)
+                raise value.file.error(
+                    f"{value.origin} matches nothing in {shown(place)}, which has no {name!r}; "
+                    f"{listing(names, name)}"
+                )
+            self.ignored.append(".".join((*place, name)))
         return found
+
+    def names_in(self, place: flatten.Path) -> list[str]:
+        """Names that a parameter of an element may have."""
+        if place in self.net.fmus:
+            variables = self.net.fmus[place].description.variables.values()
+            return [v.name for v in variables if v.causality in ("parameter", "input", "local")]
+        system = self.net.systems.get(place)
+        if system is None:
+            return []
+        return [
+            *(c.name for c in system.connectors.values() if c.kind != "output"),
+            *(f"{child}.{name}" for child in system.elements or {}
+              for name in self.names_in((*place, child))),
+        ]  # fmt: skip
 
     def targets(self, place: flatten.Path, name: str) -> list[flatten.Route]:
         """The variables that a name means, seen from an element."""
@@ -247,6 +275,8 @@ class _Flat:
                 item if isinstance(item, str) else route.factor * float(item) + route.offset
                 for item in given
             ]
+        if variable.type in ("Float64", "Float32"):
+            given = [self.exact(item, value, route) for item in given]
         if index >= 0 and variable.size > 1:  # one element, through a connector of a system
             key, size = f"{self.names[place]}.{variable.elements()[index]}", 1
         else:
@@ -261,6 +291,21 @@ class _Flat:
                 "arrays cannot be changed"
             )
         found[key] = given[0] if size == 1 else given
+
+    def exact(self, item: Scalar, value: Value, route: flatten.Route) -> Scalar:
+        """A whole number as floating point, if it is one."""
+        if isinstance(item, bool) or not isinstance(item, int):
+            return item
+        try:
+            given = float(item)
+        except OverflowError:
+            given = math.inf
+        if given != item:
+            raise value.file.error(
+                f"{value.origin} = {item} has no exact floating-point number, as "
+                f"{shown(route.end[0])}.{route.end[1]} takes; give the nearest, {given:.17g}"
+            )
+        return given
 
     # -- experiment --------------------------------------------------------------------------------
 
@@ -305,7 +350,7 @@ def _element(node: flatten.Node) -> str:
 
 def _items(fmu: Fmu, name: str) -> dict[str, int]:
     """Items of the enumeration that a variable of an FMU has as its type."""
-    root = ET.parse(fmu.folder / "modelDescription.xml").getroot()
+    root = markup.read(fmu.folder / "modelDescription.xml").root
     declared = ""
     for element in root.iterfind("ModelVariables/*"):
         if element.get("name") == name:

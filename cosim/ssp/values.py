@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from ..errors import UnitError
@@ -21,7 +23,7 @@ from .document import (
     units_of,
 )
 
-Scalar = float | bool | str
+Scalar = float | int | bool | str
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Value:
                     gain, offset = conversion(own, unit)
                 except UnitError as error:
                     raise UnitError(f"{self.file.shown}: {self.origin}: unit {error}") from error
-                value = float(value) * gain + offset
+                if (gain, offset) != (1.0, 0.0):
+                    value = float(value) * gain + offset
             own = None
             value = self._transformed(value, transformation)
         if self.kind == "item":
@@ -73,19 +76,25 @@ class Value:
 
     def _transformed(self, value: Scalar, transformation: Transformation) -> Scalar:
         if transformation.kind == "linear":
-            if isinstance(value, float):
-                return transformation.factor * value + transformation.offset
-            return value
+            plain = (transformation.factor, transformation.offset) == (1.0, 0.0)
+            if plain or isinstance(value, (bool, str)):
+                return value
+            return transformation.factor * value + transformation.offset
         entries = transformation.entries or {}
         if transformation.kind == "enumeration":
             return entries.get(str(value), str(value))
         boolean = transformation.kind == "boolean"
-        parse = _boolean if boolean else float
+        parse = _boolean if boolean else _number
         try:
             table = {parse(source): parse(target) for source, target in entries.items()}
         except ValueError as error:
             raise self.file.error(f"{self.origin}: mapping: {error}") from None
-        return table.get(value, value) if isinstance(value, (bool, float)) else value
+        return table.get(value, value) if isinstance(value, (bool, int, float)) else value
+
+
+def _number(text: str) -> int | float:
+    """A number; a whole one with all its digits."""
+    return int(text) if re.fullmatch(r"\s*[+-]?\d{1,20}\s*", text, flags=re.ASCII) else float(text)
 
 
 def _boolean(text: str) -> bool:
@@ -149,6 +158,7 @@ def _mapped(
             raise file.error(f"parameter mapping of {what} has neither source nor entries")
         root = found
     by_name = dict(values)
+    sources = {entry.get("source", "") for entry in root.iterfind("ssm:MappingEntry", NAMES)}
     result = []
     targets: set[str] = set()
     for entry in root.iterfind("ssm:MappingEntry", NAMES):
@@ -157,6 +167,11 @@ def _mapped(
             raise file.error(f"parameter mapping of {what} maps two parameters to {target!r}")
         targets.add(target)
         if name not in by_name:
+            if near := get_close_matches(name, set(by_name) - sources, n=1):
+                raise file.error(
+                    f"parameter mapping of {what} names {name!r}, which the parameter set does not "
+                    f"have; did you mean {near[0]!r}?"
+                )
             continue
         suppressed = entry.get("suppressUnitConversion", "false") in ("true", "1")
         transformation = read_transformation(entry, file, f"mapping of {name!r}")
@@ -188,7 +203,8 @@ def _read_value(inner: ET.Element, units: Mapping[str, Unit], origin: str, file:
         unit = units[name]
     try:
         if type_ in REALS or type_ in INTEGERS:
-            numbers = tuple(float(item) for item in (text or "").split())
+            parse = _number if type_ in INTEGERS else float
+            numbers = tuple(parse(item) for item in (text or "").split())
             if not numbers:
                 raise ValueError("has no value")
             return Value(numbers, "number", unit, origin, file)

@@ -14,6 +14,7 @@ from typing import Any
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import places
+from ..schema import shown
 
 KEYS = {
     "description", "scenario", "runs", "duration", "period", "algorithm", "step", "repeats",
@@ -23,6 +24,8 @@ REFERENCE_KEYS = {"set", "param", "algorithm", "step"}
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 METHODS = ("latin_hypercube", "random")
 FINEST = "finest"
+MOST = 1_000_000
+"""Values, repeats and samples of a study: at a millisecond each, a quarter of an hour."""
 
 
 @dataclass(frozen=True)
@@ -179,8 +182,12 @@ class _Reader:
     def number(self, what: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.fail(f"{what} must be a number, not {value!r}")
-        if not math.isfinite(value):
-            raise self.fail(f"{what} = {value} must be finite")
+        try:
+            finite = math.isfinite(value)
+        except OverflowError:  # a whole number beyond floating point
+            finite = False
+        if not finite:
+            raise self.fail(f"{what} = {shown(value)} must be finite")
         return float(value)
 
     def positive(self, what: str, value: Any) -> float:
@@ -189,9 +196,11 @@ class _Reader:
             raise self.fail(f"{what} = {number:g} must be positive")
         return number
 
-    def count(self, what: str, value: Any, least: int) -> int:
+    def count(self, what: str, value: Any, least: int, most: int = MOST) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise self.fail(f"{what} must be a whole number from {least} on, not {value!r}")
+        if value > most:
+            raise self.fail(f"{what} = {shown(value)} is more than the most, {most}")
         return value
 
     def texts(self, what: str, value: Any) -> tuple[str, ...]:
@@ -213,8 +222,9 @@ class _Reader:
         reuse = table.get("reuse", True)
         if not isinstance(reuse, bool):
             raise self.fail(f"reuse must be true or false, not {reuse!r}")
-        self.only(table.get("set", {}), set(table.get("set", {})), "[set]")
-        self.only(table.get("param", {}), set(table.get("param", {})), "[param]")
+        for key in ("set", "param"):
+            if not isinstance(table.get(key, {}), Mapping):
+                raise self.fail(f"[{key}] must be a table, not {table[key]!r}")
         parameters = {
             key: self.values(f"[param] {key}", value)
             for key, value in self.flat(table.get("param", {})).items()
@@ -316,6 +326,8 @@ class _Reader:
         if scale == "log":
             first = self.positive(f"{what}: from", first)
             last = self.positive(f"{what}: to", last)
+            if not 0.0 < last / first < math.inf:
+                raise self.fail(f"{what} goes from {first:g} to {last:g}, too far for one range")
             inner = [first * (last / first) ** (i / (count - 1)) for i in range(1, count - 1)]
         elif scale == "linear":
             inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
@@ -333,7 +345,7 @@ class _Reader:
         return Sample(
             self.count("[sample] count", table["count"], 1),
             method,
-            self.count("[sample] seed", table.get("seed", 0), 0),
+            self.count("[sample] seed", table.get("seed", 0), 0, 2**63 - 1),
         )
 
     def algorithms(self, value: Any) -> tuple[Algorithm, ...]:
@@ -356,7 +368,7 @@ class _Reader:
 
     def several_steps(self) -> None:
         steps = self.table.get("step")
-        if not isinstance(steps, list) or len(set(steps)) < 2:
+        if not isinstance(steps, list) or len(set(map(repr, steps))) < 2:
             raise self.fail('reference "finest" needs a list of at least two steps in step')
 
     def reference(self, value: Any) -> ReferenceRun:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from ..errors import ScenarioError
 from ..files import flatten, read_toml
+from ..schema import Check, anything, keyed, list_of, table, text
 from .provider import Provider
 from .system import System
 
@@ -67,6 +68,12 @@ class SystemFile:
         return system
 
 
+_KINDS: dict[str, Check] = {
+    "name": text, "description": text, "instances": anything, "connections": list_of(anything),
+    "parameters": table,
+}  # fmt: skip
+
+
 def read_system(path: Path | str) -> SystemFile:
     """Read a system from TOML (docs/scenarios.md has the schema).
 
@@ -74,14 +81,15 @@ def read_system(path: Path | str) -> SystemFile:
         ScenarioError: not TOML, or a wrong key or value.
     """
     path = Path(path)
-    table = read_toml(path)
-    unknown = set(table) - {"name", "description", "instances", "connections", "parameters"}
+    content = read_toml(path)
+    unknown = set(content) - {"name", "description", "instances", "connections", "parameters"}
     if unknown:
         raise ScenarioError(
             f"{path}: unknown key {', '.join(sorted(unknown))}; a system has name, description, "
             "instances, connections and parameters"
         )
-    instances = table.get("instances", {})
+    keyed(_KINDS)(content, str(path))
+    instances = content.get("instances", {})
     if not isinstance(instances, dict) or not instances:
         raise ScenarioError(f'{path}: [instances] with name = "variant" is missing')
     for name, reference in instances.items():
@@ -92,11 +100,11 @@ def read_system(path: Path | str) -> SystemFile:
             )
     return SystemFile(
         path,
-        table.get("name", path.stem),
-        table.get("description", ""),
+        content.get("name", path.stem),
+        content.get("description", ""),
         dict(instances),
-        flatten(table.get("parameters", {})),
-        tuple(_arrow(path, line) for line in table.get("connections", [])),
+        flatten(content.get("parameters", {})),
+        tuple(_arrow(path, line) for line in content.get("connections", [])),
     )
 
 

@@ -85,6 +85,17 @@ def test_fmus_check_finds_problems(command: Command, tmp_path: Path) -> None:
     done = command("fmus", "check", bad, broken)
     assert done.code == 1 and "2 of 2 FMUs have problems" in done.err
     assert "has no unit" in done.out and "is not a complete FMU archive" in done.out
+    done = command("fmus", "check", bad, "--json")
+    content = json.loads(done.out)
+    (finding,) = [item for item in content["problems"][str(bad)] if item["variable"] == "tau_a"]
+    with zipfile.ZipFile(bad) as archive:
+        lines = archive.read("modelDescription.xml").decode().splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if 'name="tau_a"' in text)
+    assert finding == {
+        "severity": "error", "file": "modelDescription.xml", "line": line, "variable": "tau_a",
+        "problem": "has no unit", "way_out": "build it again with 'cosim fmus build'",
+    }  # fmt: skip
+    assert (content["checked"], content["with_problems"]) == (1, 1)
 
 
 def test_scenarios_json(command: Command) -> None:
@@ -204,8 +215,8 @@ description = "x"
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("nan", "constant input nan is not finite"),
-        ("{ times = [0.0, 0.1], values = [1.0, nan] }", "not finite, the first (nan) at t = 0.1 s"),
+        ("nan", "inputs gearbox.tau_a must be a value, a list of values or a table, not nan"),
+        ("{ times = [0.0, 0.1], values = [1.0, nan] }", "values, entry 2, must be a number,"),
         ('{ constant = 1.0, unit = "A" }', "unit 'A' (SI A) does not convert into 'N.m'"),
     ],
 )  # fmt: skip

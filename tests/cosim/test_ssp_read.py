@@ -206,11 +206,54 @@ def test_outer_bindings_win_over_inner_and_later_over_earlier(make) -> None:
         .removeprefix("<ssd:ParameterBindings>").removesuffix("</ssd:ParameterBindings>")
         + '<ssd:ParameterBinding source="resources/late.ssv"/></ssd:ParameterBindings>'
     )  # fmt: skip
-    root = system(component("c", A, two), inner=binding(ssv(real("c.u", 3.0), real("c.z", 9.0))))
+    root = system(component("c", A, two), inner=binding(ssv(real("c.u", 3.0))))
     files = {"resources/late.ssv": ssv(real("b", 2.0), real("u", 2.0))}
     found = ssp.read_package(make(ssd(root), files))
     assert found.system.parameters == {"c.a": 1.0, "c.b": 2.0, "c.u": 3.0}
-    assert found.ignored == ("c.z",)
+    assert found.ignored == ()
+
+
+def test_a_set_for_several_elements_may_match_in_some(make) -> None:
+    shared = (
+        '<ssd:ParameterBindings><ssd:ParameterBinding source="resources/p.ssv"/>'
+        "</ssd:ParameterBindings>"
+    )
+    root = system(component("c", A, shared) + component("g", GEAR, shared))
+    files = {"resources/p.ssv": ssv(real("a", 2.0), real("eta", 0.5)), GEAR: fmu("gearbox/ratio")}
+    found = ssp.read_package(make(ssd(root), files))
+    assert found.system.parameters == {"c.a": 2.0, "g.eta": 0.5}
+    assert set(found.ignored) == {"c.eta", "g.a"}
+
+
+@pytest.mark.parametrize(
+    ("value", "given"), [("2", 2.0), ("-7", -7.0), ("9007199254740992", 9007199254740992.0)]
+)
+def test_whole_numbers_map_to_floating_point_exactly(make, value: str, given: float) -> None:
+    one = f'<ssv:Parameter name="a"><ssv:Integer value="{value}"/></ssv:Parameter>'
+    found = ssp.read_package(make(ssd(system(component("c", A, binding(ssv(one)))))))
+    number = found.system.parameters["c.a"]
+    assert number == given and isinstance(number, float)
+
+
+def test_whole_numbers_without_a_floating_point_number(make) -> None:
+    one = '<ssv:Parameter name="a"><ssv:Int64 value="9007199254740993"/></ssv:Parameter>'
+    with pytest.raises(ScenarioError, match=r"'a' = 9007199254740993 has no exact .* c\.a takes"):
+        ssp.read_package(make(ssd(system(component("c", A, binding(ssv(one)))))))
+
+
+def test_a_parameter_that_matches_nothing(make) -> None:
+    alone = system(component("c", A, binding(ssv(real("aa", 1.0)))))
+    with pytest.raises(ScenarioError, match=r"'aa' matches nothing in c, .* did you mean 'a'"):
+        ssp.read_package(make(ssd(alone)))
+    outside = system(component("c", A), inner=binding(ssv(real("c.aa", 1.0))))
+    with pytest.raises(
+        ScenarioError, match=r"'c.aa' matches nothing in the root system.* did you mean 'c.a'"
+    ):
+        ssp.read_package(make(ssd(outside)))
+    mapping = ssm('<ssm:MappingEntry source="gainn" target="a"/>')
+    mapped = system(component("c", A, binding(ssv(real("gain", 1.0)), mapping)))
+    with pytest.raises(ScenarioError, match=r"mapping of c names 'gainn', .* did you mean 'gain'"):
+        ssp.read_package(make(ssd(mapped)))
 
 
 def test_mapping_names_scales_and_leaves_out(make) -> None:
