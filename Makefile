@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test quick check fmus docs bench wheel clean
+.PHONY: demo test quick check fmus docs fuzz bench wheel clean
 
 demo: $(STAMP)
 	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
@@ -28,6 +28,9 @@ fmus: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
+
+fuzz: $(STAMP)
+	$(BIN)/python -m tests.fuzz --seconds 3600
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.fmu_step

@@ -23,7 +23,8 @@ Every text names both ends, both values and the time where there are such, and t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
 
@@ -131,6 +132,17 @@ class CheckError(CosimError):
 
 class StudyError(CosimError):
     """A study ran, but runs of it failed."""
+
+
+@contextmanager
+def within(where: str) -> Iterator[None]:
+    """Errors about what a file says, with the file before them unless they name it themselves."""
+    try:
+        yield
+    except InputError as error:
+        if where in str(error):
+            raise
+        raise type(error)(f"{where}: {error}") from error
 
 
 def listing(names: Iterable[str], wanted: str = "", limit: int = 12) -> str:

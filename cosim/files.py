@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, ScenarioError
-from .limits import TEXT
-from .schema import DEPTH, depth_of
+from .reading.limits import TEXT
+from .reading.schema import DEPTH, depth_of
 
 
 @contextlib.contextmanager

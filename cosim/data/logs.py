@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import is_file, read_toml
-from ..limits import DATA
+from ..reading.limits import DATA
 from .matlab import read_matlab
 from .npz import read_npz
 from .parquet import read_table
@@ -211,7 +211,8 @@ class DataSet:
         if run not in self.runs:
             raise UnknownNameError(f"data set {self.name}: {listing(self.runs, run)} as run")
         entry = self.runs[run]
-        log = read_log(entry.file, units=self.units)
+        with within(f"{self.folder / 'set.toml'}: run {run}"):
+            log = read_log(entry.file, units=self.units)
         return Log(f"{self.name}/{run}", log.columns, log.units, self.noise, entry.values)
 
 

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import archives
 from ..errors import ScenarioError
-from ..limits import DATA
+from ..reading import archives
+from ..reading.limits import DATA
 
 _HEADER = 10_128
 """Longest header that numpy reads, with what stands before it."""
@@ -43,8 +43,8 @@ def read_npz(path: Path) -> dict[str, NDArray[Any]]:
             }
     except (archives.ArchiveError, *_DAMAGE) as error:
         raise ScenarioError(
-            f"{path}: is not a whole npz archive of numbers ({error}); write it again with "
-            "numpy.savez"
+            f"{path}: is not a whole npz archive of numbers ({archives.reason(error)}); write it "
+            "again with numpy.savez"
         ) from error
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror or error})") from error

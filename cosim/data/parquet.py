@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ScenarioError
-from ..limits import DATA
+from ..reading.limits import DATA
 
 if TYPE_CHECKING:
     import pyarrow as pa

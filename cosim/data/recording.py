@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 _META = b"cosim"
-_KINDS = ("double", "int64", "uint64", "string", "binary")
+_TYPES = ("double", "int64", "uint64", "string", "binary")
+"""Of columns in Parquet; one of objects without rows has none."""
 
 
 @dataclass(frozen=True)
@@ -220,18 +221,10 @@ def read_recording(path: Path | str) -> Recording:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
     meta = _read_meta(path, metadata[_META])
     names = tuple(name for name in table.column_names if name != "time")
-    columns = []
-    for name in names:
-        column = table[name]
-        kind = str(column.type)
-        if kind not in _KINDS or column.null_count:
-            raise ScenarioError(
-                f"{path}: column {name!r} is of type {kind} with {column.null_count} gaps; a "
-                f"recording has columns of {', '.join(_KINDS)} without gaps: record it again"
-            )
-        columns.append(column.to_numpy())
-    if str(table["time"].type) != "double" or table["time"].null_count:
-        raise ScenarioError(f"{path}: its times are not floating-point numbers; record it again")
+    columns = [_column(path, name, table[name]) for name in names]
+    time = _column(path, "time", table["time"])
+    if time.dtype != np.float64:
+        raise ScenarioError(f"{path}: its times are no floating-point numbers; record it again")
     objects = {
         name: column
         for name, column in zip(names, columns, strict=True)
@@ -241,7 +234,6 @@ def read_recording(path: Path | str) -> Recording:
         np.full(len(column), np.nan) if column.dtype == object else column.astype(np.float64)
         for column in columns
     ]
-    time = table["time"].to_numpy()
     return Recording(
         time=time,
         values=np.column_stack(numbers) if numbers else np.zeros((len(time), 0)),
@@ -253,6 +245,20 @@ def read_recording(path: Path | str) -> Recording:
         objects=objects,
         notes=tuple(meta.get("notes", ())),
     )
+
+
+def _column(path: Path, name: str, column: Any) -> NDArray[Any]:
+    """A column of the types that `write_parquet` writes.
+
+    Raises:
+        ScenarioError: another type, or gaps.
+    """
+    if str(column.type) not in (*_TYPES, *([] if len(column) else ["null"])) or column.null_count:
+        raise ScenarioError(
+            f"{path}: column {name!r} is of type {column.type} with {column.null_count} gaps; a "
+            f"recording has {', '.join(_TYPES)} without gaps: record it again"
+        )
+    return np.asarray(column.to_numpy())
 
 
 def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
@@ -268,9 +274,10 @@ def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
         raise ScenarioError(
             f"{path}: what it says about itself is not JSON ({error}); record it again"
         ) from error
-    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str}
+    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str, "notes": list}
     for key, kind in kinds.items():
-        if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
+        missing: Any = [] if key == "notes" else None  # older recordings have none
+        if not isinstance(meta, dict) or not isinstance(meta.get(key, missing), kind):
             raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
     if not all(isinstance(unit, str) for unit in meta["units"].values()) or not all(
         isinstance(energy, (int, float)) for energy in meta["bond_energy_J"].values()

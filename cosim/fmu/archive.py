@@ -11,13 +11,12 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
-from .. import archives
-from ..archives import DAMAGE, ArchiveError
 from ..errors import FmuFileError, InputError, PlatformError
-from ..limits import TEXT, UNPACKED, VALUES
+from ..reading import archives
+from ..reading.archives import DAMAGE, ArchiveError
+from ..reading.limits import TEXT, UNPACKED, VALUES
 from ..spec.cache import cache_folder
-from .description import Description
-from .model_description import read_description
+from .description import Description, read_description
 
 
 def platform_folders(fmi: Literal[2, 3]) -> tuple[str, ...]:
@@ -114,7 +113,9 @@ def _elf_size(path: Path) -> int:
     return needed
 
 
-def unpacked(path: Path, kind: str, what: str, error: type[InputError]) -> tuple[Path, str]:
+def unpacked(
+    path: Path, kind: str, what: str, error: type[InputError], shown: str = ""
+) -> tuple[Path, str]:
     """Folder with the content of an archive, and the SHA-256 of the archive.
 
     It is unpacked if it is not there yet, or no longer whole.
@@ -124,22 +125,24 @@ def unpacked(path: Path, kind: str, what: str, error: type[InputError]) -> tuple
         kind: folder of the cache.
         what: kind of archive in error texts, `an FMU`.
         error: class of the errors.
+        shown: what their texts call it, its path by default.
 
     Raises:
         InputError: of that class: missing, damaged, too large, or with entries that do harm.
     """
+    shown = shown or str(path)
     try:
         size = path.stat().st_size
         if not path.is_file():
-            raise error(f"{path}: is not {what} archive but a folder or device")
+            raise error(f"{shown}: is not {what} archive but a folder or device")
         if excess := UNPACKED.excess(size):
-            raise error(f"{path}: {excess}")
+            raise error(f"{shown}: {excess}")
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError:
-        raise error(f"{path}: there is no such file") from None
+        raise error(f"{shown}: there is no such file") from None
     except OSError as problem:
-        raise error(f"{path}: cannot be read ({problem.strerror})") from problem
+        raise error(f"{shown}: cannot be read ({problem.strerror})") from problem
     except ValueError as problem:  # a zero byte in the path
         raise error(f"{str(path)!r}: is no path ({problem})") from problem
     folder = cache_folder() / kind / digest[:32]
@@ -148,29 +151,34 @@ def unpacked(path: Path, kind: str, what: str, error: type[InputError]) -> tuple
             if not archives.intact(archives.members(archive), folder):
                 archives.unpack(archive, folder)
     except ArchiveError as problem:
-        raise error(f"{path}: {problem}") from problem
+        raise error(f"{shown}: {problem}") from problem
     except DAMAGE as problem:
         raise error(
-            f"{path}: is not a complete {what.rpartition(' ')[2]} archive ({problem}); "
-            f"it has {size} bytes. Build or fetch it again"
+            f"{shown}: is not a complete {what.rpartition(' ')[2]} archive "
+            f"({archives.reason(problem)}); it has {size} bytes. Build or fetch it again"
         ) from problem
     except OSError as problem:
         raise error(
-            f"{path}: cannot be unpacked into {folder.parent} ({problem}); "
+            f"{shown}: cannot be unpacked into {folder.parent} ({problem}); "
             "set COSIM_CACHE to a folder that can be written"
         ) from problem
     return folder, digest
 
 
-def open_fmu(path: Path | str) -> Fmu:
+def open_fmu(path: Path | str, shown: str = "") -> Fmu:
     """Unpack an .fmu into the cache (if it is not there yet) and read its description.
+
+    Args:
+        path: of the .fmu.
+        shown: what error texts call it, its path by default.
 
     Raises:
         FmuFileError: missing, corrupt, truncated, too large, or not an FMU.
     """
     path = Path(path)
-    folder, digest = unpacked(path, "unpacked", "an FMU", FmuFileError)
-    return Fmu(path, digest, folder, _described(folder, str(path), _limits()))
+    shown = shown or str(path)
+    folder, digest = unpacked(path, "unpacked", "an FMU", FmuFileError, shown)
+    return Fmu(path, digest, folder, _described(folder, shown, _limits()))
 
 
 def _limits() -> tuple[int, int]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FmuFileError
-from ..limits import TEXT
+from ..reading.limits import TEXT
 
 ENTRY = "extra/cosim/component.json"
 _TEXTS = ("component", "variant", "fidelity")

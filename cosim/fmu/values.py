@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ValueRangeError, listing
-from .description import INTEGERS, Variable
+from .attributes import INTEGERS
+from .description import Variable
 
 NUMBERS: dict[str, Any] = {
     "Float64": np.float64, "Float32": np.float32, "Int8": np.int8, "UInt8": np.uint8,

@@ -25,8 +25,8 @@ from typing import Any
 
 from ..errors import ScenarioError, listing
 from ..files import is_file
-from ..limits import TEXT
-from ..schema import keyed
+from ..reading.limits import TEXT
+from ..reading.schema import keyed
 from .shape import TABLE
 
 PLACE = re.compile(r"\{(\w+)\}")

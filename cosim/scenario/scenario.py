@@ -17,10 +17,10 @@ import numpy as np
 from ..data.comparison import Reference, circle
 from ..data.logs import Log, read_data_set, read_log
 from ..data.signals import Constant, Signal, SignalVector, Table
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import flatten, read_toml
 from ..installation import places
-from ..limits import DATA
+from ..reading.limits import DATA
 from ..system.toml import SystemFile, read_system
 from .axes import Axes, read_axes
 from .checks import CHECK_KEYS, Check, read_check
@@ -218,6 +218,10 @@ class _Reader:
         return float(value)
 
     def read(self) -> Scenario:
+        with within(self.where):
+            return self.whole()
+
+    def whole(self) -> Scenario:
         table = self.table
         check_inside(table, self.where)
         record = table.get("record", {})

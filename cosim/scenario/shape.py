@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..schema import (
+from ..reading.schema import (
     Check,
     anything,
-    bound,
     either,
     flag,
+    floating,
     keyed,
     list_of,
     number,
-    numbers,
     path,
     said,
     table,
@@ -36,7 +35,7 @@ _VALUES = list_of(
 _SOURCE: dict[str, Check] = {
     "file": path, "data": path, "run": said, "column": said, "columns": list_of(said),
     "time": said, "unit": said, "constant": either("a value or a list of values", _VALUE, _VALUES),
-    "times": numbers, "values": list_of(_VALUE),
+    "times": list_of(floating), "values": list_of(_VALUE),
     "interpolation": text,
 }  # fmt: skip
 _POINT = list_of(number, 2)
@@ -48,12 +47,12 @@ _COMPARED: dict[str, Check] = {
 _CHECK: dict[str, Check] = {
     "name": said, "source": said, "of": text, "signal": text, "signals": texts,
     "comparison": text, "minus": text, "quantity": said, "case": said, "reference": said,
-    "after": bound, "before": bound, "expected": number, "per": number, "relative": flag,
-    "limit": either("a number, or two", bound, list_of(bound, 2)),
+    "after": floating, "before": floating, "expected": number, "per": number, "relative": flag,
+    "limit": either("a number, or two", floating, list_of(floating, 2)),
 }  # fmt: skip
 _AXES: dict[str, Check] = {
     "label": said, "signals": texts, "paths": list_of(list_of(text, 2)), "comparisons": texts,
-    "names": list_of(said), "unit": said, "minus": text, "after": bound, "before": bound,
+    "names": list_of(said), "unit": said, "minus": text, "after": floating, "before": floating,
 }  # fmt: skip
 INSIDE: dict[str, Check] = {
     "description": said, "question": said, "expected": said, "source": said, "system": path,

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from .. import markup
 from ..errors import ScenarioError
 from ..files import is_file
 from ..fmu import archive
-from ..fmu.model_description import read_units
+from ..fmu.attributes import read_units
+from ..reading import markup
 from ..spec.units import Unit
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"

@@ -82,7 +82,7 @@ class Net:
             else:
                 assert isinstance(child.source, File)
                 self.components[place] = child
-                self.fmus[place] = open_fmu(child.source.path)
+                self.fmus[place] = open_fmu(child.source.path, child.source.shown)
                 for connector in child.connectors.values():
                     for index in range(self.variable(place, connector.name).size):
                         self._units[place, connector.name, index] = connector.unit

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import markup
 from ..data.signals import Signal
 from ..errors import listing
 from ..fmu.archive import Fmu
+from ..reading import markup
 from ..system.system import System
 from ..system.toml import DeclaredConnection, SystemFile
 from . import flatten
@@ -137,6 +137,7 @@ class _Flat:
             },
             parameters=self.parameters(),
             connections=tuple(wires),
+            shown=self.file.shown,
         )
         return Package(
             system, experiment, inputs, outputs, signals, tuple(self.ignored),

@@ -168,15 +168,18 @@ def _mapped(
         targets.add(target)
         if name not in by_name:
             if near := get_close_matches(name, set(by_name) - sources, n=1):
+                given = by_name[near[0]].file.name
                 raise file.error(
-                    f"parameter mapping of {what} names {name!r}, which the parameter set does not "
-                    f"have; did you mean {near[0]!r}?"
+                    f"parameter mapping of {what} names {name!r}, which {given} does not have; "
+                    f"did you mean {near[0]!r}?"
                 )
             continue
         suppressed = entry.get("suppressUnitConversion", "false") in ("true", "1")
         transformation = read_transformation(entry, file, f"mapping of {name!r}")
         value = by_name[name]
-        result.append((target, replace(value, steps=((transformation, suppressed),))))
+        origin = f"{value.origin}, mapped to {target!r} by {file.name},"
+        steps = ((transformation, suppressed),)
+        result.append((target, replace(value, steps=steps, origin=origin)))
     return result
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import places
-from ..schema import shown
+from ..reading.schema import shown
 
 KEYS = {
     "description", "scenario", "runs", "duration", "period", "algorithm", "step", "repeats",

@@ -67,7 +67,7 @@ class Store:
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror})") from error
         problem, result = _check(key, content)
-        if not problem and result["channels"] is not None:
+        if not problem and result.get("channels") is not None:
             recording = self.channels(key)
             if not recording.is_file():
                 problem = f"its recording {recording.name} is missing"
@@ -109,7 +109,7 @@ def _check(key: str, content: bytes) -> tuple[str, dict[str, Any]]:
     """What is wrong with a result file ("" for nothing), and the result."""
     try:
         whole = json.loads(content)
-    except ValueError:
+    except (ValueError, RecursionError):
         return f"not JSON, or cut off after {len(content)} bytes", {}
     if not isinstance(whole, dict) or whole.get("format") != NAME:
         return "not a result of a study", {}
@@ -119,6 +119,9 @@ def _check(key: str, content: bytes) -> tuple[str, dict[str, Any]]:
         return "its content does not fit its checksum", {}
     if result.get("key") != key:
         return f"it is the result of run {result.get('key')}", {}
+    kept = result.get("channels")
+    if kept is not None and not (isinstance(kept, dict) and isinstance(kept.get("sha256"), str)):
+        return "what it says about its recording is no checksum", {}
     return "", result
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..errors import ScenarioError
+from ..errors import ScenarioError, within
 from ..files import flatten, read_toml
-from ..schema import Check, anything, keyed, list_of, table, text
+from ..reading.schema import Check, anything, keyed, list_of, table, text
 from .provider import Provider
 from .system import System
 
@@ -34,6 +34,7 @@ class SystemFile:
         instances: name -> variant or path of an .fmu.
         parameters: full name -> value.
         connections: between instances.
+        shown: what error texts call it, its path by default.
     """
 
     path: Path
@@ -42,6 +43,7 @@ class SystemFile:
     instances: dict[str, str]
     parameters: dict[str, Any]
     connections: tuple[DeclaredConnection, ...]
+    shown: str = ""
 
     def build(
         self, provider: Provider | None, parameters: Mapping[str, Any] | None = None
@@ -53,17 +55,22 @@ class SystemFile:
             parameters: full name -> value; replace those of the file.
         """
         system = System(self.name, provider, self.text)
-        for name, reference in self.instances.items():
-            system.add(name, reference, base=self.path.parent)
-        for wire in self.connections:
-            system.connect(
-                wire.source,
-                wire.target,
-                factor=wire.factor,
-                offset=wire.offset,
-                convert=wire.convert,
-            )
-        for name, value in {**self.parameters, **(parameters or {})}.items():
+        given = parameters or {}
+        with within(self.shown or str(self.path)):
+            for name, reference in self.instances.items():
+                system.add(name, reference, base=self.path.parent)
+            for wire in self.connections:
+                system.connect(
+                    wire.source,
+                    wire.target,
+                    factor=wire.factor,
+                    offset=wire.offset,
+                    convert=wire.convert,
+                )
+            for name, value in self.parameters.items():
+                if name not in given:
+                    system.set(name, value)
+        for name, value in given.items():
             system.set(name, value)
         return system
 

@@ -218,9 +218,15 @@ def test_a_recording_that_says_other_things(recording: Path, meta: object, messa
 
 
 def test_a_recording_with_other_columns(recording: Path) -> None:
-    _with(recording, word=pa.array([True] * TIME.size))
+    _with(recording, on=pa.array([True] * TIME.size))
     text = refused(read_recording, recording)
-    assert "column 'word' is of type bool with 0 gaps; a recording has columns of double" in text
+    assert "column 'on' is of type bool with 0 gaps; a recording has double, int64, " in text
+
+
+def test_a_recording_with_gaps(recording: Path) -> None:
+    _with(recording, gap=pa.array([None] * TIME.size, pa.float64()))
+    text = refused(read_recording, recording)
+    assert "column 'gap' is of type double with 11 gaps" in text and "record it again" in text
 
 
 def test_parquet_columns_of_one_name(tmp_path: Path) -> None:

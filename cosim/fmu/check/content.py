@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
-from ... import archives
+from ...reading import archives
 from .finding import DESCRIPTION, Findings
 from .model import Model
 

@@ -6,7 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 
-from ..model_description import FMI3_TYPES
+from ..description import FMI3_TYPES
 from .finding import Findings
 from .model import RANGES, Model
 from .variables import value_of

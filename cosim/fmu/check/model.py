@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from ...markup import Markup
-from ..model_description import FMI2_TYPES, FMI3_TYPES
+from ...reading.markup import Markup
+from ..description import FMI2_TYPES, FMI3_TYPES
 
 FLOATS = ("Real", "Float64", "Float32")
 RANGES = {

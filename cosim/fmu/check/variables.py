@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from ...limits import VALUES
+from ...reading.limits import VALUES
 from .finding import Findings
 from .model import FLOATS, RANGES, Declared, Model
 

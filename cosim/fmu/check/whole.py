@@ -13,11 +13,11 @@ import zipfile
 from pathlib import Path
 from typing import Literal
 
-from ... import archives, markup
 from ...errors import FmuFileError
-from ...limits import TEXT, UNPACKED
+from ...reading import archives, markup
+from ...reading.limits import TEXT, UNPACKED
+from ..description import parse_description
 from ..metadata import ENTRY, parse_metadata
-from ..model_description import parse_description
 from .content import check_binaries, check_entries, check_folders, check_sources
 from .definitions import check_definitions
 from .finding import DESCRIPTION, Finding, Findings
@@ -50,7 +50,9 @@ def check(path: Path) -> list[Finding]:
         about.error(str(error), _AGAIN)
     except archives.DAMAGE as error:
         size = path.stat().st_size
-        about.error(f"is not a complete FMU archive ({error}) of {size} bytes", _AGAIN)
+        about.error(
+            f"is not a complete FMU archive ({archives.reason(error)}) of {size} bytes", _AGAIN
+        )
     except OSError as error:
         about.error(f"cannot be read ({error.strerror})", _AGAIN)
     found = list(dict.fromkeys([*about.found, *found]))
@@ -70,7 +72,7 @@ def _content(archive: zipfile.ZipFile, about: Findings) -> list[Finding]:
                 while file.read(1 << 20):  # to the end, where the checksum is
                     pass
             except (*archives.DAMAGE, OSError) as error:
-                about.error(f"its entry {name!r} is damaged ({error})", _AGAIN)
+                about.error(f"its entry {name!r} is damaged ({archives.reason(error)})", _AGAIN)
                 return []
     check_folders(entries, about)
     if DESCRIPTION not in entries:

@@ -28,8 +28,16 @@ _TAIL = 65557 + 76
 """Bytes from the end within which the directory's record is, with that of large archives."""
 _ENTRY = 512
 """Bytes of a directory entry whose name and remarks are long."""
+_LONGEST = 120
+"""Characters of an error text."""
 _NAME = 255
 """Bytes that file systems allow for one name."""
+
+
+def reason(error: Exception) -> str:
+    """What an error of zipfile says, without the bytes of the file that it may show."""
+    text = str(error) or type(error).__name__
+    return text if len(text) <= _LONGEST else text[:_LONGEST] + " …"
 
 
 class ArchiveError(Exception):

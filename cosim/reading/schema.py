@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from .errors import ScenarioError
+from ..errors import ScenarioError
 
 Check = Callable[[Any, str], None]
 """Takes a value and its place for the error text; raises ScenarioError."""
@@ -55,9 +55,9 @@ def number(value: Any, where: str) -> None:
         raise fail(where, value, "a finite number")
 
 
-def bound(value: Any, where: str) -> None:
-    """A number, or infinity."""
-    if value not in (math.inf, -math.inf):
+def floating(value: Any, where: str) -> None:
+    """A number, infinity or not a number (a gap)."""
+    if not isinstance(value, float):
         number(value, where)
 
 
@@ -128,9 +128,8 @@ def keyed(checks: Mapping[str, Check]) -> Check:
 
 said = either("a text or a number", text, number)
 """What may also be a number where a row of a table gave it."""
-numbers = list_of(number)
 texts = list_of(text)
-"""Lists of one kind."""
+"""A list of texts."""
 
 
 def depth_of(value: Any) -> int:

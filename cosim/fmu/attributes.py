@@ -1,0 +1,93 @@
+"""What attributes of FMI's elements mean: numbers, start values, units, types."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping
+
+from ..spec.units import BASE, Unit
+
+Start = float | bool | str | bytes | None
+INTEGERS = (
+    "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration",
+    "Enumeration2",
+)  # fmt: skip
+
+
+def number_of(element: ET.Element, key: str) -> float | None:
+    """A floating-point attribute, None where it is not given."""
+    text = element.get(key)
+    return None if text is None else float(text)
+
+
+def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str, Unit]:
+    """Units by name, from elements `Unit` of FMI (or of SSP, which has them in a namespace)."""
+    units = {}
+    for element in elements:
+        base = element.find(f"{namespace}BaseUnit")
+        name = element.get("name", "")
+        if base is not None:
+            factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+            if not (math.isfinite(factor) and factor and math.isfinite(offset)):
+                raise ValueError(f"unit {name!r} has factor {factor} and offset {offset}")
+            exponents = tuple(int(base.get(key, "0")) for key in BASE)
+            units[name] = Unit(name, exponents, factor, offset)
+    return units
+
+
+def start_of(text: str | None, type_: str) -> tuple[Start, ...]:
+    """Start values as one attribute has them, () where it is not given."""
+    if text is None:
+        return ()
+    if type_ == "String":
+        return (text,)
+    if type_ == "Binary":
+        return (bytes.fromhex(text),)
+    items = text.split()
+    if type_.startswith("Boolean"):
+        return tuple(item in ("true", "1") for item in items)
+    if type_ in INTEGERS:
+        return tuple(int(item) for item in items)
+    return tuple(float(item) for item in items)
+
+
+class Types:
+    """Attributes that a variable inherits from the type it declares."""
+
+    def __init__(self, elements: Iterable[ET.Element]) -> None:
+        self._types = dict(_named(elements))
+
+    def get(self, element: ET.Element, key: str) -> str | None:
+        """An attribute, the element's own or that of its type."""
+        value = element.get(key)
+        if value is None:
+            declared = self._types.get(element.get("declaredType", ""))
+            value = declared.get(key) if declared is not None else None
+        return value
+
+    def number(self, element: ET.Element, key: str) -> float | None:
+        """The same of a floating-point attribute."""
+        text = self.get(element, key)
+        return None if text is None else float(text)
+
+    def items(self, element: ET.Element) -> dict[int, str]:
+        """Names of the values of an enumeration; FMI 2 counts from 1 where it does not say."""
+        declared = self._types.get(element.get("declaredType", ""))
+        found = [] if declared is None else declared.findall("Item")
+        return {
+            int(item.get("value", index)): item.get("name", "")
+            for index, item in enumerate(found, start=1)
+        }
+
+
+def _named(elements: Iterable[ET.Element]) -> Iterator[tuple[str, ET.Element]]:
+    """Pairs of the attribute `name` and the element that carries the other attributes."""
+    for element in elements:
+        inner = element[0] if element.tag == "SimpleType" and len(element) else element
+        yield element.get("name", ""), inner
+
+
+def unit_of(name: str | None, units: Mapping[str, Unit]) -> Unit | None:
+    """The unit of a name, None where there is none."""
+    return units.get(name) if name else None

@@ -1,0 +1,1 @@
+"""Reading what anybody made: limits on sizes, zip archives, XML, kinds of values."""
