@@ -82,7 +82,7 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         point[: theta.size] = theta
         point[real.index(strengths[0].name)] = size
         for p in real.parameters:
-            if p.mix == "turn":
+            if p.hints.mix == "turn":
                 point[real.index(p.name)] = random.uniform(-np.pi, np.pi)
         values = {run.name: real.simulate(point, run) for run in real.runs}
         real.close()

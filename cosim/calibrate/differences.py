@@ -209,7 +209,7 @@ def _sides(
 ) -> tuple[float, float]:
     """The two changes between which a difference is taken; 0 is the point itself."""
     parameter, value = problem.parameters[index], float(theta[index])
-    change = max(relative * parameter.scale, parameter.lattice)
+    change = max(relative * parameter.scale, parameter.hints.lattice)
     above, below = parameter.maximum - value, value - parameter.minimum
     if central and above >= change and below >= change:
         return -change, change

@@ -131,7 +131,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         scaled = profiled(run, normal, scaled, vectors[:, doubtful])
     covariance = scaled * np.outer(scale, scale)
     # any value between two of a lattice may do as well
-    covariance += np.diag([p.lattice**2 / 12.0 for p in problem.parameters])
+    covariance += np.diag([p.hints.lattice**2 / 12.0 for p in problem.parameters])
     variances, directions = np.linalg.eigh(scaled)
     combinations = tuple(
         Combination(

@@ -28,6 +28,7 @@ from ..data.segments import relative_pose
 from ..errors import FmuCallError, UnknownNameError, listing
 from ..master.master import Master
 from ..master.session import Session
+from ..spec.hints import NO_HINTS, from_json
 from ..system.provider import Provider
 from ..system.system import System
 from ..system.toml import SystemFile
@@ -438,10 +439,7 @@ class Problem:
             before = old.members[name].description.variables
             strengths = set(member.description.extra.get("strengths", ()))
             stated = {n for run in self.runs for n in run.starts}
-            mixes, tries, lattices, visits = (
-                member.description.extra.get(hints, {})
-                for hints in ("mixes", "tries", "lattices", "visits")
-            )
+            hints = from_json(member.description.extra)
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
@@ -450,20 +448,12 @@ class Problem:
                     and full not in changed.constants
                     and full not in stated
                 ):
-                    parameter = free_parameter(
-                        variable, full, full, strength=variable.name in strengths
-                    )
                     added.append(
-                        replace(
-                            parameter,
-                            mix=mixes.get(variable.name, ""),
-                            tries=tuple(map(float, tries.get(variable.name, ()))),
-                            lattice=lattices.get(variable.name, 0.0),
-                            visits=f"{name}.{place}"
-                            if (place := visits.get(variable.name))
-                            else "",
+                        free_parameter(
+                            variable, full, full, strength=variable.name in strengths,
+                            hints=hints.get(variable.name, NO_HINTS).within(name),
                         )
-                    )
+                    )  # fmt: skip
         return changed._with(parameters=[*self.parameters, *added])
 
     def close(self) -> None:

@@ -32,7 +32,7 @@ Say = Callable[[str], None]
 ITERATIONS = 6
 """Steps of a quick fit at most."""
 USUAL = 2.1
-"""Usual values of a strength (see `Parameter.tries`) by a larger factor away from what its first
+"""Usual values of a strength (see `SearchHints.tries`) by a larger factor away from what its first
 order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
@@ -182,7 +182,7 @@ class Fitter(Judge):
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
-        near = [v for v in item.strength.tries if 1.0 / USUAL < v / value < USUAL]
+        near = [v for v in item.strength.hints.tries if 1.0 / USUAL < v / value < USUAL]
         if abs(item.score.amplitude - 1.0) > EXACT:
             near.append(item.value)  # what was simulated: a steep law goes too far from there
         for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
@@ -342,20 +342,22 @@ class Fitter(Judge):
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.
 
-        See `Parameter.lattice`: steps that come a sample too late cost much, whatever the fraction
-        of a sample, so derivatives do not lead to the right one; and others may do as well.
+        See `SearchHints.lattice`: steps that come a sample too late cost much, whatever the
+        fraction of a sample, so derivatives do not lead to the right one; and others may do as
+        well.
         """
         prefix = winner.effects[-1].prefix
         for p in winner.problem.parameters:
-            if not (p.lattice and p.name.startswith(prefix)):
+            lattice = p.hints.lattice
+            if not (lattice and p.name.startswith(prefix)):
                 continue
             place = winner.problem.index(p.name)
-            nearest = math.floor(winner.estimate.theta[place] / p.lattice)
+            nearest = math.floor(winner.estimate.theta[place] / lattice)
             best, known = winner, {0}
             while fresh := sorted({nearest, nearest + 1, nearest - (best is not winner)} - known):
                 known |= set(fresh)
                 for count in fresh:
-                    value = count * p.lattice
+                    value = count * lattice
                     if not p.minimum <= value <= p.maximum:
                         continue
                     found = self._held(winner, p.name, value)
@@ -363,10 +365,10 @@ class Fitter(Judge):
                     if found is not None and self.gain(best, found) > least:
                         best, nearest = found, count
             if best is not winner:
-                self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * p.lattice:g} {p.unit}")
+                self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * lattice:g} {p.unit}")
                 theta = winner.estimate.theta.copy()
                 theta[np.arange(theta.size) != place] = best.estimate.theta
-                theta[place] = nearest * p.lattice
+                theta[place] = nearest * lattice
                 whole = replace(winner, estimate=replace(winner.estimate, theta=theta))
                 found = self.sharpened(whole, base)
                 winner = found if self.gain(winner, found) > -GATE else winner

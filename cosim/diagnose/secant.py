@@ -123,7 +123,7 @@ class Bench:
 
         Args:
             candidates: which; those that cannot be simulated are left out.
-            thorough: try other values of parameters that ask for it (see `Parameter.tries`).
+            thorough: try other values of parameters that ask for it (see `SearchHints.tries`).
         """
 
         def simulated(batch: Batch) -> list[Trials]:
@@ -168,7 +168,7 @@ class Bench:
 
         An oscillation at a frequency that is off by a few periods over the run is as good as none.
         """
-        for value in trials.probe.strength.tries:
+        for value in trials.probe.strength.hints.tries:
             try:
                 values = trials.probe.values(value, trials.second, trials.fixed)
                 found = self._measure(

@@ -39,7 +39,7 @@ class Signature:
         rest: what of it calibration cannot absorb, stretches that are far off counted less.
         score: of `rest` against the residual.
         absorbed: share of the signature's energy that calibration absorbs.
-        second: value of the effect's second parameter (see `Parameter.mix`).
+        second: value of the effect's second parameter (see `SearchHints.mix`).
         fixed: its parameters that have another value than its FMU's.
         twins: candidates with the same signature; fits may still tell them apart.
     """

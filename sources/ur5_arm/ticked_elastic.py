@@ -25,6 +25,8 @@ from dataclasses import replace
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..component import Solver
 from ..model import Model
 from ..quantity import Quantity
@@ -45,7 +47,7 @@ C = Quantity(
     nominal=1e-4,
     size=6,
     strength=True,
-    tries=COMPLIANCES,
+    hints=SearchHints(tries=COMPLIANCES),
 )
 T_D = Quantity(
     "t_d",

@@ -13,6 +13,7 @@ from cosim.diagnose import exchange
 from cosim.diagnose.fitter import Fitter
 from cosim.diagnose.secant import Bench
 from cosim.errors import FmuCallError
+from cosim.spec.hints import SearchHints
 
 
 def search(best: float, place: int = 0) -> Any:
@@ -58,7 +59,7 @@ def test_of_usual_strengths_the_best_is_kept_though_none_leads_there() -> None:
         return 0.0
 
     probe = SimpleNamespace(
-        strength=SimpleNamespace(tries=(1.0, 2.0, 4.0, 8.0)), problem=None,
+        strength=SimpleNamespace(hints=SearchHints(tries=(1.0, 2.0, 4.0, 8.0))), problem=None,
         values=lambda value, *_: {"c": value},
     )  # fmt: skip
     trials: Any = SimpleNamespace(probe=probe, second=0.0, fixed={}, best=None, open=True)
