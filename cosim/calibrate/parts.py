@@ -16,6 +16,8 @@ from ..spec.hints import NO_HINTS, SearchHints
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]
+PURPOSE = "identification"
+"""Of runs that are fitted."""
 COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
@@ -171,7 +173,7 @@ class Sampler:
 
 
 @dataclass(frozen=True)
-class Run:
+class MeasuredRun:
     """A measured run.
 
     Attributes:

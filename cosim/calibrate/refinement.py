@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 
 from ..spec.hints import NO_HINTS, from_json
-from ..system.variants import apply
 from .parts import Parameter, adjustable, free_parameter
 from .problem import Problem
 
@@ -53,9 +52,7 @@ class Refinement:
         Raises:
             VariantError, UnknownNameError: it does not fit.
         """
-        changed = problem._with(
-            instances=apply(problem.instances, {instance: self.fidelity}, problem.provider)
-        )
+        changed = problem.changed(model=problem.model.changed({instance: self.fidelity}))
         description = changed.system().members[instance].description
         variables, hints = description.variables, from_json(description.extra)
         before = problem.system().members[instance].description.variables
@@ -90,7 +87,7 @@ class Refinement:
                 and name not in dict(self.held)
             ):
                 added.append(free_parameter(variable, prefix + _own(name), full, strength=False))
-        return changed._with(
+        return changed.changed(
             parameters=[*problem.parameters, *added], constants={**problem.constants, **constants}
         )
 

@@ -36,13 +36,14 @@ def diagnose_command(
 
     Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
-    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    problem = read_problem(dataset, mapping=mapping, system=system)
     folder = out or Path("out") / problem.name
     folder.mkdir(parents=True, exist_ok=True)
     begun = time.monotonic()
     result = diagnose(
         problem, folder,
         lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
+        workers=workers,
     )  # fmt: skip
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)
