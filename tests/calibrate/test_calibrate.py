@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,12 @@ def test_sensitivity(noisy, truth) -> None:
     estimate = fit(simulator(problem), truth, effort=Effort("near", "intervals"))
     values = local(estimate)
     assert values["Kp_v"] > values["b"] > 0.0
+
+
+def test_a_problem_stays_what_it_is(short) -> None:
+    with pytest.raises(FrozenInstanceError):
+        short.step = 0.5 * short.step
+    with pytest.raises(FrozenInstanceError):
+        short.model.instances = {}
+    finer = short.changed(step=0.5 * short.step)
+    assert finer.step == 0.5 * short.step and finer.model is short.model
