@@ -31,6 +31,8 @@ from .layout import Entry, layout
 
 Kind = description.Kind
 _SOURCES = Path(__file__).parent.parent
+_SPEC = Path(hints.__file__).parent
+"""What an FMU carries besides FMI is written there."""
 _EQUATIONS = threading.Lock()
 """Held while CasADi works: it counts references without locks. Compilers run beside it."""
 
@@ -195,11 +197,12 @@ def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
 def sources_key() -> str:
     """Hash of everything that an FMU is made of: our sources and the versions of the makers."""
     digest = hashlib.sha256()
-    for path in sorted(_SOURCES.rglob("*")):
-        if path.suffix in (".py", ".c", ".toml"):
-            digest.update(
-                path.relative_to(_SOURCES).as_posix().encode() + b"\0" + path.read_bytes()
-            )
+    for folder in (_SOURCES, _SPEC):
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".py", ".c", ".toml"):
+                digest.update(
+                    path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes()
+                )
     for package in ("casadi", "pythonfmu", "ziglang"):
         digest.update(importlib.metadata.version(package).encode())
     return digest.hexdigest()
