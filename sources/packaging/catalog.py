@@ -81,7 +81,7 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
 def _has_place(effect: str) -> bool:
     """Whether an effect sits at a point in the world."""
     values = vars(effects()[effect]).values()
-    return any(isinstance(v, Quantity) and v.visits for v in values)
+    return any(isinstance(v, Quantity) and v.hints.visits for v in values)
 
 
 def refinements(name: str) -> list[dict[str, Any]]:
