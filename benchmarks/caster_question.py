@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from benchmarks.own_plant import individual
 from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.candidates import candidates
 
 Vector = NDArray[np.float64]
@@ -84,15 +85,15 @@ def write(folder: Path, friction: float, scrub: float, seed: int) -> dict[str, f
     theta = problem.nominal
     theta[: len(declared.parameters)] = individual(declared, random)
     theta[problem.index(SWIVEL)], theta[problem.index(FLOOR)] = friction, scrub
+    simulator = Simulator(problem)
     for run in problem.runs:
-        values = problem.simulate(theta, run)
+        values = simulator.simulate(theta, run)
         values += problem.sigma * random.standard_normal(values.shape)
         measured = dict(zip(names, values.T, strict=True))
         pd.DataFrame(tables[run.name] | measured).to_parquet(
             folder / "runs" / f"{run.name}.parquet"
         )
-    problem.close()
-    declared.close()
+    simulator.close()
     truth = {n: float(v) for n, v in zip(problem.names, theta, strict=True) if "@" not in n}
     return {n: v for n, v in truth.items() if n in (SWIVEL, FLOOR) or "base." not in n}
 

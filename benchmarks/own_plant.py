@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.candidates import Candidate, candidates, new_parameters
 
 Vector = NDArray[np.float64]
@@ -40,14 +41,14 @@ class Made:
     change: dict[str, dict[str, Vector]]
 
 
-def example(folder: Path, seconds: float, workers: int) -> Problem:
+def example(folder: Path, seconds: float) -> Problem:
     """The rig of an example data set, with its runs cut after some seconds."""
-    problem = read_problem(folder, workers=workers)
+    problem = read_problem(folder)
     runs = []
     for run in problem.runs:
         kept = run.times <= run.times[0] + seconds
         runs.append(replace(run, times=run.times[kept], data=run.data[kept]))
-    return problem._with(runs=runs)
+    return problem.changed(runs=runs)
 
 
 def individual(problem: Problem, random: np.random.Generator) -> Vector:
@@ -71,7 +72,8 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
     """
     random = np.random.default_rng(seed)
     theta = individual(problem, random)
-    plain = {run.name: problem.simulate(theta, run) for run in problem.runs}
+    simulator = Simulator(problem)
+    plain = {run.name: simulator.simulate(theta, run) for run in problem.runs}
     values, size = plain, 0.0
     if candidate is not None:
         real = candidate.added_to(problem)
@@ -82,15 +84,16 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         point[: theta.size] = theta
         point[real.index(strengths[0].name)] = size
         for p in real.parameters:
-            if p.mix == "turn":
+            if p.hints.mix == "turn":
                 point[real.index(p.name)] = random.uniform(-np.pi, np.pi)
-        values = {run.name: real.simulate(point, run) for run in real.runs}
-        real.close()
+        other = simulator.of(real)
+        values = {run.name: other.simulate(point, run) for run in real.runs}
+        other.close()
     data = {}
     for run in problem.runs:
         noise = problem.sigma * random.standard_normal(run.data.shape)
         data[run.name] = np.where(np.isfinite(run.data), values[run.name] + noise, np.nan)
-    problem.close()
+    simulator.close()
     channels = [c.name for c in problem.channels]
     change = {n: dict(zip(channels, (values[n] - plain[n]).T, strict=True)) for n in plain}
     names = [p.name for p in problem.parameters]

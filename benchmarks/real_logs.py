@@ -35,10 +35,11 @@ from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
 from cosim.calibrate.estimate import Estimate
-from cosim.calibrate.fit import fit
+from cosim.calibrate.fit import Effort, fit
 from cosim.calibrate.mapping import read_problem
-from cosim.calibrate.parts import Run
+from cosim.calibrate.parts import MeasuredRun
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.files import flatten, read_toml
 from sources.function import Oracle
 from sources.variant import build_model
@@ -68,10 +69,10 @@ def model_of(problem: Problem, entry: Mapping[str, Any], known: Mapping[str, flo
     return problem.with_parameters(changed)
 
 
-def errors(problem: Problem, theta: Vector, skip: float) -> list[tuple[str, str, list[float]]]:
+def errors(simulator: Simulator, theta: Vector, skip: float) -> list[tuple[str, str, list[float]]]:
     """(run, channel, [RMS, mean absolute, relative in %]) over all runs."""
-    table = []
-    for name, residual in problem.residuals(theta, None):
+    table, problem = [], simulator.problem
+    for name, residual in simulator.residuals(theta, None):
         run = problem.run(name)
         late = run.times - run.times[0] >= skip
         for column, channel in enumerate(problem.channels):
@@ -86,15 +87,16 @@ def errors(problem: Problem, theta: Vector, skip: float) -> list[tuple[str, str,
     return table
 
 
-def ends(problem: Problem, theta: Vector, entry: Mapping[str, Any]) -> dict[str, Vector]:
+def ends(simulator: Simulator, theta: Vector, entry: Mapping[str, Any]) -> dict[str, Vector]:
     """Error of the position [m] and of the yaw at the end of each run, by log and purpose.
 
     Each row is one run: what the model lacks along x and y, and its yaw error.
     """
+    problem = simulator.problem
     names = [c.name for c in problem.channels]
     place = [names.index(name) for name in (*entry["position"], entry["yaw"])]
     rows: dict[str, list[Vector]] = {}
-    for name, residual in problem.residuals(theta, None):
+    for name, residual in simulator.residuals(theta, None):
         run = problem.run(name)
         error = residual[:, place] * problem.sigma[place]
         last = error[np.flatnonzero(np.isfinite(error).all(axis=1))[-1]]
@@ -104,9 +106,9 @@ def ends(problem: Problem, theta: Vector, entry: Mapping[str, Any]) -> dict[str,
     return {key: np.array(found) for key, found in rows.items()}
 
 
-def print_ends(problem: Problem, theta: Vector, entry: Mapping[str, Any]) -> None:
+def print_ends(simulator: Simulator, theta: Vector, entry: Mapping[str, Any]) -> None:
     """Table of the errors at the ends of the runs."""
-    found = ends(problem, theta, entry)
+    found = ends(simulator, theta, entry)
     for key in sorted(found, key=lambda k: (k.startswith("all"), k)):
         distance = np.hypot(found[key][:, 0], found[key][:, 1])
         yaw = found[key][:, 2]
@@ -121,7 +123,7 @@ def smooth(values: Vector, interval: float, frequency: float) -> Vector:
 
 
 def inverse(
-    problem: Problem, theta: Vector, run: Run, entry: Mapping[str, Any]
+    problem: Problem, theta: Vector, run: MeasuredRun, entry: Mapping[str, Any]
 ) -> list[float] | None:
     """Relative error [%] of the force that the model needs for the motion: as logged, held.
 
@@ -177,9 +179,10 @@ def shown(estimate: Estimate) -> str:
     )
 
 
-def print_errors(problem: Problem, theta: Vector, skip: float) -> None:
+def print_errors(simulator: Simulator, theta: Vector, skip: float) -> None:
     """Table of the errors over whole runs."""
-    rows = errors(problem, theta, skip)
+    problem = simulator.problem
+    rows = errors(simulator, theta, skip)
     for run, channel, (rms, mean, relative) in rows:
         purpose = problem.run(run).purpose
         print(
@@ -213,24 +216,24 @@ def compared_part(
     """Print the table of all models of a problem; what is known after it."""
     for entry in table["model"]:
         problem = model_of(base, entry, known)
-        theta = problem.nominal
+        simulator, theta = Simulator(problem), problem.nominal
         print(f"\n{entry['name']}")
         if entry.get("fit", True):
-            estimate = fit(problem, theta, robust=False)
+            estimate = fit(simulator, theta, effort=Effort("near"))
             theta = estimate.theta
             known = {**known, **estimate.values}
             print(f"  {shown(estimate)}")
         if "end" in table:
-            print_ends(problem, theta, table["end"])
+            print_ends(simulator, theta, table["end"])
         else:
-            print_errors(problem, theta, float(table.get("skip", 0.0)))
+            print_errors(simulator, theta, float(table.get("skip", 0.0)))
         if "inverse" in table:
             for run in problem.runs:
                 found = inverse(problem, theta, run, table["inverse"])
                 if found is not None:
                     print(f"  inverse force {run.name}: {found[0]:.3f} % as logged, "
                           f"{found[1]:.3f} % held")  # fmt: skip
-        problem.close()
+        simulator.close()
     return known
 
 

@@ -29,12 +29,14 @@ from numpy.typing import NDArray
 
 from benchmarks.motor_plant import EFFECTS, Bench, changes, draw, write_sets
 from benchmarks.own_plant import Made, catalogue, example, made
+from cosim.calibrate.differences import jacobian
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import diagnose
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis
-from cosim.diagnose.linear import MATERIAL, Absorber, Layout
+from cosim.diagnose.linear import MATERIAL, Absorber, SampleStack
 
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
@@ -67,13 +69,13 @@ def parts(bench: Bench) -> list[Bench]:
     return [one, replace(one, effect=bench.second, size=bench.second_size)]
 
 
-def over_noise(problem: Problem, change: Change, layout: Layout) -> Vector:
-    """Changes of the channels of the layout's runs, over the noise, as one vector."""
+def over_noise(problem: Problem, change: Change, stack: SampleStack) -> Vector:
+    """Changes of the channels of the stack's runs, over the noise, as one vector."""
     rows = [
         np.column_stack([change[name][c.name] / c.sigma for c in problem.channels])
-        for name in layout.names
+        for name in stack.names
     ]
-    return layout.vector(rows)
+    return stack.vector(rows)
 
 
 def shown(problem: Problem, truth: dict[str, float], change: Change) -> float:
@@ -87,17 +89,16 @@ def shown(problem: Problem, truth: dict[str, float], change: Change) -> float:
     theta = problem.nominal
     for name, value in truth.items():
         theta[problem.index(name)] = value
-    layout = Layout(problem, problem.chosen("identification"))
-    slopes = problem.jacobian(theta, layout.names)
-    problem.close()
-    absorber = Absorber(layout.matrix(slopes, problem.scale), problem)
-    return round(layout.largest(absorber.rest(over_noise(problem, change, layout))), 4)
+    stack = SampleStack(problem, problem.chosen("identification"))
+    slopes = jacobian(Simulator(problem), theta, stack.names)
+    absorber = Absorber(stack.matrix(slopes, problem.scale), problem)
+    return round(stack.largest(absorber.rest(over_noise(problem, change, stack))), 4)
 
 
 def extreme(one: Made) -> bool:
     """Whether an effect changes a channel of a run by more than a machine that still works does."""
-    layout = Layout(one.problem, one.problem.runs)
-    return not layout.largest(over_noise(one.problem, one.change, layout)) < EXTREME
+    stack = SampleStack(one.problem, one.problem.runs)
+    return not stack.largest(over_noise(one.problem, one.change, stack)) < EXTREME
 
 
 def judged(
@@ -152,12 +153,11 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
     alone = [part for bench in chosen for part in parts(bench)]
     effects = iter(changes(alone, arguments.seed, arguments.seconds))
     for bench, place in zip(chosen, places, strict=True):
-        problem = read_problem(place, workers=arguments.workers)
+        problem = read_problem(place)
         both = [next(effects), next(effects)]
         size = shown(problem, bench.parameters, both[0])
-        row = judged(
-            diagnose(problem), bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters
-        )
+        result = diagnose(problem, workers=arguments.workers)
+        row = judged(result, bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters)
         if bench.second != "none":
             other = shown(problem, bench.parameters, both[1])
             yield judged_pair(row, bench, [size, other])
@@ -167,7 +167,7 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
 
 def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[str, Any]]:
     """Rows of sets from our own FMUs."""
-    rig = example(example_set, arguments.seconds, arguments.workers)
+    rig = example(example_set, arguments.seconds)
     jobs: list[tuple[Candidate | None, float]] = [(None, 0.0)] * arguments.clean
     for repeat in range(arguments.repeats):
         jobs += [(item, (1.0, 2.0, 0.5)[repeat % 3]) for item in catalogue(rig)]
@@ -179,7 +179,8 @@ def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[
             one = made(rig, item, factor, seed)
         effect = "none" if item is None else item.effect
         size = shown(one.problem, one.parameters, one.change)
-        row = judged(diagnose(one.problem), effect, one.size, (effect,), one.parameters)
+        result = diagnose(one.problem, workers=arguments.workers)
+        row = judged(result, effect, one.size, (effect,), one.parameters)
         yield {**row, "label": one.effect, "shown": size}
 
 

@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.calibrate.estimate import Estimate
-from cosim.calibrate.fit import fit
-from cosim.calibrate.parts import Channel, Parameter, Run
+from cosim.calibrate.fit import Effort, fit
+from cosim.calibrate.model import Model
+from cosim.calibrate.parts import Channel, Coarse, MeasuredRun, Parameter
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.data.signals import Constant
 from cosim.installation.builder import default_provider
 from cosim.system.toml import read_system
@@ -147,17 +149,17 @@ def problem_of(turns: Turns, law: Chained) -> Problem:
         speeds = {"crawler.w2": Constant(float(turns.w2[k]), "rad/s"),
                   "crawler.w3": Constant(float(turns.w3[k]), "rad/s")}  # fmt: skip
         name = f"SET{turns.group[k]}_{int(np.sum(turns.group[:k] == turns.group[k])) + 1}"
-        runs.append(Run(name, "identification", times, path, speeds))
+        runs.append(MeasuredRun(name, "identification", times, path, speeds))
     return Problem(
         "crawler_paper",
-        read_system(FOLDER / "slip_law_system.toml"),
-        default_provider(),
+        Model.of(read_system(FOLDER / "slip_law_system.toml"), default_provider()),
         law.parameters,
         [Channel("x_S", "m", SIGMA, "crawler.x_S"), Channel("y_S", "m", SIGMA, "crawler.y_S")],
         runs,
+        STEP,
+        Coarse(STEP),
         constants={"crawler.slip_b": 0.0, "crawler.slip_c": 0.0, "crawler.e_inner": 0.0,
                    "crawler.exchange": law.exchange},
-        step=STEP,
         period=5 * STEP,
     )  # fmt: skip
 
@@ -165,11 +167,12 @@ def problem_of(turns: Turns, law: Chained) -> Problem:
 def chained(turns: Turns, law: Chained) -> tuple[Vector, Vector, Estimate]:
     """Criterion on sets left out and on the sets themselves, by turn [1], and the fit to all."""
     whole = problem_of(turns, law)
+    simulator, near = Simulator(whole), Effort("near")
 
     def criterion(theta: Vector, names: list[str]) -> list[float]:
         return [
             float(np.max(np.hypot(*(SIGMA * residual.T)))) / turns.R_S[index[name]]
-            for name, residual in whole.residuals(theta, names)
+            for name, residual in simulator.residuals(theta, names)
         ]
 
     names = [run.name for run in whole.runs]
@@ -178,11 +181,11 @@ def chained(turns: Turns, law: Chained) -> tuple[Vector, Vector, Estimate]:
     for group in np.unique(turns.group):
         held = [name for name in names if turns.group[index[name]] == group]
         rest = [name for name in names if name not in held]
-        theta = fit(whole, whole.nominal, rest, robust=False).theta
+        theta = fit(simulator, whole.nominal, rest, effort=near).theta
         found[[index[name] for name in held]] = criterion(theta, held)
-    estimate = fit(whole, whole.nominal, names, robust=False)
+    estimate = fit(simulator, whole.nominal, names, effort=near)
     own = np.array(criterion(estimate.theta, names))
-    whole.close()
+    simulator.close()
     return found, own, estimate
 
 

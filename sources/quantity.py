@@ -7,10 +7,11 @@ import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from cosim.spec.hints import NO_HINTS, SearchHints
+
 from .units import coherent
 
 Variability = Literal["tunable", "fixed"]
-Mix = Literal["", "turn", "shift"]
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -28,15 +29,7 @@ class Quantity:
         nominal: typical magnitude, for solvers and scaling.
         size: 0 for a scalar, n for a vector.
         strength: marks the parameter of an effect whose value 0 means that the effect is absent.
-        mix: how two simulations tell this parameter of a weak effect: `turn`, an angle (effect =
-            strength * (cos * effect at 0 + sin * effect at pi/2)); `shift`, an offset
-            (effect = strength * (effect at 0 + value * derivative)).
-        tries: values that a search should try, where a model with another one tells nothing of the
-            right one (cycles per revolution); for a strength, values near which fits begin.
-        lattice: distance of the values at which the model is exact, 0 if it is everywhere (a held
-            signal is delayed by whole samples; between, its steps are smeared).
-        visits: output of the component among whose values along a run the right value is, for a
-            parameter that tells nothing where it is wrong (where a patch lies).
+        hints: of a parameter; what a search for its value should know.
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -49,10 +42,7 @@ class Quantity:
     nominal: float | None = None
     size: int = 0
     strength: bool = False
-    mix: Mix = ""
-    tries: tuple[float, ...] = ()
-    lattice: float = 0.0
-    visits: str = ""
+    hints: SearchHints = NO_HINTS
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from cosim.errors import VariantError
+from cosim.errors import VariantError, listing
 from cosim.spec import variant as spec
 from cosim.spec.variant import Name
 
@@ -162,8 +162,7 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
     available = devices(component)
     if device not in available:
         raise UnknownVariantError(
-            f"component {component!r} has no device {device!r}; it has "
-            f"{', '.join(available) or 'none'}"
+            f"component {component!r} has no device {device!r}; {listing(available, device)}"
         )
     table = tomllib.loads(available[device].read_text(encoding="utf-8"))
     values = {}
@@ -188,9 +187,7 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
 
 def _choose(kind: str, wanted: str, available: Mapping[str, Any]) -> Any:
     if wanted not in available:
-        raise UnknownVariantError(
-            f"there is no {kind} {wanted!r}; there is {', '.join(available) or 'none'}"
-        )
+        raise UnknownVariantError(f"there is no {kind} {wanted!r}; {listing(available, wanted)}")
     return available[wanted]
 
 

@@ -1,18 +1,16 @@
-"""Derivatives of a problem's model values by differences, simulated in threads."""
+"""Derivatives of model values by differences, simulated in threads."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
-from .parts import Run, Sensitivity
-
-if TYPE_CHECKING:
-    from .problem import Problem
+from .parts import MeasuredRun, Sensitivity
+from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 STEP = 1e-3
@@ -28,7 +26,7 @@ TOLD = 16.0
 
 
 def jacobian(
-    problem: Problem,
+    simulator: Simulator,
     theta: Vector,
     purpose: str | Iterable[str] | None = "identification",
     *,
@@ -39,15 +37,16 @@ def jacobian(
     """Derivatives of the model values over sigma, by differences inside the bounds.
 
     Args:
-        problem: whose model.
+        simulator: of the problem.
         theta: where.
         purpose: runs.
         columns: parameters, all if not given.
         central: differences on both sides.
         relative: step over the span of a parameter, from its lattice on where it has one.
     """
+    problem = simulator.problem
     runs = problem.chosen(purpose)
-    tasks: list[tuple[Run, int, float]] = []
+    tasks: list[tuple[MeasuredRun, int, float]] = []
     wanted = set(range(len(problem.parameters)) if columns is None else columns)
     owned = {
         run.name: [int(i) for i in problem.columns(run.name) if int(i) in wanted] for run in runs
@@ -58,16 +57,16 @@ def jacobian(
             tasks.append((run, -1, 0.0))
         tasks += [(run, i, h) for i in owned[run.name] for h in sides[i] if h]
 
-    def simulate(task: tuple[Run, int, float]) -> Vector:
+    def simulate(task: tuple[MeasuredRun, int, float]) -> Vector:
         run, index, change = task
         moved = theta.copy()
         if index >= 0:  # sums round past bounds
             moved[index] = np.clip(
                 moved[index] + change, problem.lower[index], problem.upper[index]
             )
-        return problem.simulate(moved, run)
+        return simulator.simulate(moved, run)
 
-    def beside(task: tuple[Run, int, float]) -> tuple[float, Vector]:
+    def beside(task: tuple[MeasuredRun, int, float]) -> tuple[float, Vector]:
         """The change that was made, and what it gave: where it cannot be, the opposite."""
         run, index, change = task
         try:
@@ -78,7 +77,7 @@ def jacobian(
                 raise
             return -change, simulate((run, index, -change))
 
-    results = problem.spread(beside, tasks)
+    results = simulator.spread(beside, tasks)
     found = {(t[0].name, t[1], t[2]): r for t, r in zip(tasks, results, strict=True)}
     output = []
     for run in runs:
@@ -101,7 +100,7 @@ def jacobian(
     return output
 
 
-def smoothest(problem: Problem, theta: Vector, found: list[Sensitivity]) -> list[Sensitivity]:
+def smoothest(simulator: Simulator, theta: Vector, found: list[Sensitivity]) -> list[Sensitivity]:
     """Derivatives of which both sides agree, from finer steps for the runs where they do not.
 
     A jump within the step is no derivative: it looks like information on what changes nothing. All
@@ -109,18 +108,18 @@ def smoothest(problem: Problem, theta: Vector, found: list[Sensitivity]) -> list
     finest step still meets one on one side, the other side is right.
 
     Args:
-        problem: whose model.
+        simulator: of the problem.
         theta: where.
         found: central differences.
     """
-    found = list(found)
+    problem, found = simulator.problem, list(found)
     columns = sorted({int(i) for item in found for i in item.columns})
     for step in FINER:
         rough = [k for k, item in enumerate(found) if unevenness(problem, item) > UNEVEN]
         if not rough:
             break
         names = [found[k].run for k in rough]
-        finer = jacobian(problem, theta, names, columns=columns, relative=step)
+        finer = jacobian(simulator, theta, names, columns=columns, relative=step)
         for k, item in zip(rough, finer, strict=True):
             if unevenness(problem, item) < unevenness(problem, found[k]):
                 found[k] = item
@@ -151,7 +150,12 @@ def _one_sided(item: Sensitivity) -> Sensitivity:
 
 
 def directional(
-    problem: Problem, theta: Vector, run: Run | str, directions: Vector, *, relative: float = STEP
+    simulator: Simulator,
+    theta: Vector,
+    run: MeasuredRun | str,
+    directions: Vector,
+    *,
+    relative: float = STEP,
 ) -> Sensitivity:
     """Derivatives of one run along directions, given back along the parameters.
 
@@ -159,12 +163,13 @@ def directional(
     no effect at all; differences along the combination do.
 
     Args:
-        problem: whose model.
+        simulator: of the problem.
         theta: where.
         run: which.
         directions: orthonormal columns over the run's parameters, in spans.
         relative: step in spans.
     """
+    problem = simulator.problem
     run = problem.run(run) if isinstance(run, str) else run
     columns = problem.columns(run.name)
     scale = problem.scale[columns]
@@ -172,7 +177,7 @@ def directional(
     def simulate(change: Vector) -> Vector:
         moved = theta.copy()
         moved[columns] += change * scale
-        return problem.simulate(np.clip(moved, problem.lower, problem.upper), run)
+        return simulator.simulate(np.clip(moved, problem.lower, problem.upper), run)
 
     low, high = problem.lower[columns] - theta[columns], problem.upper[columns] - theta[columns]
     steps: list[tuple[float, float]] = []
@@ -189,7 +194,7 @@ def directional(
         else:
             steps.append((0.0, relative) if room[0] > room[1] else (-relative, 0.0))
     changes = [h * d for d, pair in zip(directions.T, steps, strict=True) for h in pair if h]
-    results = iter(problem.spread(simulate, [np.zeros(columns.size), *changes]))
+    results = iter(simulator.spread(simulate, [np.zeros(columns.size), *changes]))
     base = next(results)
     gap = np.where(np.isfinite(run.data), 0.0, np.nan)
     slopes = np.empty((*run.data.shape, columns.size))
@@ -209,7 +214,7 @@ def _sides(
 ) -> tuple[float, float]:
     """The two changes between which a difference is taken; 0 is the point itself."""
     parameter, value = problem.parameters[index], float(theta[index])
-    change = max(relative * parameter.scale, parameter.lattice)
+    change = max(relative * parameter.scale, parameter.hints.lattice)
     above, below = parameter.maximum - value, value - parameter.minimum
     if central and above >= change and below >= change:
         return -change, change

@@ -5,25 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from .descent import Descent
+from .known import Known
 from .loss import loss_for
-from .normal import Normal, cost_of
+from .normal import BOUNDS, KNOWN, Normal, cost_of
 from .parts import Sensitivity
 from .problem import Problem
+from .simulator import Simulator
 from .valley import profiled
-from .weak import KNOWN, WEAK, confirmed
-
-if TYPE_CHECKING:
-    from .fit import Descent
+from .weak import WEAK, confirmed
 
 Vector = NDArray[np.float64]
-BOUNDS = 12.0
-"""Information of the bounds: 1 / variance of a value anywhere between them, in spans."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class Estimate:
     """Calibrated parameters.
 
     Attributes:
-        problem: what was fitted.
+        simulator: of what was fitted.
         theta: values of all parameters.
         covariance: of the parameters; sandwich over blocks, so correlated residuals count.
         low, high: 95 % intervals, cut at the bounds.
@@ -58,11 +55,11 @@ class Estimate:
         cost: half the sum of squared residuals over sigma, priors included.
         robust: the same with residuals that are far off counted less (`loss.loss_for`).
         count: residuals.
-        iterations, evaluations: of the fit.
+        evaluations: simulated runs of the fit.
         jacobian, residuals: at the solution, by run.
     """
 
-    problem: Problem
+    simulator: Simulator
     theta: Vector
     covariance: Vector
     low: Vector
@@ -73,10 +70,19 @@ class Estimate:
     cost: float
     robust: float
     count: int
-    iterations: int
     evaluations: int
     jacobian: list[Sensitivity] = field(repr=False)
     residuals: list[tuple[str, Vector]] = field(repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """What was fitted."""
+        return self.simulator.problem
+
+    @property
+    def known(self) -> Known:
+        """The derivatives, for a fit of nearly the same."""
+        return Known(self.problem.names, self.jacobian)
 
     @property
     def values(self) -> dict[str, float]:
@@ -131,7 +137,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         scaled = profiled(run, normal, scaled, vectors[:, doubtful])
     covariance = scaled * np.outer(scale, scale)
     # any value between two of a lattice may do as well
-    covariance += np.diag([p.lattice**2 / 12.0 for p in problem.parameters])
+    covariance += np.diag([p.hints.lattice**2 / 12.0 for p in problem.parameters])
     variances, directions = np.linalg.eigh(scaled)
     combinations = tuple(
         Combination(
@@ -150,7 +156,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         if value <= p.minimum + margin or value >= p.maximum - margin
     ]
     return Estimate(
-        problem=problem,
+        simulator=run.simulator,
         theta=run.theta,
         covariance=covariance,
         low=np.maximum(run.theta - half, problem.lower),
@@ -162,8 +168,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         cost=cost,
         robust=robust,
         count=count,
-        iterations=run.iterations,
-        evaluations=problem.evaluations - run.begun,
+        evaluations=run.simulator.evaluations - run.begun,
         jacobian=run.jacobian,
         residuals=run.residuals,
     )

@@ -1,403 +1,114 @@
-"""Bounded weighted least squares over all identification runs.
-
-Levenberg-Marquardt in parameters scaled by their spans, so that combinations that the runs cannot
-tell apart stay where they began. Limits whose integrators stop tick by tick make the cost stepwise:
-the Jacobian is taken over wide steps first, and a search along its main directions, which needs no
-derivatives, ends the fit.
-"""
+"""Bounded weighted least squares over all identification runs."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
-from ..errors import FmuCallError
-from .differences import UNEVEN, smoothest, unevenness
-from .estimate import BOUNDS, Estimate, estimated
-from .loss import Huber, Loss, Squares, loss_for
-from .normal import Normal, cost_of, drawn, gradient
-from .parts import Sensitivity
-from .problem import Problem
-from .weak import KNOWN
+from .descent import EVEN, STEPS, Descent
+from .estimate import Estimate, estimated
+from .known import Known
+from .loss import Huber, Squares, loss_for
+from .parts import PURPOSE
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
-STEPS = (2e-2, 5e-3, 1e-2)
-"""Steps of differences over the span, from the first iterations to the last."""
-REUSED = 0.02
-"""A Jacobian is used again after a step that lowered the cost by this fraction."""
 APART = 10.0
 """Runs are fitted one half after the other if their mean errors differ by more than this factor."""
-CORRECTIONS = 4
-"""Steps at most with the Jacobian of a point that is close."""
-ROUGH = 0.1
-"""Unevenness of derivatives that go on being those of jumps: others are taken along directions."""
-CALM = 0.8
-"""Share of the information on a direction that runs without jumps give: then derivatives do."""
-RENEWALS, DRAFTED = 5, 3
-"""Jacobians that a fit from close by takes at most, and that a draft takes."""
-FIRM = 1e-9
-"""Damping of a Gauss-Newton step, relative to the information, with which a quick fit begins."""
-PARTS = (1.0, 0.3, 0.1)
-"""Shares of a step that are tried."""
-SHORTER = 8
-"""Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
-SETTLED = 0.2
-"""Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
-EVEN, ROUGHLY, QUICKLY = 1e-3, 1e-2, 3e-2
-"""Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
-second for drafts, the third for quick fits."""
-PURPOSE = "identification"
 
 
-class Known:
-    """Derivatives of another fit, to be used again for a model with some parameters more or less.
+@dataclass(frozen=True)
+class Effort:
+    """How far a fit is from its minimum when it begins, and how near it must come.
 
-    Args:
-        names: parameters of that fit.
-        jacobian: its derivatives.
+    Attributes:
+        begin: `far`: large residuals count linearly at first, the calmest runs lead; `near`: they
+            count in full; `there`: but for small corrections, by steps with one Jacobian.
+        end: `draft`: the minimum roughly, for comparison or another fit, no intervals; `intervals`:
+            derivatives good enough for these; `polished`: after a search without derivatives, too,
+            which `there` needs not.
+        iterations: at each size of difference steps at most, or with known derivatives.
+        share: of the cost beyond the noise's, below which a fall ends a fit with known derivatives.
     """
 
-    def __init__(self, names: Sequence[str], jacobian: Iterable[Sensitivity]) -> None:
-        self.runs = {item.run: item for item in jacobian}
-        self.place = {
-            name: {names[i]: k for k, i in enumerate(item.columns.tolist())}
-            for name, item in self.runs.items()
-        }
-
-    @classmethod
-    def of(cls, estimate: Estimate) -> Known:
-        """Those of a fit."""
-        return cls(estimate.problem.names, estimate.jacobian)
-
-    @classmethod
-    def at(cls, problem: Problem, theta: Vector) -> Known:
-        """Those at a point of the parameters."""
-        found = problem.jacobian(theta, PURPOSE, central=False, relative=STEPS[1])
-        return cls(problem.names, found)
-
-    def extended(
-        self, problem: Problem, theta: Vector, purpose: str | Iterable[str]
-    ) -> list[Sensitivity]:
-        """Derivatives for all parameters of a problem, the unknown ones taken at theta."""
-        runs = problem.chosen(purpose)
-        names = problem.names
-        new = [
-            i
-            for i, name in enumerate(names)
-            if any(
-                i in problem.columns(run.name) and name not in self.place.get(run.name, {})
-                for run in runs
-            )
-        ]
-        fresh = {
-            item.run: item
-            for item in problem.jacobian(
-                theta, [r.name for r in runs], columns=new, central=False, relative=STEPS[1]
-            )
-        } if new else {}  # fmt: skip
-        found = []
-        for run in runs:
-            columns = problem.columns(run.name)
-            place = self.place.get(run.name, {})
-            mine = [names[i] for i in columns.tolist()]
-            here = [k for k, name in enumerate(mine) if name in place]
-            values = np.empty((*run.data.shape, columns.size))
-            rough = None
-            if here:
-                old, at = self.runs[run.name], [place[mine[k]] for k in here]
-                values[:, :, here] = old.values[:, :, at]
-                if old.roughness is not None:
-                    rough = np.zeros_like(values)
-                    rough[:, :, here] = old.roughness[:, :, at]
-            if len(here) < len(mine):
-                item = fresh[run.name]
-                own = {i: k for k, i in enumerate(item.columns.tolist())}
-                there = [k for k, name in enumerate(mine) if name not in place]
-                values[:, :, there] = item.values[:, :, [own[int(columns[k])] for k in there]]
-            found.append(Sensitivity(run.name, columns, values, rough))
-        return found
+    begin: Literal["far", "near", "there"] = "far"
+    end: Literal["draft", "intervals", "polished"] = "polished"
+    iterations: int = 25
+    share: float = EVEN
 
 
-class Descent:
-    """A point on its way to the minimum, with what was simulated there last."""
-
-    def __init__(
-        self,
-        problem: Problem,
-        purpose: str | Iterable[str],
-        theta: Vector,
-        begun: int | None = None,
-    ) -> None:
-        self.problem = problem
-        self.purpose = purpose if isinstance(purpose, str) else list(purpose)
-        self.theta = np.clip(theta, problem.lower, problem.upper)
-        self.loss: Loss = Squares()
-        self.iterations = 0
-        self.uneven = False
-        self.promised = math.inf
-        self.damping = FIRM
-        self.begun = problem.evaluations if begun is None else begun
-        self.drawn = drawn(problem)
-        self.residuals = problem.residuals(self.theta, self.purpose)
-        self.cost = self.total(self.theta, self.residuals)
-
-    def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
-        """Cost with the bounds as a weak prior, which decides where the data are silent."""
-        p = self.problem
-        away = ((theta - p.nominal) / p.scale)[self.drawn]
-        return cost_of(p, theta, residuals, self.loss) + 0.5 * BOUNDS * float(away @ away)
-
-    def count(self, loss: Loss) -> None:
-        """Count residuals in another way from here on."""
-        self.loss = loss
-        self.cost = self.total(self.theta, self.residuals)
-
-    def normal(self, relative: float, central: bool) -> Normal:
-        """Normal equations here, from differences with steps of this share of the spans."""
-        self.jacobian = self.problem.jacobian(
-            self.theta, self.purpose, central=central, relative=relative
-        )
-        normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-        return self._directed(normal, set(normal.rough), relative) if normal.rough else normal
-
-    def _directed(self, normal: Normal, rough: set[str], relative: float) -> Normal:
-        """Normal equations with the derivatives of runs that jump taken along main directions."""
-        for place, item in enumerate(self.jacobian):
-            if item.run in rough:
-                part = normal.calm[np.ix_(item.columns, item.columns)]
-                self.jacobian[place] = self.problem.directional(
-                    self.theta, item.run, np.linalg.eigh(part)[1], relative=relative
-                )
-        return Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-
-    def smooth(self) -> None:
-        """Last steps, with derivatives that avoid jumps; long ones across them have led here."""
-        p = self.problem
-        if p.unstable:  # rough at any step
-            return
-        self.uneven = any(unevenness(p, item) > UNEVEN for item in self.jacobian)
-        if not self.uneven:
-            return
-        self.jacobian = smoothest(p, self.theta, self.jacobian)
-        normal = Normal(p, self.theta, self.jacobian, self.residuals, self.loss)
-        jumps = {item.run for item in self.jacobian if unevenness(p, item) > ROUGH}
-        if rough := jumps & set(normal.rough):
-            normal = self._directed(normal, rough, STEPS[-1])
-        self.settle(normal, CORRECTIONS)
-
-    def attempt(self, theta: Vector) -> bool:
-        """Go there, inside the bounds, if it is better."""
-        theta = np.clip(theta, self.problem.lower, self.problem.upper)  # sums round past them
-        if np.array_equal(theta, self.theta):
-            return False
-        try:
-            residuals = self.problem.residuals(theta, self.purpose)
-        except FmuCallError:
-            return False
-        cost = self.total(theta, residuals)
-        if not cost < self.cost:
-            return False
-        self.theta, self.residuals, self.cost = theta, residuals, cost
-        return True
-
-    def step(self, normal: Normal, damping: float) -> Vector:
-        """Damped Gauss-Newton step inside the bounds; `promised` says what it should gain.
-
-        It goes to the minimum of the quadratic within the bounds: cutting off parameters that would
-        leave them spoils the step along collinear ones.
-        """
-        p = self.problem
-        size = self.theta.size
-        whole = normal.matrix + np.diag(BOUNDS * self.drawn)
-        gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
-        ridge = damping * np.trace(whole) / size + 1e-9
-        values, vectors = np.linalg.eigh(whole)
-        # information taken off for jumps may leave a direction with none at all
-        root = np.sqrt(np.maximum(values, 0.0) + ridge)
-        along = (vectors.T @ gradient) / root
-        change = vectors @ (along / root)
-        low, high = (p.lower - self.theta) / p.scale, (p.upper - self.theta) / p.scale
-        if np.any(change < low) or np.any(change > high):
-            matrix = root[:, None] * vectors.T
-            change = lsq_linear(matrix, along, (low, high), method="bvls").x
-        self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
-        return np.asarray(np.clip(self.theta + change * p.scale, p.lower, p.upper))
-
-    def descend(self, relative: float, limit: int, tolerance: float) -> None:
-        """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
-
-        A Jacobian costs as many simulations as there are parameters, a step one; so a Jacobian is
-        used again as long as steps with it pay.
-        """
-        damping = 1e-6
-        for _ in range(limit):
-            self.iterations += 1
-            normal = self.normal(relative, central=False)
-            first = self.cost
-            for _ in range(8):
-                if self.attempt(self.step(normal, damping)):
-                    damping = max(damping * 0.1, 1e-12)
-                    break
-                damping = max(damping, 1e-9) * 10.0
-            else:
-                return
-            before = first
-            while before - self.cost > REUSED * before:
-                before = self.cost
-                normal.gradient = self.gradient()
-                if not self.attempt(self.step(normal, damping)):
-                    break
-            if first - self.cost <= tolerance * max(first, 1.0):
-                return
-
-    def follow(self, known: Known, limit: int, share: float) -> None:
-        """Gauss-Newton with a Jacobian from close by; only what it lacks is differentiated.
-
-        Parameters that were there before hardly change what they do when one is added, so a step
-        costs one simulation and one for each new parameter.
-        """
-        damping = FIRM
-        for _ in range(limit):
-            self.iterations += 1
-            self.jacobian = known.extended(self.problem, self.theta, self.purpose)
-            normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-            before = self.cost
-            if self.settle(normal, 1, damping) or before - self.cost <= self.enough(share):
-                return
-            damping = max(0.1 * self.damping, FIRM)
-
-    def enough(self, share: float) -> float:
-        """Fall of the cost below which a fit ends: a share of what is left beyond the noise."""
-        noise = 0.5 * float(sum(np.isfinite(r).sum() for _, r in self.residuals))
-        return max(SETTLED, share * (self.cost - noise))
-
-    def gradient(self) -> Vector:
-        """J^T r with the last Jacobian and the present residuals."""
-        return gradient(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-
-    def settle(self, normal: Normal, limit: int, damping: float = FIRM) -> bool:
-        """Damped steps with one Jacobian; whether they came to where it promises no more."""
-        for _ in range(limit):
-            self.damping = damping
-            whole = self.step(normal, damping)
-            if abs(self.promised) < SETTLED:
-                return True
-            # a limit or a threshold is passed: the direction is right, but not so far
-            if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
-                for _ in range(SHORTER):
-                    damping = self.damping = max(damping, 1e-7) * 30.0
-                    if self.attempt(self.step(normal, damping)):
-                        break
-                else:
-                    return False
-            damping = max(damping * 0.1, 1e-12)
-            normal.gradient = self.gradient()
-        return False
-
-    def correct(self, *, draft: bool = False) -> Normal:
-        """Steps with a Jacobian taken here, and with another one as long as they lead far.
-
-        Args:
-            draft: only to be compared: one-sided differences, and fewer of them.
-        """
-        for _ in range(DRAFTED if draft else RENEWALS):
-            before = self.cost
-            normal = self.normal(STEPS[-1], central=not draft)
-            enough = self.enough(ROUGHLY if draft else EVEN)
-            if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
-                break
-        return normal
-
-    def polish(self) -> None:
-        """Search along the main directions of the normal matrix, without derivatives."""
-        p = self.problem
-        normal = self.correct()
-        if not normal.rough:
-            return
-        values, vectors = np.linalg.eigh(normal.matrix)
-        for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
-            if value < 1.0 / KNOWN**2 or float(direction @ normal.calm @ direction) > CALM * value:
-                continue
-            size = 1.0 / math.sqrt(value)
-            for sign in (1.0, -1.0):
-                length = size
-                while self.attempt(
-                    np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
-                ):
-                    length *= 2.0
-                if length > size:
-                    break
+THOROUGH = Effort()
+"""From the nominal values to the minimum, with intervals."""
+INTERVALS = Effort("near", "intervals", iterations=0)
+"""Stays where it begins and says what the data know there."""
+POLISH = Effort("near", iterations=0)
+"""The last search and steps alone."""
+CORRECTION = Effort("there", "intervals")
+"""Steps from close by, with intervals."""
+DRAFT = Effort("there", "draft")
+"""The same to be compared: one-sided derivatives."""
 
 
 def fit(
-    problem: Problem,
+    simulator: Simulator,
     theta: Vector | None = None,
     purpose: str | Iterable[str] = PURPOSE,
     *,
-    limit: int = 25,
-    polish: bool = True,
-    robust: bool = True,
-    rough: bool = False,
-    near: bool = False,
-    draft: bool = False,
+    effort: Effort = THOROUGH,
     known: Known | None = None,
-    share: float = EVEN,
 ) -> Estimate:
     """Estimate the parameters of a problem.
 
     Near the solution, residuals that are far off count less (`loss.loss_for`).
 
     Args:
-        problem: what to fit.
+        simulator: of the problem.
         theta: where to begin, the nominal values if not given.
         purpose: runs to fit.
-        limit: iterations at each size of difference steps.
-        polish: end with a search without derivatives.
-        robust: begin with large residuals counted linearly; off when `theta` is close.
-        rough: end near the solution and without derivatives there: another fit goes on.
-        near: `theta` is the solution but for small corrections: one Jacobian, and steps with it.
+        effort: how far away that is, and how near the minimum must be reached.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
-        share: with `known`, of the cost beyond the noise's, below which a fall ends the fit.
-        draft: with `near`, a one-sided Jacobian: the minimum counts and not its intervals.
     """
-    begun = problem.evaluations
-    run = Descent(problem, purpose, problem.nominal if theta is None else theta.astype(np.float64))
-    if near or known is not None:
+    begun, problem = simulator.evaluations, simulator.problem
+    run = Descent(
+        simulator, purpose, problem.nominal if theta is None else theta.astype(np.float64)
+    )
+    if effort.begin == "there" or known is not None:
         run.count(loss_for(problem.unstable, run.residuals))
     if known is not None:
-        run.follow(known, limit, share)
+        run.follow(known, effort.iterations, effort.share)
         return estimated(run)
-    if near:
+    draft = effort.end == "draft"
+    if effort.begin == "there":
         run.correct(draft=draft)
         if not draft:
             run.smooth()
         return estimated(run, confirm=not draft)
-    if robust and _uneven(run):
-        run = Descent(problem, _calmest(run), run.theta)
+    if effort.begin == "far" and _uneven(run):
+        run = Descent(simulator, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
         typical = float(np.median(np.abs(sizes))) if sizes.size else 1.0
         run.count(Huber(max(3.0, typical)))
         run.descend(STEPS[0], 3, 0.05)
         run.count(Huber(3.0))
         run.descend(STEPS[1], 3, 0.01)
-        run = Descent(problem, purpose, run.theta, begun)
+        run = Descent(simulator, purpose, run.theta, begun)
         run.count(Huber(3.0))
         run.descend(STEPS[1], 4, 0.01)
         run.count(Squares())
-    run.descend(STEPS[1], limit, 5e-3 if rough else 1e-4)
+    run.descend(STEPS[1], effort.iterations, 5e-3 if draft else 1e-4)
     run.count(loss_for(problem.unstable, run.residuals))
-    if polish and not rough:
+    if effort.end == "polished":
         run.polish()
-    elif not rough:
+    elif effort.end == "intervals":
         run.normal(STEPS[-1], central=True)
-    if not rough:
+    if not draft:
         run.smooth()
-    return estimated(run, confirm=not rough)
+    return estimated(run, confirm=not draft)
 
 
 def _uneven(run: Descent) -> bool:

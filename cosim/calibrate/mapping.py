@@ -26,7 +26,8 @@ from ..installation import builder, places
 from ..system.provider import Provider
 from ..system.toml import SystemFile, read_system
 from .columns import ITEM, expand, prepared
-from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
+from .model import Model
+from .parts import COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 
 Vector = NDArray[np.float64]
@@ -103,7 +104,6 @@ def read_problem(
     *,
     mapping: Path | str | None = None,
     system: str | None = None,
-    workers: int | None = None,
     only: Mapping[str, Any] | None = None,
 ) -> Problem:
     """Read a data set as a calibration problem.
@@ -113,7 +113,6 @@ def read_problem(
         provider: where variants come from; builds them if not given.
         mapping: a `dataset.toml`, looked for if not given.
         system: another system than the mapping's, with the same instances.
-        workers: threads.
         only: entries that the runs must have, besides those of the mapping's `only`.
 
     Raises:
@@ -128,14 +127,11 @@ def read_problem(
     else:
         path = Path(mapping) if mapping is not None else find_mapping(folder, "")
         data = _plain(folder, path)
-    problem = _Mapping(path, data, only or {}).problem(provider, system, workers)
-    problem.further = tuple(
-        partial(
-            read_problem, folder, provider, mapping=path.parent / name, workers=workers, only=only
-        )
+    further = [
+        partial(read_problem, folder, provider, mapping=path.parent / name, only=only)
         for name in read_mapping(path).get("further", [])
-    )
-    return problem
+    ]
+    return _Mapping(path, data, only or {}).problem(provider, system).changed(further=further)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -205,7 +201,7 @@ class _Mapping:
                 for one, window in windows(name, log, lead):
                     self.logs[one], self.purposes[one] = window, run.purpose
 
-    def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
+    def problem(self, provider: Provider, system: str | None) -> Problem:
         """The problem."""
         table = self.table
         file = find_system(self.path, system or str(table.get("system", "")))
@@ -229,24 +225,22 @@ class _Mapping:
         parameters = [p for p in stated if not p.late]
         return Problem(
             self.data.name,
-            file,
-            provider,
+            Model.of(file, provider),
             parameters,
             present,
             [self.run(name, present) for name in self.logs],
+            float(table["step"]),
+            self.search(),
             constants=constants,
-            step=float(table["step"]),
             algorithm=str(table.get("algorithm", "jacobi")),
             period=float(table["period"]) if "period" in table else None,
-            workers=workers,
             ticks=bool(table.get("ticks", False)),
-            search=self.search(),
             relative=[tuple(names) for names in self.table.get("relative", [])],
             late=[p for p in stated if p.late],
         )
 
-    def search(self) -> Coarse | None:
-        """How the system is run in a search; None for no other way than always."""
+    def search(self) -> Coarse:
+        """How the system is run in a search."""
         step, table = self.table.get("search_step"), self.table.get("search", {})
         if set(table) - {"options", "parameters"}:
             raise ScenarioError(f"{self.path}: [search] has options and parameters, no other keys")
@@ -256,7 +250,9 @@ class _Mapping:
                 f"{self.table['step']} and ticks = true: its error is measured against these ticks"
             )
         parameters = {name: float(v) for name, v in flatten(table.get("parameters", {})).items()}
-        return None if step is None else Coarse(float(step), table.get("options", {}), parameters)
+        if step is None:
+            return Coarse(float(self.table["step"]))
+        return Coarse(float(step), table.get("options", {}), parameters)
 
     def _column(self, channel: Channel) -> str:
         return self.columns[channel.name]
@@ -346,7 +342,7 @@ class _Mapping:
             return float(values[np.isfinite(values)][0])
         return _lookup(self.logs[run].values, entry, where)
 
-    def run(self, name: str, channels: list[Channel]) -> Run:
+    def run(self, name: str, channels: list[Channel]) -> MeasuredRun:
         """One run."""
         log = self.logs[name]
         starts: dict[str, float] = {}
@@ -365,7 +361,7 @@ class _Mapping:
                 raise ScenarioError(f"{log.name}: {', '.join(triple)} are never measured together")
             anchor = int(known[0])
             data[:, place] = relative_pose(data[:, place], anchor)
-        return Run(
+        return MeasuredRun(
             name,
             self.purposes[name],
             log.time[during] + lead,

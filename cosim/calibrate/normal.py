@@ -1,4 +1,4 @@
-"""Normal equations of weighted residuals, and derivatives that are used again."""
+"""Normal equations of weighted residuals, and when they determine a parameter."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ BLOCK = 1.0
 """Length of the blocks over which residuals may be correlated [s]."""
 BLOCKS = 40
 """Blocks needed to estimate a variance from them: its own error is then a quarter."""
+KNOWN = 0.25
+"""A combination is identifiable if its standard deviation is below this fraction of the span."""
+BOUNDS = 12.0
+"""Information of the bounds: 1 / variance of a value anywhere between them, in spans."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 

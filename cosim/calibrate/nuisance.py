@@ -20,9 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
+from .differences import jacobian
 from .loss import loss_for
 from .parts import Sensitivity
 from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 STEP = 5e-3
@@ -48,16 +50,16 @@ def concerned(problem: Problem, runs: Iterable[str]) -> list[int]:
     return [i for i, p in enumerate(problem.parameters) if p.run in names]
 
 
-def slopes(problem: Problem, theta: Vector, runs: Iterable[str]) -> dict[str, Sensitivity]:
+def slopes(simulator: Simulator, theta: Vector, runs: Iterable[str]) -> dict[str, Sensitivity]:
     """Derivatives with respect to the runs' own parameters, by run."""
     names = list(runs)
-    columns = concerned(problem, names)
-    found = problem.jacobian(theta, names, columns=columns, central=False, relative=STEP)
+    columns = concerned(simulator.problem, names)
+    found = jacobian(simulator, theta, names, columns=columns, central=False, relative=STEP)
     return {item.run: item for item in found}
 
 
 def settled(
-    problem: Problem,
+    simulator: Simulator,
     theta: Vector,
     runs: Iterable[str],
     known: dict[str, Sensitivity] | None = None,
@@ -65,25 +67,25 @@ def settled(
     """Parameters with the runs' own values fitted to each of them.
 
     Args:
-        problem: system and data.
+        simulator: of system and data.
         theta: all values; those of other runs and common ones stay.
         runs: names.
         known: derivatives from `slopes`, taken here if not given. They need not be of this theta.
     """
-    names = list(runs)
+    problem, names = simulator.problem, list(runs)
     columns = concerned(problem, names)
     theta = theta.copy()
     if not columns:
         return theta
     if known is None:
-        known = slopes(problem, theta, names)
+        known = slopes(simulator, theta, names)
     own = {name: [i for i in columns if problem.parameters[i].run == name] for name in names}
     costs: dict[str, float] = {}
     length = dict.fromkeys(names, 1.0)
     best, open_runs = theta.copy(), [name for name in names if own[name]]
     for _ in range(STEPS):
         going: list[str] = []
-        for name, residual in problem.residuals(theta, open_runs):
+        for name, residual in simulator.residuals(theta, open_runs):
             cost = _cost(problem, theta, residual, own[name])
             fallen = costs.get(name, np.inf) - cost
             if fallen > 0.0:
@@ -119,7 +121,7 @@ def late_estimated(problem: Problem) -> bool:
     return bool(np.any(np.abs(moved) > 1e-9 * np.array([p.scale for p in problem.late])))
 
 
-def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
+def released(simulator: Simulator, theta: Vector) -> tuple[Simulator, Vector, float]:
     """Estimate the late parameters of every run, with its other own values.
 
     Such values may move the model far from linearly, start angles of casters for instance, which
@@ -128,28 +130,29 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     runs come first (see `HORIZONS`), but where they were estimated before and did well.
 
     Returns:
-        The problem with these parameters held at what was found, all its values, and the fall of
-        the cost [nats].
+        Of the problem with these parameters held at what was found, all its values, and the fall
+        of the cost [nats].
     """
+    problem = simulator.problem
     start = starts(problem)
-    whole = problem.with_parameters([*problem.parameters, *problem.late])
-    whole.limits = problem.limits
+    every = simulator.of(problem.with_parameters([*problem.parameters, *problem.late]))
+    whole = every.problem
     names = [run.name for run in problem.runs]
     first = np.clip(np.concatenate([theta, start]), whole.lower, whole.upper)
     anew = first.copy()
     anew[theta.size :] = whole.nominal[theta.size :]
-    values, costs = first.copy(), _costs(whole, first, names)
+    values, costs = first.copy(), _costs(every, first, names)
     before = sum(costs.values())
 
     def tried(theta: Vector, runs: list[str], horizons: tuple[float, ...]) -> None:
         try:
-            found = _followed(whole, theta, runs, horizons)
+            found = _followed(every, theta, runs, horizons)
         except FmuCallError:
             if len(runs) > 1:  # one run that cannot be simulated there keeps what it has
                 for name in runs:
                     tried(theta, [name], horizons)
             return
-        for name, cost in _costs(whole, found, runs).items():
+        for name, cost in _costs(every, found, runs).items():
             if cost < costs[name]:
                 own = concerned(whole, [name])
                 costs[name], values[own] = cost, found[own]
@@ -160,17 +163,18 @@ def released(problem: Problem, theta: Vector) -> tuple[Problem, Vector, float]:
     off = [n for n in names if n not in moved or 2.0 * costs[n] > OFF * count[n]]
     tried(anew, off, HORIZONS)
     kept = dict(zip((p.name for p in problem.late), values[theta.size :].tolist(), strict=True))
-    return whole.hold(kept), values[: theta.size], before - sum(costs.values())
+    held = simulator.of(whole.hold(kept))
+    return held, values[: theta.size], before - sum(costs.values())
 
 
 def _followed(
-    problem: Problem, theta: Vector, names: list[str], horizons: tuple[float, ...]
+    simulator: Simulator, theta: Vector, names: list[str], horizons: tuple[float, ...]
 ) -> Vector:
     """Values of some runs estimated over longer and longer beginnings."""
     if not names:
         return theta
     for share in horizons:
-        part = _beginnings(problem, share)
+        part = simulator.of(_beginnings(simulator.problem, share))
         begun = cost = sum(_costs(part, theta, names).values())
         for _ in range(RELEASES):
             theta = settled(part, theta, names)
@@ -187,14 +191,13 @@ def _beginnings(problem: Problem, share: float) -> Problem:
     for run in problem.runs:
         size = math.ceil(share * run.times.size)
         runs.append(replace(run, times=run.times[:size], data=run.data[:size]))
-    part = problem._with(runs=runs)
-    part.limits = problem.limits
-    return part
+    return problem.changed(runs=runs)
 
 
-def _costs(problem: Problem, theta: Vector, names: list[str]) -> dict[str, float]:
+def _costs(simulator: Simulator, theta: Vector, names: list[str]) -> dict[str, float]:
     """Run -> cost; nothing is simulated without names."""
-    found = problem.residuals(theta, names)
+    problem = simulator.problem
+    found = simulator.residuals(theta, names)
     return {n: _cost(problem, theta, r, concerned(problem, [n])) for n, r in found}
 
 

@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from ..data.signals import Signal
 from ..errors import ValueRangeError
 from ..fmu.description import Variable
+from ..spec.hints import NO_HINTS, SearchHints
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]
+PURPOSE = "identification"
+"""Of runs that are fitted."""
 COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
@@ -50,10 +53,7 @@ class Parameter:
         strength: whether 0 makes an effect absent exactly.
         span: size of a typical change; the distance of the bounds if not given.
         inverse: the targets get factor / value: a compliance that sets a stiffness.
-        tries: values that a search should try; of a strength, where fits should begin, too.
-        lattice: distance of the values at which the model is exact, 0 if it is everywhere.
-        visits: variable of the system among whose values along a run the right one is.
-        mix: `turn` or `shift`: how two simulations tell this parameter of an effect.
+        hints: what a search for it should know; variables are named with their instance.
         late: held, and estimated run by run once a model explains the data (`nuisance.released`).
     """
 
@@ -70,10 +70,7 @@ class Parameter:
     span: float = 0.0
     text: str = ""
     inverse: bool = False
-    mix: str = ""
-    tries: tuple[float, ...] = ()
-    lattice: float = 0.0
-    visits: str = ""
+    hints: SearchHints = NO_HINTS
     late: bool = False
 
     def set(self, value: float) -> dict[str, float]:
@@ -176,7 +173,7 @@ class Sampler:
 
 
 @dataclass(frozen=True)
-class Run:
+class MeasuredRun:
     """A measured run.
 
     Attributes:
@@ -219,7 +216,9 @@ class Sensitivity(NamedTuple):
     roughness: Vector | None
 
 
-def free_parameter(variable: Variable, name: str, target: str, *, strength: bool) -> Parameter:
+def free_parameter(
+    variable: Variable, name: str, target: str, *, strength: bool, hints: SearchHints = NO_HINTS
+) -> Parameter:
     """A parameter that a variant has brought, at its FMU's value; a strength begins at 0.
 
     Args:
@@ -227,6 +226,7 @@ def free_parameter(variable: Variable, name: str, target: str, *, strength: bool
         name: of the parameter.
         target: full variable name.
         strength: whether 0 is exact absence.
+        hints: of the FMU, as they are in the system.
     """
     start = float(variable.start[0] or 0.0) if variable.start else 0.0
     span = abs(start) or variable.nominal or 1.0
@@ -234,7 +234,7 @@ def free_parameter(variable: Variable, name: str, target: str, *, strength: bool
     high = 100.0 * span if variable.maximum is None else variable.maximum
     return Parameter(
         name, variable.symbol, 0.0 if strength else start, low, high, ((target, 1.0),), "effect",
-        strength=strength, span=span, text=variable.text,
+        strength=strength, span=span, text=variable.text, hints=hints,
     )  # fmt: skip
 
 

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..master.session import RUNAWAY, Session
-from ..system.system import System
 from .parts import Vector
 
 MOST = 128
@@ -62,8 +61,8 @@ class Ran(NamedTuple):
         return self.cost <= limit and calm
 
 
-class Pool:
-    """Idle sessions, the systems that they run and what they gave, the ones used last."""
+class SessionPool:
+    """Idle sessions and what they gave, the ones used last."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -71,7 +70,6 @@ class Pool:
         self._size = 0
         self._idle: dict[Key, list[tuple[object, Session]]] = {}
         self._count = 0
-        self._systems: dict[Hashable, System] = {}
 
     def take(self, key: Key) -> Session | None:
         """An idle session, if there is one; nobody else gets it until it is given back."""
@@ -129,19 +127,9 @@ class Pool:
         old = self._ran.pop(place, None)
         self._size -= old.rows.nbytes if old else 0
 
-    def system(self, kind: Hashable) -> System | None:
-        """The system of a kind of problem, if it was kept."""
-        return self._systems.get(kind)
-
-    def keep(self, kind: Hashable, system: System) -> System:
-        """Keep a system; the one that counts, where two threads have made one."""
-        with self._lock:
-            return self._systems.setdefault(kind, system)
-
     def close(self, kind: Hashable) -> None:
         """Free what is idle of one kind of problem."""
         with self._lock:
-            self._systems.pop(kind, None)
             found = [e for key in list(self._idle) if key.kind == kind for e in self._taken(key)]
         for _, session in found:
             session.close()

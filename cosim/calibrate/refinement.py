@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from ..system.variants import apply
+from ..spec.hints import NO_HINTS, from_json
 from .parts import Parameter, adjustable, free_parameter
 from .problem import Problem
 
@@ -52,10 +52,9 @@ class Refinement:
         Raises:
             VariantError, UnknownNameError: it does not fit.
         """
-        changed = problem._with(
-            instances=apply(problem.instances, {instance: self.fidelity}, problem.provider)
-        )
-        variables = changed.system().members[instance].description.variables
+        changed = problem.changed(model=problem.model.changed({instance: self.fidelity}))
+        description = changed.system().members[instance].description
+        variables, hints = description.variables, from_json(description.extra)
         before = problem.system().members[instance].description.variables
         constants = {f"{instance}.{name}": value for name, value in self.held}
         place = f"{instance}.{self.port}" if self.port else instance
@@ -75,9 +74,12 @@ class Refinement:
                     )
                 )  # fmt: skip
             elif name == self.parameter:
-                usual = changed.system().members[instance].description.extra.get("tries", {})
-                strength = free_parameter(variable, prefix + _own(name), full, strength=True)
-                added.append(replace(strength, tries=tuple(map(float, usual.get(name, ())))))
+                added.append(
+                    free_parameter(
+                        variable, prefix + _own(name), full, strength=True,
+                        hints=hints.get(name, NO_HINTS).within(instance),
+                    )
+                )  # fmt: skip
             elif name in self.others or (
                 not self.port
                 and adjustable(variable)
@@ -85,7 +87,7 @@ class Refinement:
                 and name not in dict(self.held)
             ):
                 added.append(free_parameter(variable, prefix + _own(name), full, strength=False))
-        return changed._with(
+        return changed.changed(
             parameters=[*problem.parameters, *added], constants={**problem.constants, **constants}
         )
 

@@ -25,7 +25,7 @@ from scipy.stats import t as student
 from ..errors import FmuCallError
 from ..files import atomic
 from .estimate import Estimate
-from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 LEVEL = 0.05
@@ -55,17 +55,18 @@ def significance_limit(samples: int, parameters: int, level: float = LEVEL) -> f
 
 
 def correlation_index(
-    problem: Problem, theta: Vector, samples: int = 64, *, width: float = 0.5, seed: int = 0
+    simulator: Simulator, theta: Vector, samples: int = 64, *, width: float = 0.5, seed: int = 0
 ) -> Correlation:
     """Correlate declared parameters with the residual over random parameter sets.
 
     Args:
-        problem: what is simulated, on its identification runs.
+        simulator: of the problem, whose identification runs count.
         theta: centre of the sets, and the values of all other parameters.
         samples: parameter sets.
         width: half width of the sets' range over the parameters' spans.
         seed: of the Latin hypercube.
     """
+    problem = simulator.problem
     chosen = [i for i, p in enumerate(problem.parameters) if p.role != "nuisance" and not p.run]
     cube = qmc.LatinHypercube(len(chosen), rng=seed).random(samples) * 2.0 - 1.0
     sets, costs = [], []
@@ -74,7 +75,7 @@ def correlation_index(
         moved[chosen] += width * row * problem.scale[chosen]
         moved = np.clip(moved, problem.lower, problem.upper)
         try:
-            residuals = problem.residuals(moved)
+            residuals = simulator.residuals(moved)
         except FmuCallError:
             continue
         squares = np.concatenate([r[np.isfinite(r)] for _, r in residuals]) ** 2

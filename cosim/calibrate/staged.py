@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
-from .fit import PURPOSE, Known, fit
+from .fit import DRAFT, fit
+from .known import Known
 from .loss import loss_for, mean_squares
 from .nuisance import released, starts
-from .problem import Problem
+from .parts import PURPOSE
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 PASSES, PAYS = 4, 0.1
@@ -34,108 +36,103 @@ ADVANCES, FARTHER = 6, 1.02
 """Fits of what the model has not left at most, and the factor by which each must reach farther."""
 
 
-def staged(problem: Problem, theta: Vector, purpose: str = PURPOSE) -> tuple[Problem, Vector]:
+def staged(simulator: Simulator, theta: Vector, purpose: str = PURPOSE) -> tuple[Simulator, Vector]:
     """The calmer half of the runs fitted, late values estimated in all, nothing fitted to all yet.
 
     Args:
-        problem: with late parameters.
+        simulator: of a problem with late parameters.
         theta: a fit of all runs.
         purpose: runs to fit.
 
     Returns:
-        The problem with late values held, and its parameters.
+        Of the problem with late values held, and its parameters.
     """
+    problem = simulator.problem
     costs, loss = [], loss_for(problem.unstable)
-    for name, residual in problem.residuals(theta, purpose):
+    for name, residual in simulator.residuals(theta, purpose):
         count = int(np.isfinite(residual).sum())
         costs.append((loss.cost(residual) / max(count, 1), name))
     calm = [name for _, name in sorted(costs)[: (len(costs) + 1) // 2]]
-    part = problem.only(calm)
-    limits = part.limits = problem.limits
-    values = theta[[problem.index(name) for name in part.names]]
+    part = simulator.of(problem.only(calm))
+    names = part.problem.names
+    values = theta[[problem.index(name) for name in names]]
     before = np.inf
     for _ in range(PASSES):
         part, values, _ = released(part, values)
-        part.limits = limits
-        found = fit(part, values, calm, near=True, draft=True)
+        found = fit(part, values, calm, effort=DRAFT)
         values = found.theta
         beyond = found.robust - 0.5 * found.count
         if not beyond < (1.0 - PAYS) * before:
             break
         before = beyond
     theta = theta.copy()
-    theta[[problem.index(name) for name in part.names]] = values
-    runs = [part.run(run.name) if run.name in calm else run for run in problem.runs]
-    whole = problem._with(runs=runs)
-    whole.limits = limits
-    whole, theta = _advanced(whole, theta, purpose)
+    theta[[problem.index(name) for name in names]] = values
+    runs = [part.problem.run(run.name) if run.name in calm else run for run in problem.runs]
+    whole, theta = _advanced(simulator.of(problem.changed(runs=runs)), theta, purpose)
     whole, theta, _ = released(whole, theta)
-    whole.limits = limits
     return whole, theta
 
 
-def _advanced(problem: Problem, theta: Vector, purpose: str) -> tuple[Problem, Vector]:
+def _advanced(simulator: Simulator, theta: Vector, purpose: str) -> tuple[Simulator, Vector]:
     """All runs fitted up to where the model leaves them, as long as that gets farther."""
-    limits, before = problem.limits, 0
+    before = 0
     for _ in range(ADVANCES):
-        part, late, _ = released(_cut(problem, theta, purpose, LEAST), theta)
-        problem = _begun(problem, part)
-        part = _cut(problem, late, purpose)
-        part.limits = limits
-        count = sum(run.times.size for run in part.chosen(purpose))
+        part, late, _ = released(_cut(simulator, theta, purpose, LEAST), theta)
+        simulator = _begun(simulator, part)
+        part = _cut(simulator, late, purpose)
+        count = sum(run.times.size for run in part.problem.chosen(purpose))
         if count < FARTHER * before:
             break
         try:
             part, theta, _ = jointly(part, late, purpose)
         except FmuCallError:  # too steep for derivatives: what follows begins here
             break
-        problem, before = _begun(problem, part), count
-        if count == sum(run.times.size for run in problem.chosen(purpose)):
+        simulator, before = _begun(simulator, part), count
+        if count == sum(run.times.size for run in simulator.problem.chosen(purpose)):
             break
-    return problem, theta
+    return simulator, theta
 
 
 def jointly(
-    problem: Problem, theta: Vector, purpose: str = PURPOSE
-) -> tuple[Problem, Vector, Known]:
+    simulator: Simulator, theta: Vector, purpose: str = PURPOSE
+) -> tuple[Simulator, Vector, Known]:
     """All parameters fitted together with late values: in turn they would hold each other up.
 
     Returns:
-        The problem with late values held at what was found, its parameters, and derivatives there.
+        Of the problem with late values held at what was found, its parameters, and derivatives
+        there.
     """
+    problem = simulator.problem
     names = {run.name for run in problem.chosen(purpose)}
     late = [p for p in problem.late if p.run in names]
     whole = problem.with_parameters([*problem.parameters, *late])
-    whole.limits = problem.limits
     known = dict(zip((p.name for p in problem.late), starts(problem), strict=True))
     begun = np.concatenate([theta, [known[p.name] for p in late]])
-    found = fit(whole, np.clip(begun, whole.lower, whole.upper), purpose, near=True, draft=True)
+    begun = np.clip(begun, whole.lower, whole.upper)
+    found = fit(simulator.of(whole), begun, purpose, effort=DRAFT)
     held = whole.hold({p.name: found.values[p.name] for p in late})
-    held.limits = problem.limits
-    return held, found.theta[: theta.size], Known.of(found)
+    return simulator.of(held), found.theta[: theta.size], found.known
 
 
-def _begun(problem: Problem, other: Problem) -> Problem:
-    """A problem whose runs begin as those of another one."""
-    runs = [replace(run, starts=other.run(run.name).starts) for run in problem.runs]
-    changed = problem._with(runs=runs)
-    changed.limits = problem.limits
-    return changed
+def _begun(simulator: Simulator, other: Simulator) -> Simulator:
+    """Of a problem whose runs begin as those of another one."""
+    problem = simulator.problem
+    runs = [replace(run, starts=other.problem.run(run.name).starts) for run in problem.runs]
+    return simulator.of(problem.changed(runs=runs))
 
 
-def _cut(problem: Problem, theta: Vector, purpose: str, most: float = 1.0) -> Problem:
-    """The problem with runs that end where the model has left them."""
+def _cut(simulator: Simulator, theta: Vector, purpose: str, most: float = 1.0) -> Simulator:
+    """Of the problem with runs that end where the model has left them."""
     sizes = {}
-    for name, residual in problem.residuals(theta, purpose):
+    for name, residual in simulator.residuals(theta, purpose):
         gone = np.flatnonzero(np.any(mean_squares(residual) > LEFT, axis=1))
         count = len(residual)
         first = int(gone[0]) if gone.size else count
         sizes[name] = max(min(first, math.ceil(most * count)), math.ceil(LEAST * count))
+    problem = simulator.problem
     cut = [
         replace(run, times=run.times[: sizes[run.name]], data=run.data[: sizes[run.name]])
         if run.name in sizes else run
         for run in problem.runs
     ]  # fmt: skip
-    part = problem._with(runs=cut)
-    part.limits = problem.limits
-    return part
+    return simulator.of(problem.changed(runs=cut))

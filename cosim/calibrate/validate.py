@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CosimError
-from .parts import Run
+from .parts import MeasuredRun
 from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 SHORT = 50
@@ -88,7 +89,7 @@ def check_data(problem: Problem) -> list[Finding]:
     return found
 
 
-def _check_times(run: Run) -> Iterator[Finding]:
+def _check_times(run: MeasuredRun) -> Iterator[Finding]:
     steps = np.diff(run.times)
     if run.times.size < SHORT:
         text = f"has {run.times.size} samples; a run needs {SHORT} or more"
@@ -108,7 +109,7 @@ def _check_times(run: Run) -> Iterator[Finding]:
         yield Finding("warning", "jitter", run.name, "time", text)
 
 
-def _check_columns(problem: Problem, run: Run) -> Iterator[Finding]:
+def _check_columns(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:
     for name, signal in run.inputs.items():
         values = np.asarray(signal.at(run.times))
         if np.ptp(values) == 0.0:
@@ -151,11 +152,12 @@ def _check_columns(problem: Problem, run: Run) -> Iterator[Finding]:
             yield Finding("error", "constant", run.name, channel.name, text)
 
 
-def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
+def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Finding]:
     """Problems that show against the model (at nominal values if `theta` is not given).
 
     Wrong parameters look like a shifted clock, too, so at nominal values that must be more evident.
     """
+    problem = simulator.problem
     evident = 100.0 if theta is None else 4.0
     theta = problem.nominal if theta is None else theta
     found: list[Finding] = []
@@ -164,7 +166,7 @@ def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
         models = dict(
             zip(
                 [run.name for run in problem.runs],
-                problem.spread(lambda run: problem.simulate(theta, run), problem.runs),
+                simulator.spread(lambda run: simulator.simulate(theta, run), problem.runs),
                 strict=True,
             )
         )
@@ -177,12 +179,12 @@ def check_model(problem: Problem, theta: Vector | None = None) -> list[Finding]:
     pairs = {name for f in swaps for name in f.column.split(" and ")}
     found = [f for f in found if not f.run or f.column not in pairs] + swaps
     found += _check_clocks(problem, models, evident)
-    found += _check_inputs(problem, models, theta)
+    found += _check_inputs(simulator, models, theta)
     return found
 
 
 def _centred(problem: Problem, models: dict[str, Vector], data: int, model: int,
-             run: Run) -> tuple[Vector, Vector]:  # fmt: skip
+             run: MeasuredRun) -> tuple[Vector, Vector]:  # fmt: skip
     measured, simulated = run.data[:, data], models[run.name][:, model]
     good = np.isfinite(measured) & np.isfinite(simulated)
     measured, simulated = measured[good], simulated[good]
@@ -326,8 +328,11 @@ def _best_lag(measured: Vector, simulated: Vector, reach: int, sigma: float) -> 
     return best, misfit(0) / (misfit(best) + sigma**2)
 
 
-def _check_inputs(problem: Problem, models: dict[str, Vector], theta: Vector) -> Iterator[Finding]:
+def _check_inputs(
+    simulator: Simulator, models: dict[str, Vector], theta: Vector
+) -> Iterator[Finding]:
     """Pairs of inputs that explain the data far better when exchanged."""
+    problem = simulator.problem
     run = max(problem.runs, key=lambda item: _cost(problem, item, models[item.name]))
     straight = _cost(problem, run, models[run.name])
     if straight < 10.0 * run.data.size:
@@ -336,8 +341,9 @@ def _check_inputs(problem: Problem, models: dict[str, Vector], theta: Vector) ->
     for a, first in enumerate(names):
         for second in names[a + 1 :]:
             exchanged = {**run.inputs, first: run.inputs[second], second: run.inputs[first]}
-            trial = problem._with(runs=[replace(run, inputs=exchanged)], parameters=[
-                p for p in problem.parameters if p.run in ("", run.name)])  # fmt: skip
+            trial = simulator.of(
+                problem.only([run.name]).changed(runs=[replace(run, inputs=exchanged)])
+            )
             try:
                 model = trial.simulate(theta[problem.columns(run.name)], run.name)
             except CosimError:
@@ -350,5 +356,5 @@ def _check_inputs(problem: Problem, models: dict[str, Vector], theta: Vector) ->
                 yield Finding("error", "swapped", "", columns[0], text)
 
 
-def _cost(problem: Problem, run: Run, model: Vector) -> float:
+def _cost(problem: Problem, run: MeasuredRun, model: Vector) -> float:
     return float(np.nansum(((run.data - model) / problem.sigma) ** 2))

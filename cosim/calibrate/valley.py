@@ -7,17 +7,13 @@ beside parameters that are known a million times better, that is not well enough
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
-from .normal import Normal, gradient
-from .weak import KNOWN
-
-if TYPE_CHECKING:
-    from .fit import Descent
+from .descent import Descent
+from .normal import KNOWN, Normal, gradient
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
@@ -141,7 +137,7 @@ def _made_up(run: Descent, inverse: Vector, change: Vector) -> tuple[Vector, flo
     """
     p = run.problem
     theta = np.clip(run.theta + change * p.scale, p.lower, p.upper)
-    residuals = p.residuals(theta, run.purpose)
+    residuals = run.simulator.residuals(theta, run.purpose)
     cost = run.total(theta, residuals)
     for _ in range(FOLLOWED):
         step = inverse @ gradient(p, theta, run.jacobian, residuals, run.loss) * p.scale
@@ -149,7 +145,7 @@ def _made_up(run: Descent, inverse: Vector, change: Vector) -> tuple[Vector, flo
         for parts in (LONGER, (SHORTER,)):
             for part in parts:
                 there = np.clip(begun + part * step, p.lower, p.upper)
-                moved = p.residuals(there, run.purpose)
+                moved = run.simulator.residuals(there, run.purpose)
                 if not (after := run.total(there, moved)) < cost:
                     break
                 theta, residuals, cost = there, moved, after

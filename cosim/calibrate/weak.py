@@ -7,20 +7,14 @@ same factor).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
-from .normal import gradient
-
-if TYPE_CHECKING:
-    from .fit import Descent
+from .descent import Descent
+from .normal import KNOWN, gradient
 
 Vector = NDArray[np.float64]
-KNOWN = 0.25
-"""A combination is identifiable if its standard deviation is below this fraction of the span."""
 WEAK = 1e-3
 """Share of the best known direction's information up to which a direction is measured again."""
 LONG, SHORT = 0.1, 0.01
@@ -69,7 +63,7 @@ def confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Ve
                 continue
             try:
                 there = np.clip(run.theta + length * way, p.lower, p.upper)
-                moved = p.residuals(there, run.purpose)
+                moved = run.simulator.residuals(there, run.purpose)
             except FmuCallError:
                 continue
             pairs = zip(moved, base, strict=True)

@@ -13,13 +13,14 @@ import itertools
 import json
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError
+from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError, listing
 from ..installation import places
 from ..installation.builder import default_provider, naming_errors, sources
 from ..master import algorithms
@@ -106,25 +107,30 @@ def _describe_file(path: Path) -> dict[str, Any]:
 
 @fmus_app.command("list")
 def fmus_list(
-    component: Annotated[str, typer.Argument(help="Only variants of this component.")] = "",
+    component: Annotated[str, typer.Argument(help="Variants of this component.")] = "",
+    every: Annotated[bool, typer.Option("--all", help="All variants of all components.")] = False,
+    containing: Annotated[
+        str, typer.Option("--filter", help="Only variants whose name contains this.")
+    ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """List the component catalogue.
+    """List the component catalogue: components, or variants with what they offer.
 
-    Example: `cosim fmus list gearbox`
+    With --json always variants, of all components if none is named.
+
+    Example: `cosim fmus list`, `cosim fmus list gearbox`, `cosim fmus list --filter backlash`
     """
-    try:
-        catalog = sources("packaging.catalog")
-        with naming_errors():
-            names = [name for name in catalog.names() if _is_of(name, component)]
-            entries = [catalog.describe(name) for name in names]
-    except VariantError:
-        if places.in_checkout():
-            raise
-        found = [_describe_file(path) for path in sorted(places.fmus().rglob("*.fmu"))]
-        entries = [entry for entry in found if _is_of(entry["variant"], component)]
-    if component and not entries:
-        raise VariantError(f"no variant of a component {component!r}; see 'cosim fmus list'")
+    if not (component or every or containing or as_json):
+        _print_components(_components())
+        return
+    entries = [
+        entry for entry in _variants(component, containing) if containing in entry["variant"]
+    ]
+    if component and not entries and not containing:
+        raise VariantError(
+            f"no variant of a component {component!r}; "
+            f"{listing((entry['component'] for entry in _components()), component)}"
+        )
     if as_json:
         _print_json(entries)
         return
@@ -133,6 +139,50 @@ def fmus_list(
         counts = [str(len(entry[key])) for key in ("inputs", "outputs", "parameters")]
         table.add_row(entry["variant"], *counts, entry["description"])
     _console().print(table)
+
+
+def _components() -> list[dict[str, Any]]:
+    """The catalogue by component: from the sources, else from the installed FMUs."""
+    try:
+        found: list[dict[str, Any]] = sources("packaging.catalog").overview()
+        return found
+    except VariantError:
+        if places.in_checkout():
+            raise
+    grouped: dict[str, dict[str, Any]] = {}
+    for entry in map(_describe_file, sorted(places.fmus().rglob("*.fmu"))):
+        group = grouped.setdefault(
+            entry["component"],
+            {"component": entry["component"], "description": entry["description"],
+             "fidelities": [], "devices": []},
+        )  # fmt: skip
+        if entry["fidelity"] not in group["fidelities"]:
+            group["fidelities"].append(entry["fidelity"])
+    return list(grouped.values())
+
+
+def _variants(component: str, containing: str) -> list[dict[str, Any]]:
+    try:
+        catalog = sources("packaging.catalog")
+    except VariantError:
+        if places.in_checkout():
+            raise
+        found = [_describe_file(path) for path in sorted(places.fmus().rglob("*.fmu"))]
+        return [entry for entry in found if _is_of(entry["variant"], component)]
+    known = [entry["component"] for entry in catalog.overview()]
+    if component and component not in known:
+        return []
+    with naming_errors():
+        return [catalog.describe(n) for n in catalog.names(component) if containing in n]
+
+
+def _print_components(entries: list[dict[str, Any]]) -> None:
+    table = _table("component", "fidelities", "devices", "description")
+    for entry in entries:
+        lists = [", ".join(entry[key]) for key in ("fidelities", "devices")]
+        table.add_row(entry["component"], *lists, entry["description"])
+    _console().print(table)
+    _say("'cosim fmus list COMPONENT' has the variants of one with their inputs and outputs")
 
 
 def _is_of(variant: str, component: str) -> bool:
@@ -145,7 +195,7 @@ def _is_of(variant: str, component: str) -> bool:
 def fmus_build(
     variants: Annotated[
         list[str] | None,
-        typer.Argument(help="E.g. gearbox/elastic+backlash [all]."),
+        typer.Argument(help="E.g. gearbox/elastic+backlash, or gearbox for its fidelities [all]."),
     ] = None,
     fmi: Annotated[int, typer.Option(help="FMI version.", min=2, max=3)] = 2,
     kind: Annotated[Kind, typer.Option(help="C code, or the Python twin.")] = Kind.native,
@@ -162,8 +212,8 @@ def fmus_build(
     build_many = sources("packaging.build").build_many
     folder = out or (places.fmus() if places.in_checkout() else Path("fmus"))
     with naming_errors():
-        names = list(variants or sources("packaging.catalog").names())
-        for name in variants or ():  # bad names are found before anything is built
+        names = _asked(variants or ())
+        for name in names if variants else ():  # bad names are found before anything is built
             sources("variant").build_model(name)
     if kind is Kind.python and fmi == 3:
         raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
@@ -183,6 +233,23 @@ def fmus_build(
     else:
         for item in paths:
             typer.echo(item["file"])
+
+
+def _asked(variants: Sequence[str]) -> list[str]:
+    """Names of variants; a component means all of its fidelities, nothing means everything."""
+    catalog = sources("packaging.catalog")
+    if not variants:
+        return list(catalog.names())
+    fidelities = {entry["component"]: entry["fidelities"] for entry in catalog.overview()}
+    return [
+        name
+        for asked in variants
+        for name in (
+            [f"{asked}/{fidelity}" for fidelity in fidelities[asked]]
+            if asked in fidelities
+            else [asked]
+        )
+    ]
 
 
 @fmus_app.command("check")

@@ -43,19 +43,21 @@ def calibrate_command(
     from ..calibrate.fit import fit
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
+    from ..calibrate.simulator import Simulator
     from ..calibrate.validate import check_data, check_model
 
     started = time.perf_counter()
-    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    problem = read_problem(dataset, mapping=mapping, system=system)
+    simulator = Simulator(problem, workers=workers)
     findings = check_data(problem)
     if not any(f.severity == "error" for f in findings):
-        findings += check_model(problem)
+        findings += check_model(simulator)
     for finding in findings:
         typer.echo(str(finding), err=True)
     if any(f.severity == "error" for f in findings):
         raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
-    estimate = fit(problem)
-    correlation = correlation_index(problem, estimate.theta, samples) if samples else None
+    estimate = fit(simulator)
+    correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
     content["wall_s"] = time.perf_counter() - started
     folder = make_folder(out or Path("out") / problem.name)
@@ -115,7 +117,7 @@ def calibration_table(
             "correlation_limit": correlation.limit if correlation else None,
         },
         "findings": [finding.to_dict() for finding in findings],
-        "evaluations": estimate.problem.evaluations,
+        "evaluations": estimate.simulator.evaluations,
     }  # fmt: skip
 
 
@@ -126,7 +128,8 @@ def validation_rms(estimate: Estimate) -> dict[str, float]:
 
     problem = estimate.problem
     names = [run.name for run in problem.runs if run.purpose == "validation"]
-    return channel_rms(problem, problem.residuals(settled(problem, estimate.theta, names), names))
+    theta = settled(estimate.simulator, estimate.theta, names)
+    return channel_rms(problem, estimate.simulator.residuals(theta, names))
 
 
 def _scaled(value: float | None, sigma: float) -> float | None:

@@ -39,12 +39,13 @@ def diagnose_command(
     from ..diagnose import diagnose
     from ..report import write_page
 
-    problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
+    problem = read_problem(dataset, mapping=mapping, system=system)
     folder = make_folder(out or Path("out") / problem.name)
     begun = time.monotonic()
     result = diagnose(
         problem, folder,
         lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
+        workers=workers,
     )  # fmt: skip
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.loss import WINDOW
-from ..calibrate.parts import Run
-from .linear import Layout
+from ..calibrate.parts import MeasuredRun
+from .linear import SampleStack
 
 Vector = NDArray[np.float64]
 SUDDEN = 5.0
@@ -19,10 +19,10 @@ SUDDEN = 5.0
 never reach 3."""
 
 
-def bursts(residual: Vector, layout: Layout) -> dict[str, NDArray[np.bool_]]:
+def bursts(residual: Vector, stack: SampleStack) -> dict[str, NDArray[np.bool_]]:
     """Run -> samples in windows with a burst in any channel, and in the windows beside them."""
     found = {}
-    for run, values in zip(layout.runs, layout.by_run(residual), strict=True):
+    for run, values in zip(stack.runs, stack.by_run(residual), strict=True):
         sudden = np.zeros(len(values), dtype=np.bool_)
         for first in range(0, len(values), WINDOW):
             part = values[first : first + WINDOW]
@@ -35,7 +35,7 @@ def bursts(residual: Vector, layout: Layout) -> dict[str, NDArray[np.bool_]]:
 
 
 def times(
-    found: dict[str, NDArray[np.bool_]], runs: list[Run]
+    found: dict[str, NDArray[np.bool_]], runs: list[MeasuredRun]
 ) -> dict[str, list[tuple[float, float]]]:
     """First and last time of each burst, by run."""
     return {run.name: _spans(run.times, found[run.name]) for run in runs if run.name in found}

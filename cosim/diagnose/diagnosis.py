@@ -14,23 +14,24 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError, ScenarioError
 from ..files import atomic
 from ..system.provider import locate
-from ..system.variants import apply
 from .bursts import bursts, times
 from .deferred import step_error
-from .exchange import is_open, reconsidered
+from .exchange import reconsidered
 from .experiment import propose
 from .further import Further, judged
-from .linear import Layout
+from .linear import SampleStack
 from .localise import Place, localise
-from .models import Fitted
+from .models import Fitted, is_open
 from .power import power
-from .search import ROUNDS, Round, Search
-from .structure import Structure, structures
+from .rounds import Round
+from .search import ROUNDS, Search
 from .unstable import ends
+from .whiteness import WhitenessTest, whiteness_tests
 
 Vector = NDArray[np.float64]
 PURPOSES = ("identification", "validation")
@@ -70,7 +71,7 @@ class Diagnosis:
     located: list[Place] = field(default_factory=list)
     places: dict[str, list[str]] = field(default_factory=dict)
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
-    structure: dict[tuple[str, str], list[Structure]] = field(default_factory=dict)
+    structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
@@ -224,7 +225,11 @@ class Diagnosis:
 
 
 def diagnose(
-    problem: Problem, out: Path | None = None, say: Callable[[str], None] = lambda text: None
+    problem: Problem,
+    out: Path | None = None,
+    say: Callable[[str], None] = lambda text: None,
+    *,
+    workers: int | None = None,
 ) -> Diagnosis:
     """Close the loop on one data set.
 
@@ -232,21 +237,23 @@ def diagnose(
         problem: the declared system and its data.
         out: folder for the FMUs with the effects.
         say: told what is done.
+        workers: threads, one per core if not given.
 
     Raises:
         CosimError: the declared system cannot be simulated.
     """
     begun = time.perf_counter()
+    simulator = Simulator(problem, workers=workers)
     findings = check_data(problem)
     if not any(f.severity == "error" for f in findings):
-        findings += check_model(problem)
+        findings += check_model(simulator)
     errors = [str(f) for f in findings if f.severity == "error"]
     if errors:
         result = Diagnosis(problem, "bad_data", "; ".join(errors))
         result.warnings = [str(f) for f in findings if f.severity != "error"]
         result.wall = time.perf_counter() - begun
         return result
-    search = Search(problem, say)
+    search = Search(simulator, say)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
@@ -322,7 +329,7 @@ def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitt
         return current
     names = [*search.fitting.names, *search.checking.names]
     try:
-        sizes = ends(current.problem, current.estimate.theta, list(dict.fromkeys(names)))
+        sizes = ends(current.simulator, current.estimate.theta, list(dict.fromkeys(names)))
     except CosimError as error:  # it runs so well that a small change is too much
         search.say(f"where runs turn unstable is not known: {error}")
         return current
@@ -338,10 +345,10 @@ def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitt
     return search.shortened(current, sizes)
 
 
-def _tests(search: Search, fitted: Fitted, purpose: str) -> list[Structure]:
+def _tests(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest]:
     if purpose == PURPOSES[0]:
-        return structures(search.fit_data - fitted.fit, search.fitting)
-    return structures(search.check_data - fitted.check, search.checking)
+        return whiteness_tests(search.fit_data - fitted.fit, search.fitting)
+    return whiteness_tests(search.check_data - fitted.check, search.checking)
 
 
 def _judge(result: Diagnosis, winners: list[Round]) -> None:
@@ -357,9 +364,9 @@ def _judge(result: Diagnosis, winners: list[Round]) -> None:
         for purpose in PURPOSES:
             runs = [r for r in result.problem.runs if r.purpose == purpose]
             if runs:
-                layout = Layout(result.problem, runs)
-                vector = layout.vector([result.residuals[which, r.name] for r in runs])
-                result.structure[which, purpose] = structures(vector, layout)
+                stack = SampleStack(result.problem, runs)
+                vector = stack.vector([result.residuals[which, r.name] for r in runs])
+                result.structure[which, purpose] = whiteness_tests(vector, stack)
     left = {
         s.channel
         for purpose in PURPOSES
@@ -422,12 +429,13 @@ def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     step = result.problem.step
     whole = {run.name: run for run in result.problem.runs}
     runs = [replace(whole[run.name], starts=run.starts) for run in fitted.problem.runs]
-    problem = fitted.problem._with(runs=runs, step=step)
+    problem = fitted.problem.changed(runs=runs, step=step)
+    simulator = fitted.simulator.limited({}).of(problem)
     theta = fitted.estimate.theta
-    errors = step_error(problem, theta, step)
-    for name, residual in problem.residuals(theta, None):
+    errors = step_error(simulator, theta, step)
+    for name, residual in simulator.residuals(theta, None):
         result.residuals[which, name] = residual + errors[name] / problem.sigma
-    problem.close()
+    simulator.close()
 
 
 def _look_further(result: Diagnosis) -> None:
@@ -442,7 +450,8 @@ def _look_further(result: Diagnosis) -> None:
             wrong = [f for f in check_data(problem) if f.run and f.severity == "error"]
             if wrong:
                 raise ScenarioError("; ".join(map(str, wrong)))
-            result.further.append(judged(problem, result.problem, result.before, result.after))
+            simulator = Simulator(problem, workers=result.search.simulator.workers)
+            result.further.append(judged(simulator, result.problem, result.before, result.after))
         except CosimError as error:  # they are an extra: the verdict stands without them
             result.warnings.append(f"further runs are not judged: {error}")
 
@@ -450,13 +459,13 @@ def _look_further(result: Diagnosis) -> None:
 def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:
     """Copy the FMUs that carry the effects into the output folder."""
     assert result.after is not None
-    instances = result.problem.instances
+    model = result.problem.model
     for item in result.after.effects:
-        instances = apply(instances, item.change, result.problem.provider)
+        model = model.changed(item.change)
     files = []
     for name in dict.fromkeys(item.instance for item in result.after.effects):
         try:
-            source = locate(instances[name], result.problem.provider)
+            source = locate(model.instances[name], result.problem.provider)
         except CosimError as error:
             result.warnings.append(str(error))
             continue

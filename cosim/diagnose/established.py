@@ -6,14 +6,11 @@ start values of the runs, or beside moments that no model gets right.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..errors import CosimError
 from .exchange import challenged
+from .late import LateFitter
 from .models import GATE, Fitted, compare
-
-if TYPE_CHECKING:
-    from .search import Round, Search
+from .rounds import Round
 
 HAIR = 0.005
 """Share of what the winner explains that a simpler law may leave, where nothing that the winner has
@@ -23,7 +20,7 @@ PART = 0.2
 unstable: moments that come too early are most of that, and any law moves them a little."""
 
 
-def settle(search: Search, base: Fitted, stage: Round) -> None:
+def settle(search: LateFitter, base: Fitted, stage: Round) -> None:
     """Replace a winner by a simpler law where nothing else of it is determined.
 
     Args:
@@ -39,10 +36,10 @@ def settle(search: Search, base: Fitted, stage: Round) -> None:
     search.say(f"{winner.effects[-1].label}: nothing of it but {simple.effects[-1].effect} shows")
     stage.winner = simple
     challenged(search, base, stage)  # its places have been compared by the other law only
-    search.follow(stage, search.sharpened(stage.winner, base))
+    stage.follow(search.sharpened(stage.winner, base))
 
 
-def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
+def _simpler(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
     """The best simpler law of the same quantity, if nothing else of the winner is determined."""
     winner = stage.winner
     assert winner is not None and winner.signature is not None
@@ -69,7 +66,7 @@ def _simpler(search: Search, base: Fitted, stage: Round) -> Fitted:
     return max(laws, key=lambda f: search.total(base, f), default=winner)
 
 
-def needed(search: Search, base: Fitted, stage: Round) -> None:
+def needed(search: LateFitter, base: Fitted, stage: Round) -> None:
     """Take a further effect back that the model from where it ended does as well without.
 
     Only where runs may turn unstable. The round then has no winner, and perhaps a better base.

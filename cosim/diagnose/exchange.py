@@ -9,25 +9,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.estimate import Estimate
-from ..calibrate.fit import QUICKLY
 from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
-from .models import GATE, Fitted, compare, more_general
+from .fitter import QUICKLY
+from .judge import ALIKE, Judge
+from .late import LateFitter
+from .models import GATE, Fitted, absent, compare, more_general
+from .rounds import Round
 from .signature import Signature
 
-if TYPE_CHECKING:
-    from .search import Round, Search
-
 Vector = NDArray[np.float64]
-OPEN = 4.0
-"""Mean square over the noise's from which the best model of a round evidently lacks more."""
 NEARLY = 0.8
 """Rivals gained this share of what the best one did; their fits were rough."""
 HOPEFUL = 0.5
@@ -47,18 +43,13 @@ MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
 
-def is_open(estimate: Estimate) -> bool:
-    """Whether a fitted model evidently lacks something."""
-    return 2.0 * estimate.robust > OPEN * estimate.count
-
-
-def nearly(search: Search, base: Fitted, stage: Round) -> frozenset[Candidate]:
+def nearly(search: LateFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:
     """Candidates whose fits gain nearly as much as the best quick one did."""
     least = NEARLY * stage.quick
     return frozenset(f.effects[-1] for f in stage.fitted if search.total(base, f) > least)
 
 
-def reconsidered(search: Search, fitted: Fitted, rounds: list[Round]) -> Fitted:
+def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:
     """The model with early choices exchanged where that is better.
 
     Rounds get the winner and the rivals that the last model shows. One that was not open is asked
@@ -129,7 +120,7 @@ def _wider(first: Fitted, second: Fitted) -> bool:
 
 
 def _told_apart(
-    search: Search, present: Fitted, base: Fitted, trials: list[tuple[Fitted, Fitted | None]]
+    search: LateFitter, present: Fitted, base: Fitted, trials: list[tuple[Fitted, Fitted | None]]
 ) -> list[tuple[Fitted, Fitted | None]]:
     """Models that could take another's place, the best first, thoroughly fitted if they are near.
 
@@ -150,11 +141,11 @@ def _told_apart(
     return sorted(found, key=lambda pair: -search.gains(present, pair[0])[0])
 
 
-def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
+def challenged(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
     """The winner of a round, or its effect elsewhere or another law, if that does as well.
 
     Fits that end at different distances from their minima would tell laws apart that are one; so
-    all of these are fitted from where the winner's parameters are, down to `fit.SETTLED`.
+    all of these are fitted from where the winner's parameters are, down to `descent.SETTLED`.
 
     Args:
         search: fits and judges.
@@ -167,7 +158,7 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
     while others := _alike(search, base, stage, set(settled)):
         if not settled:
             first = winner
-            close = search.fitted(first.problem, first.estimate.theta, first.estimate, share=0.0)
+            close = search.fitted(first.simulator, first.estimate.theta, first.estimate, share=0.0)
             winner = search.again(close, first, base)
             stage.fitted = [winner if f is first else f for f in stage.fitted]
             settled[winner.effects[-1]] = winner
@@ -181,7 +172,7 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
                 continue  # more general than one that does as well
             try:
                 # without the winner's effect, and with its late values
-                less = base.problem._with(runs=winner.problem.runs)
+                less = base.problem.changed(runs=winner.problem.runs)
                 trial = exchanged(search, winner, item, known, less, share=0.0)
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
@@ -215,8 +206,28 @@ def challenged(search: Search, base: Fitted, stage: Round) -> Fitted:
     return winner
 
 
+def kin(judge: Judge, base: Fitted, stage: Round) -> list[Signature]:
+    """Twins of what was fitted that the winner must be compared with: they have not been.
+
+    To first order they are one, but where an effect explains millions of nats, what differs in
+    the sixth digit tells its place, and a simpler law there from the winner.
+    """
+    winner = stage.winner
+    if winner is None or winner.signature is None:
+        return []
+    if ALIKE * judge.total(base, winner) < GATE:
+        return []
+    last, tuned = winner.effects[-1], winner.signature.tuned
+    twins = [t for f in stage.fitted if f.signature is not None for t in f.signature.twins]
+    return [
+        t for t in twins
+        if t.candidate.effect == last.effect
+        or (t.candidate.place == last.place and t.tuned < tuned)
+    ]  # fmt: skip
+
+
 def _alike(
-    search: Search, base: Fitted, stage: Round, known: set[Candidate]
+    search: LateFitter, base: Fitted, stage: Round, known: set[Candidate]
 ) -> list[tuple[Signature, Fitted | None]]:
     """The winner's effect at other places, simpler laws at its own, close ones elsewhere.
 
@@ -235,8 +246,8 @@ def _alike(
         ))  # fitted with fewer parameters, a law that has more of them is no simpler one
     ]  # fmt: skip
     fitted = {f.effects[-1]: f for f in stage.fitted}
-    found += [(t, None) for t in search.kin(base, stage) if t.candidate not in fitted]
-    found += _simpler(search, stage)
+    found += [(t, None) for t in kin(search, base, stage) if t.candidate not in fitted]
+    found += _simpler(stage)
     # another law that does nearly as well elsewhere has not been fitted as far; one with more
     # parameters makes up by them for what a limit does
     least = CLOSE * search.total(base, winner)
@@ -261,7 +272,7 @@ def _seen_last(fitted: Fitted, winner: Fitted) -> Fitted:
     return replace(fitted, effects=(*rest, last), signature=winner.signature)
 
 
-def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None]]:
+def _others(search: LateFitter, stage: Round) -> list[tuple[Signature, Fitted | None]]:
     """Rivals of a round's winner with their quick fits, and its twins elsewhere."""
     winner = stage.winner
     assert winner is not None
@@ -282,28 +293,19 @@ def _others(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None
     found: list[tuple[Signature, Fitted | None]] = [
         (f.signature, f) for f in near if f.signature is not None
     ]
-    found += [(twin, None) for twin in search.kin(stage.base, stage)]
+    found += [(twin, None) for twin in kin(search, stage.base, stage)]
     known = {item.candidate for item, _ in found}
-    return found + [pair for pair in _simpler(search, stage) if pair[0].candidate not in known]
+    return found + [pair for pair in _simpler(stage) if pair[0].candidate not in known]
 
 
-def _simpler(search: Search, stage: Round) -> list[tuple[Signature, Fitted | None]]:
+def _simpler(stage: Round) -> list[tuple[Signature, Fitted | None]]:
     """Simpler laws at the winner's place, with their fits where there are any."""
     fitted = {f.effects[-1]: f for f in stage.fitted}
-    return [(item, fitted.get(item.candidate)) for item in search.simpler(stage)]
-
-
-def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
-    """Values of an effect's parameters with which it does nothing."""
-    return {
-        p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
-        for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True)
-        if p.name.startswith(effect.prefix)
-    }
+    return [(item, fitted.get(item.candidate)) for item in stage.simpler()]
 
 
 def exchanged(
-    search: Search,
+    search: LateFitter,
     fitted: Fitted,
     item: Signature,
     known: Fitted | None,
@@ -319,7 +321,7 @@ def exchanged(
         item: what comes instead.
         known: a fit of that, for the values to begin with.
         less: the problem without the last effect; if not given, that effect is held absent.
-        share: see `fit`.
+        share: see `Effort`.
 
     Raises:
         CosimError: it cannot be simulated.
@@ -346,13 +348,14 @@ def exchanged(
     if fitted.effects[-1].place == item.candidate.place:
         fixed = _sharpest(search, whole, known_values, fixed)
     problem, start = _begun(whole, known_values, fixed)
-    result = search.fitted(problem, start, fitted.estimate, share=share)
+    simulator = search.simulator.of(problem)
+    result = search.fitted(simulator, start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
     result.signature = replace(item, fixed={**item.fixed, **fixed})
     return result
 
 
-def restarted(search: Search, fitted: Fitted, base: Fitted, simpler: list[Fitted]) -> Fitted:
+def restarted(search: LateFitter, fitted: Fitted, base: Fitted, simpler: list[Fitted]) -> Fitted:
     """A model that is far off fitted from nominal values; from where a simpler law does better.
 
     Args:
@@ -366,7 +369,7 @@ def restarted(search: Search, fitted: Fitted, base: Fitted, simpler: list[Fitted
         return search.sharper(search.retried(fitted, base), base)
     name = fitted.effects[-1].label
     try:
-        less = base.problem._with(runs=near.problem.runs)
+        less = base.problem.changed(runs=near.problem.runs)
         found = exchanged(search, near, fitted.signature, fitted, less)
     except CosimError as error:
         search.say(f"{name} from {near.effects[-1].label}: {error}")
@@ -384,7 +387,6 @@ def _begun(
 ) -> tuple[Problem, Vector]:
     """A problem with some parameters held, and the values of the others."""
     problem = whole.hold(fixed)
-    problem.limits = whole.limits
     theta = problem.nominal
     for name, value in values.items():
         if name in problem.names:
@@ -393,7 +395,7 @@ def _begun(
 
 
 def _sharpest(
-    search: Search, whole: Problem, values: dict[str, float], fixed: dict[str, float]
+    search: LateFitter, whole: Problem, values: dict[str, float], fixed: dict[str, float]
 ) -> dict[str, float]:
     """Held parameters with those that smooth a law as small as the data want them.
 
@@ -407,7 +409,8 @@ def _sharpest(
         for power in range(TENTHS):
             trial = {**fixed, p.name: max(fixed[p.name] * 0.1**power, p.minimum)}
             try:
-                cost = search.cost(*_begun(whole, values, trial))
+                problem, theta = _begun(whole, values, trial)
+                cost = search.cost(search.simulator.of(problem), theta)
             except CosimError:
                 break
             if not cost < best:

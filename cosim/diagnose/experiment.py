@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.fit import STEPS
-from ..calibrate.parts import Run
+from ..calibrate.differences import jacobian
+from ..calibrate.known import STEP
+from ..calibrate.parts import MeasuredRun
+from ..calibrate.simulator import Simulator
 from ..data.signals import Table
 from ..errors import CosimError
-from .linear import Layout
+from .linear import SampleStack
 from .models import Fitted
 from .secant import model_values
 
@@ -25,7 +27,7 @@ ENOUGH = 4.0
 decision plus 2 for its power)."""
 
 
-def scaled(run: Run, factor: float) -> Run | None:
+def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
     """A run with its inputs scaled; None if they cannot be."""
     inputs = {}
     for name, signal in run.inputs.items():
@@ -51,23 +53,23 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
         run, input_factor, distance [standard deviations], repetitions, and channels: what the
         models differ by in each, as they are; None if no run could be simulated with both.
     """
-    found: list[tuple[float, Run, float, Layout, Vector]] = []
+    found: list[tuple[float, MeasuredRun, float, SampleStack, Vector]] = []
     for run in first.problem.runs:
         for factor in FACTORS:
             changed = scaled(run, factor) if factor != 1.0 else run
             if changed is None:
                 continue
             try:
-                layout, change = _difference(first, second, changed)
+                stack, change = _difference(first, second, changed)
             except (CosimError, ValueError):  # not a run for these models
                 continue
-            found.append((float(np.linalg.norm(change)), changed, factor, layout, change))
-    for _, run, factor, layout, change in sorted(found, key=lambda item: -item[0]):
+            found.append((float(np.linalg.norm(change)), changed, factor, stack, change))
+    for _, run, factor, stack, change in sorted(found, key=lambda item: -item[0]):
         try:
-            distance = _left(first, run, layout, change)
+            distance = _left(first, run, stack, change)
         except CosimError:  # one that few parameter values can go through
             continue
-        squares = np.bincount(layout.channel, change**2, layout.channels)
+        squares = np.bincount(stack.channel, change**2, stack.channels)
         names = [c.name for c in first.problem.channels]
         return {
             "run": run.name,
@@ -79,26 +81,32 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
     return None
 
 
-def _difference(first: Fitted, second: Fitted, run: Run) -> tuple[Layout, Vector]:
+def _of(fitted: Fitted, run: MeasuredRun) -> Simulator:
+    """A simulator of a fitted model in this run, which may take longer than those at hand."""
+    return fitted.simulator.limited({}).of(fitted.problem.changed(runs=[run]))
+
+
+def _difference(first: Fitted, second: Fitted, run: MeasuredRun) -> tuple[SampleStack, Vector]:
     """Model values of the second less those of the first, over sigma."""
     values = []
     for item in (first, second):
-        problem = item.problem._with(runs=[run])
-        layout = Layout(problem, [run])
-        values.append(model_values(problem, item.estimate.theta, layout))
-        problem.close()
-    return layout, values[1] - values[0]
+        simulator = _of(item, run)
+        stack = SampleStack(simulator.problem, [run])
+        values.append(model_values(simulator, item.estimate.theta, stack))
+        simulator.close()
+    return stack, values[1] - values[0]
 
 
-def _left(fitted: Fitted, run: Run, layout: Layout, change: Vector) -> float:
+def _left(fitted: Fitted, run: MeasuredRun, stack: SampleStack, change: Vector) -> float:
     """Norm of what is left of a change of a run when the parameters follow it.
 
     min  |change - J d|^2 + d^T H d    over d,   H: information of the runs at hand
     """
-    problem = fitted.problem._with(runs=[run])
-    jacobian = problem.jacobian(fitted.estimate.theta, [run.name], central=False, relative=STEPS[1])
-    problem.close()
-    slopes = layout.matrix(jacobian, problem.scale)
+    simulator = _of(fitted, run)
+    problem = simulator.problem
+    found = jacobian(simulator, fitted.estimate.theta, [run.name], central=False, relative=STEP)
+    simulator.close()
+    slopes = stack.matrix(found, problem.scale)
     known = np.zeros((slopes.shape[1], slopes.shape[1]))
     for item, (_, residual) in zip(
         fitted.estimate.jacobian, fitted.estimate.residuals, strict=True

@@ -5,25 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
-from ..calibrate.fit import QUICKLY, Known, fit
+from ..calibrate.fit import CORRECTION, DRAFT, INTERVALS, Effort, fit
+from ..calibrate.known import Known
 from ..calibrate.loss import loss_for
 from ..calibrate.normal import cost_of
 from ..calibrate.nuisance import settled, slopes
 from ..calibrate.parts import Sensitivity
-from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .deferred import corrected, step_error
-from .exchange import absent, is_open
 from .judge import Judge
-from .linear import Absorber, Layout
-from .models import GATE, Fitted, compare
+from .linear import Absorber, SampleStack
+from .models import GATE, Fitted, absent, compare, is_open
 from .secant import FLOOR, patience
 from .signature import Signature
 
@@ -31,8 +30,10 @@ Vector = NDArray[np.float64]
 Say = Callable[[str], None]
 ITERATIONS = 6
 """Steps of a quick fit at most."""
+QUICKLY = 3e-2
+"""Share of the cost beyond the noise's below which a fall ends a quick fit."""
 USUAL = 2.1
-"""Usual values of a strength (see `Parameter.tries`) by a larger factor away from what its first
+"""Usual values of a strength (see `SearchHints.tries`) by a larger factor away from what its first
 order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
@@ -52,7 +53,7 @@ class Fitter(Judge):
     """Fits models to one problem.
 
     Args:
-        problem: the data as measured.
+        simulator: of the declared system with the data as measured, without limits on time.
         check: purpose of the runs that are not used for fitting.
         say: told what is done.
 
@@ -60,8 +61,9 @@ class Fitter(Judge):
         evaluations: simulated runs so far.
     """
 
-    def __init__(self, problem: Problem, check: str, say: Say) -> None:
-        super().__init__(problem, check)
+    def __init__(self, simulator: Simulator, check: str, say: Say) -> None:
+        super().__init__(simulator.problem, check)
+        self.simulator = simulator
         self.say = say
         self.evaluations = 0
         self._own: dict[str, Sensitivity] | None = None
@@ -69,22 +71,18 @@ class Fitter(Judge):
 
     def fitted(
         self,
-        problem: Problem,
+        simulator: Simulator,
         theta: Vector,
         close: Estimate | None = None,
         *,
         share: float = QUICKLY,
     ) -> Fitted:
         """Fit a model from a point close by; quickly, if a fit of nearly the same is given."""
-        known = None if close is None else Known.of(close)
-        if close is not None and not problem.limits:
-            problem.limits = patience(close.problem)
-        return self.judged(
-            fit(
-                problem, theta, limit=ITERATIONS, robust=False, polish=known is None,
-                known=known, share=share,
-            )
-        )  # fmt: skip
+        if close is not None and not simulator.limits:
+            simulator = simulator.limited(patience(close.simulator))
+        effort = Effort("near", iterations=ITERATIONS, share=share)
+        known = None if close is None else close.known
+        return self.judged(fit(simulator, theta, effort=effort, known=known))
 
     def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
         """A quickly fitted model fitted again with derivatives of its own.
@@ -96,8 +94,8 @@ class Fitter(Judge):
         """
         theta = quick.estimate.theta
         try:
-            problem = corrected(quick.problem, theta, self.raw)
-            found = self.judged(fit(problem, theta, near=True, draft=draft))
+            simulator = corrected(quick.simulator, theta, self.raw)
+            found = self.judged(fit(simulator, theta, effort=DRAFT if draft else CORRECTION))
         except CosimError as error:  # a step finer than that of the quick fit may be unstable
             self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
             return quick
@@ -112,14 +110,14 @@ class Fitter(Judge):
 
     def judged(self, estimate: Estimate) -> Fitted:
         """A fit with its model values."""
-        problem = estimate.problem
+        simulator = estimate.simulator
         names = [run.name for run in self.checking.runs if run.purpose != "identification"]
         if self._own is None:
-            self._own = slopes(problem, estimate.theta, names)
-        theta = settled(problem, estimate.theta, names, self._own)
+            self._own = slopes(simulator, estimate.theta, names)
+        theta = settled(simulator, estimate.theta, names, self._own)
         estimate = replace(estimate, theta=theta)
         self.evaluations += estimate.evaluations
-        exact = self._exact(problem, theta)
+        exact = self._exact(simulator, theta)
         return Fitted(
             (),
             estimate,
@@ -127,10 +125,11 @@ class Fitter(Judge):
             self.checking.vector([exact[run.name] for run in self.checking.runs]),
         )
 
-    def _exact(self, problem: Problem, theta: Vector) -> dict[str, Vector]:
+    def _exact(self, simulator: Simulator, theta: Vector) -> dict[str, Vector]:
         """Model values over sigma by run, free of what the search's step adds."""
         data = {run.name: run.data for run in self.raw.runs}
-        real = problem.with_data(data)._with(step=self.raw.step)
+        problem = simulator.problem.with_data(data).changed(step=self.raw.step)
+        real = simulator.limited({}).of(problem)
         errors = step_error(real, theta, self.raw.step)
         values = {
             name: (data[name] - errors[name]) / problem.sigma - residual
@@ -138,16 +137,16 @@ class Fitter(Judge):
         }
         return values
 
-    def absorber(self, fitted: Fitted, layout: Layout, root: Vector | None = None) -> Absorber:
+    def absorber(self, fitted: Fitted, stack: SampleStack, root: Vector | None = None) -> Absorber:
         """What the parameters of a fitted model can do in some of the identification runs.
 
         Args:
             fitted: the model.
-            layout: of the runs.
+            stack: of the runs.
             root: factors on the samples, if not all count the same.
         """
         slopes = {item.run: item for item in fitted.estimate.jacobian}
-        matrix = layout.matrix([slopes[n] for n in layout.names], fitted.problem.scale)
+        matrix = stack.matrix([slopes[n] for n in stack.names], fitted.problem.scale)
         if root is not None:
             matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
@@ -175,14 +174,14 @@ class Fitter(Judge):
         held = [p for p in others if p.name != item.probe.second]
         if held:
             problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
-        problem.limits = patience(base.problem)
+        simulator = base.simulator.of(problem).limited(patience(base.simulator))
         root = self.fitting.root(self.fit_data - base.fit)
         absorber = self.absorber(base, self.fitting, root)
         residual = root * (self.fit_data - base.fit - item.score.amplitude * item.change)
         shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
-        near = [v for v in item.strength.tries if 1.0 / USUAL < v / value < USUAL]
+        near = [v for v in item.strength.hints.tries if 1.0 / USUAL < v / value < USUAL]
         if abs(item.score.amplitude - 1.0) > EXACT:
             near.append(item.value)  # what was simulated: a steep law goes too far from there
         for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
@@ -195,15 +194,15 @@ class Fitter(Judge):
                 theta[problem.index(item.probe.second)] = item.second
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
-            costs = [self.cost(problem, theta) for theta in starts]
+            costs = [self.cost(simulator, theta) for theta in starts]
             start = starts[int(np.argmin(costs))]
             if is_open(base.estimate):
-                start = self._doubled(problem, start, min(costs), item.strength.name)
-            result = self.fitted(problem, start, base.estimate)
+                start = self._doubled(simulator, start, min(costs), item.strength.name)
+            result = self.fitted(simulator, start, base.estimate)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
-                anew = self.anew(problem, kept, base, limit=ITERATIONS)
+                anew = self.anew(simulator, kept, base)
                 if anew is not None and anew.estimate.robust < result.estimate.robust:
                     result = anew
         except CosimError as error:
@@ -213,16 +212,17 @@ class Fitter(Judge):
         result.signature = item
         return result
 
-    def _doubled(self, problem: Problem, theta: Vector, cost: float, name: str) -> Vector:
+    def _doubled(self, simulator: Simulator, theta: Vector, cost: float, name: str) -> Vector:
         """A place to begin with a larger strength, as long as that is better.
 
         First orders ask for too little of what shifts oscillations, such as play.
         """
+        problem = simulator.problem
         place = problem.index(name)
         for _ in range(DOUBLINGS):
             trial = theta.copy()
             trial[place] = np.clip(2.0 * theta[place], problem.lower[place], problem.upper[place])
-            now = self.cost(problem, trial)
+            now = self.cost(simulator, trial)
             if not now < cost - GATE:
                 break
             theta, cost = trial, now
@@ -240,31 +240,32 @@ class Fitter(Judge):
     def begun(self, base: Fitted) -> Known:
         """Derivatives of a model at nominal values of its declared parameters."""
         if self._begun is None or self._begun[0] is not base:
-            problem = base.problem._with()
-            problem.limits = patience(base.problem)
+            problem = base.problem
             theta = problem.nominal
             for name, value in self.effects(base).items():
                 theta[problem.index(name)] = value
-            self._begun = base, Known.at(problem, theta)
+            limited = base.simulator.limited(patience(base.simulator))
+            self._begun = base, Known.at(limited, theta)
         return self._begun[1]
 
     def anew(
-        self, problem: Problem, kept: Mapping[str, float], base: Fitted | None = None, **how: Any
+        self, simulator: Simulator, kept: Mapping[str, float], base: Fitted | None = None
     ) -> Fitted | None:
         """A rough fit from nominal values; None if that cannot be simulated.
 
         Args:
-            problem: to fit.
+            simulator: of the problem to fit.
             kept: parameters that begin elsewhere.
             base: a model without the last effect, whose derivatives will do.
-            how: arguments of `fit`.
         """
+        problem = simulator.problem
         theta = problem.nominal
         for name, value in kept.items():
             theta[problem.index(name)] = value
         try:
             known = None if base is None else self.begun(base)
-            return self.judged(fit(problem, theta, rough=True, known=known, share=QUICKLY, **how))
+            effort = Effort("far", "draft", ITERATIONS, QUICKLY)
+            return self.judged(fit(simulator, theta, effort=effort, known=known))
         except CosimError as error:
             self.say(f"no fit from nominal values: {error}")
             return None
@@ -274,13 +275,14 @@ class Fitter(Judge):
         theta = base.problem.nominal
         for name, value in self.effects(base).items():
             theta[base.problem.index(name)] = value
-        found = self.judged(fit(base.problem, theta, limit=0, robust=False, polish=False))
+        found = self.judged(fit(base.simulator, theta, effort=INTERVALS))
         found.effects, found.signature = base.effects, base.signature
         return found
 
-    def cost(self, problem: Problem, theta: Vector) -> float:
+    def cost(self, simulator: Simulator, theta: Vector) -> float:
         """Cost over the identification runs."""
-        residuals = problem.residuals(theta, self.fitting.names)
+        problem = simulator.problem
+        residuals = simulator.residuals(theta, self.fitting.names)
         return cost_of(problem, theta, residuals, loss_for(problem.unstable))
 
     def retried(self, winner: Fitted, base: Fitted) -> Fitted:
@@ -291,12 +293,12 @@ class Fitter(Judge):
         """
         if not self.far(base) or not is_open(winner.estimate):
             return winner
-        problem = winner.problem
+        simulator = winner.simulator
         if not self.raw.far:
-            problem = corrected(problem, winner.estimate.theta, self.raw)
-        effects = {p.name for p in problem.parameters if p.role == "effect"}
+            simulator = corrected(simulator, winner.estimate.theta, self.raw)
+        effects = {p.name for p in simulator.problem.parameters if p.role == "effect"}
         kept = {n: v for n, v in winner.estimate.values.items() if n in effects}
-        found = self.anew(problem, kept, limit=6, robust=True)
+        found = self.anew(simulator, kept)
         if found is None or not found.estimate.robust < winner.estimate.robust - GATE:
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
@@ -324,11 +326,11 @@ class Fitter(Judge):
         spans = {p.name: p.span for p in winner.problem.parameters}
         problem = whole.with_parameters(
             [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
-        )._with(runs=winner.problem.runs)
+        ).changed(runs=winner.problem.runs)
         problem = problem.hold(fixed)
         theta = np.array([winner.estimate.values[name] for name in problem.names])
         try:
-            found = self.fitted(problem, theta, winner.estimate)
+            found = self.fitted(self.simulator.of(problem), theta, winner.estimate)
         except CosimError as error:
             self.say(f"{winner.effects[-1].label} with {sharp}: {error}")
             return winner
@@ -342,20 +344,22 @@ class Fitter(Judge):
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.
 
-        See `Parameter.lattice`: steps that come a sample too late cost much, whatever the fraction
-        of a sample, so derivatives do not lead to the right one; and others may do as well.
+        See `SearchHints.lattice`: steps that come a sample too late cost much, whatever the
+        fraction of a sample, so derivatives do not lead to the right one; and others may do as
+        well.
         """
         prefix = winner.effects[-1].prefix
         for p in winner.problem.parameters:
-            if not (p.lattice and p.name.startswith(prefix)):
+            lattice = p.hints.lattice
+            if not (lattice and p.name.startswith(prefix)):
                 continue
             place = winner.problem.index(p.name)
-            nearest = math.floor(winner.estimate.theta[place] / p.lattice)
+            nearest = math.floor(winner.estimate.theta[place] / lattice)
             best, known = winner, {0}
             while fresh := sorted({nearest, nearest + 1, nearest - (best is not winner)} - known):
                 known |= set(fresh)
                 for count in fresh:
-                    value = count * p.lattice
+                    value = count * lattice
                     if not p.minimum <= value <= p.maximum:
                         continue
                     found = self._held(winner, p.name, value)
@@ -363,10 +367,10 @@ class Fitter(Judge):
                     if found is not None and self.gain(best, found) > least:
                         best, nearest = found, count
             if best is not winner:
-                self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * p.lattice:g} {p.unit}")
+                self.say(f"{winner.effects[-1].label}: {p.name} = {nearest * lattice:g} {p.unit}")
                 theta = winner.estimate.theta.copy()
                 theta[np.arange(theta.size) != place] = best.estimate.theta
-                theta[place] = nearest * p.lattice
+                theta[place] = nearest * lattice
                 whole = replace(winner, estimate=replace(winner.estimate, theta=theta))
                 found = self.sharpened(whole, base)
                 winner = found if self.gain(winner, found) > -GATE else winner
@@ -378,8 +382,9 @@ class Fitter(Judge):
         theta = fitted.estimate.theta.copy()
         theta[place] = value
         try:
-            problem = corrected(fitted.problem, theta, self.raw).hold({name: value})
-            return self.fitted(problem, np.delete(theta, place), fitted.estimate)
+            simulator = corrected(fitted.simulator, theta, self.raw)
+            held = simulator.of(simulator.problem.hold({name: value}))
+            return self.fitted(held, np.delete(theta, place), fitted.estimate)
         except CosimError as error:
             self.say(f"{name} = {value:g}: {error}")
             return None
@@ -393,7 +398,7 @@ class Fitter(Judge):
             base: model without the effect.
             fitted: that fit.
             quick: a thorough one follows anyway.
-            share: see `fit`.
+            share: see `Effort`.
         """
         item = fitted.signature
         if item is None:
@@ -405,12 +410,12 @@ class Fitter(Judge):
         spans = {p.name: p.span for p in fitted.problem.parameters}
         problem = whole.with_parameters(
             [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
-        )._with(runs=fitted.problem.runs)  # with their late values
+        ).changed(runs=fitted.problem.runs)  # with their late values
         theta = problem.nominal
         for name, value in {**item.fixed, **fitted.estimate.values}.items():
             theta[problem.index(name)] = value
         try:
-            result = self.fitted(problem, theta, fitted.estimate, share=share)
+            result = self.fitted(self.simulator.of(problem), theta, fitted.estimate, share=share)
         except CosimError as error:
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
@@ -446,7 +451,8 @@ class Fitter(Judge):
         problem = fitted.problem
         held = absent(fitted, effect)
         keep = [i for i, p in enumerate(problem.parameters) if p.name not in held]
-        result = self.fitted(problem.hold(held), fitted.estimate.theta[keep], fitted.estimate)
+        less = self.simulator.of(problem.hold(held))
+        result = self.fitted(less, fitted.estimate.theta[keep], fitted.estimate)
         result.effects = tuple(e for e in fitted.effects if e != effect)
         result.signature = fitted.signature
         return result

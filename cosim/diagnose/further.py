@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..calibrate.nuisance import late_estimated, released, settled
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..errors import VariantError
-from ..system.variants import apply
 from .models import Fitted
 
 Vector = NDArray[np.float64]
@@ -57,30 +57,30 @@ class Further:
         }
 
 
-def judged(problem: Problem, raw: Problem, before: Fitted, after: Fitted) -> Further:
+def judged(simulator: Simulator, raw: Problem, before: Fitted, after: Fitted) -> Further:
     """Residuals of two models in the runs of another system.
 
     Args:
-        problem: that system with its runs.
+        simulator: of that system with its runs.
         raw: the system that was diagnosed, as declared.
         before, after: without and with what was found.
 
     Raises:
         CosimError: an effect does not fit, or the other system cannot be simulated.
     """
-    found = Further(problem)
+    found = Further(simulator.problem)
     for which, fitted in (("before", before), ("after", after)):
         if which == "after" and after is before:
             found.residuals |= {
                 ("after", name): v for (_, name), v in list(found.residuals.items())
             }
             break
-        model = carried(problem, raw, fitted)
-        theta = model.nominal
-        if late_estimated(fitted.problem) and model.late:
+        problem = carried(simulator.problem, raw, fitted)
+        model, theta = simulator.of(problem), problem.nominal
+        if late_estimated(fitted.problem) and problem.late:
             model, theta, _ = released(model, theta)
         else:
-            theta = settled(model, theta, [run.name for run in model.runs])
+            theta = settled(model, theta, [run.name for run in problem.runs])
         for name, residual in model.residuals(theta, None):
             found.residuals[which, name] = residual
         model.close()
@@ -94,7 +94,7 @@ def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:
         VariantError: an instance that carries an effect is not there, or another one, or the effect
             does not fit.
     """
-    instances = dict(problem.instances)
+    model = problem.model
     for item in fitted.effects:
         if raw.instances[item.instance] != problem.instances.get(item.instance):
             raise VariantError(
@@ -102,13 +102,13 @@ def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:
                 f"{raw.instances[item.instance]}, here it is "
                 f"{problem.instances.get(item.instance, 'missing')}"
             )
-        instances = apply(instances, item.change, problem.provider)
+        model = model.changed(item.change)
     values = {n: v for n, v in fitted.problem.constants.items() if n not in raw.constants}
     for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True):
         if not p.run:
             values |= p.set(value)
-    return problem._with(
-        instances=instances,
+    return problem.changed(
+        model=model,
         constants={**problem.constants, **values},
         parameters=[p for p in problem.parameters if p.run],
     )

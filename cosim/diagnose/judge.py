@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
-from .linear import MATERIAL, Layout, Score, score
+from .linear import MATERIAL, SampleStack
 from .models import GATE, Fitted, compare, more_general
-from .structure import structures
+from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
 RIVAL_Z = 2.0
@@ -44,18 +44,18 @@ class Judge:
     def _measured(self, problem: Problem) -> None:
         """What is judged by."""
         self.raw = problem
-        self.fitting = Layout(problem, problem.chosen("identification"))
+        self.fitting = SampleStack(problem, problem.chosen("identification"))
         checks = problem.chosen(self.purpose) or problem.chosen("identification")
-        self.checking = Layout(problem, checks)
+        self.checking = SampleStack(problem, checks)
         self.fit_data = self._data(self.fitting)
         self.check_data = self._data(self.checking)
 
-    def _data(self, layout: Layout) -> Vector:
-        return layout.vector([run.data / self.raw.sigma for run in layout.runs])
+    def _data(self, stack: SampleStack) -> Vector:
+        return stack.vector([run.data / self.raw.sigma for run in stack.runs])
 
     def count_in_full(self, full: bool = True) -> Problem:
         """Let residuals count in full though runs may turn unstable, or not again."""
-        self.raw = self.raw._with(far=full)
+        self.raw = self.raw.changed(far=full)
         self.fitting.problem = self.checking.problem = self.raw
         return self.raw
 
@@ -67,10 +67,11 @@ class Judge:
             base: without its last effect, recounted.
         """
         estimate = fitted.estimate
-        problem = estimate.problem._with(far=self.raw.far)
+        problem = estimate.problem.changed(far=self.raw.far)
+        simulator = estimate.simulator.limited({}).of(problem)
         loss = loss_for(problem.unstable)
         robust = cost_of(problem, estimate.theta, estimate.residuals, loss)
-        found = replace(fitted, estimate=replace(estimate, problem=problem, robust=robust))
+        found = replace(fitted, estimate=replace(estimate, simulator=simulator, robust=robust))
         if base is not None:
             found.gate = compare(self.check_data, base.check, found.check, self.checking)
         return found
@@ -81,7 +82,7 @@ class Judge:
 
     def lacking(self, fitted: Fitted) -> bool:
         """Whether a channel still exceeds its noise."""
-        return any(s.structured for s in structures(self.fit_data - fitted.fit, self.fitting))
+        return any(s.structured for s in whiteness_tests(self.fit_data - fitted.fit, self.fitting))
 
     def accepted(self, base: Fitted, fitted: Fitted) -> bool:
         """Whether unused runs want it, and it is worth a cause."""
@@ -116,8 +117,8 @@ class Judge:
         if last is not None and last.unit == "s" and other.estimate.values[last.name] < tick:
             return False
         return any(
-            layout.largest(second - first) > MATERIAL
-            for first, second, layout in (
+            stack.largest(second - first) > MATERIAL
+            for first, second, stack in (
                 (base.fit, other.fit, self.fitting), (base.check, other.check, self.checking)
             )
         )  # fmt: skip
@@ -175,10 +176,6 @@ class Judge:
         """What a model gains over another one on all runs, and on unused ones [nats]."""
         unused = compare(self.check_data, first.check, second.check, self.checking).gain
         return self.gain(first, second) + unused, unused
-
-    def test(self, first: Fitted, second: Fitted) -> Score:
-        """Score of the step between two models on unused runs."""
-        return score(second.check - first.check, self.check_data - first.check, self.checking, 0)
 
     def far(self, base: Fitted) -> bool:
         """Whether a model is far off the data, with parameters driven to their bounds."""

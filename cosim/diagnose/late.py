@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
-from ..calibrate.fit import fit
+from ..calibrate.fit import CORRECTION, DRAFT, POLISH, fit
 from ..calibrate.nuisance import late_estimated, released
-from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..calibrate.staged import jointly, staged
 from ..errors import CosimError, FmuCallError
 from .deferred import corrected
@@ -47,16 +47,15 @@ class LateFitter(Fitter):
             theta = winner.estimate.theta
             beyond = winner.estimate.robust - 0.5 * winner.estimate.count
             try:
-                problem = corrected(winner.problem, theta, self.raw)
-                problem.limits = limits = patience(winner.problem)
-                problem, values, fall = released(problem, theta)
+                simulator = corrected(winner.simulator, theta, self.raw)
+                simulator = simulator.limited(patience(winner.simulator))
+                simulator, values, fall = released(simulator, theta)
                 if fall < least * beyond:
                     break
                 self.say(f"start values of the runs estimated: {fall:.0f} nats")
-                problem.limits = limits
                 if not late_estimated(winner.problem):
-                    problem, values = staged(problem, values)
-                found = self._with_late(problem, values)
+                    simulator, values = staged(simulator, values)
+                found = self._with_late(simulator, values)
             except CosimError as error:
                 self.say(f"start values of the runs could not be estimated: {error}")
                 break
@@ -64,7 +63,7 @@ class LateFitter(Fitter):
             if gain > 0.0:
                 self.say(f"fitted with them: {gain:.0f} nats")
             else:  # where runs are unstable a joint step may lose what start values had gained
-                found = self.fitted(problem, values, winner.estimate)
+                found = self.fitted(simulator, values, winner.estimate)
                 gain = self.gain(winner, found)
                 if gain <= 0.0:
                     break
@@ -76,13 +75,13 @@ class LateFitter(Fitter):
         self._settled = winner.estimate
         return winner
 
-    def _with_late(self, problem: Problem, theta: Vector) -> Fitted:
+    def _with_late(self, simulator: Simulator, theta: Vector) -> Fitted:
         """A model fitted together with late values; beside them, if that cannot be simulated."""
         try:
-            held, values, known = jointly(problem, theta)
+            held, values, known = jointly(simulator, theta)
         except FmuCallError as error:
             self.say(f"start values of the runs are held: {error}")
-            return self.judged(fit(problem, theta, near=True, draft=True))
+            return self.judged(fit(simulator, theta, effort=DRAFT))
         return self.judged(fit(held, values, known=known))
 
     def shortened(self, fitted: Fitted, sizes: Mapping[str, int]) -> Fitted:
@@ -97,10 +96,11 @@ class LateFitter(Fitter):
         """
         self._measured(ended(self.raw, sizes))
         self._own = None
-        problem, theta = ended(fitted.problem, sizes), fitted.estimate.theta
-        found = self.judged(fit(problem, theta, limit=0, robust=False))
+        simulator = fitted.simulator.of(ended(fitted.problem, sizes))
+        theta = fitted.estimate.theta
+        found = self.judged(fit(simulator, theta, effort=POLISH))
         if self.lacking(found):
-            found = self.judged(fit(problem, theta, near=True))
+            found = self.judged(fit(simulator, theta, effort=CORRECTION))
         found.effects, found.signature = fitted.effects, fitted.signature
         found.gate, found.p_value = fitted.gate, fitted.p_value
         return found

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from ..calibrate.loss import WINDOW, concentrated, trust
 from ..calibrate.normal import BLOCK, block_length
-from ..calibrate.parts import Run, Sensitivity
+from ..calibrate.parts import MeasuredRun, Sensitivity
 from ..calibrate.problem import Problem
 
 Vector = NDArray[np.float64]
@@ -29,8 +29,8 @@ MATERIAL = 0.15
 has no name however many samples make it significant."""
 
 
-class Layout:
-    """Where each sample of each run lies in one long vector.
+class SampleStack:
+    """Samples of runs stacked in one vector, and where each of them lies.
 
     Args:
         problem: whose channels.
@@ -39,7 +39,7 @@ class Layout:
             leaves too few (`normal.BLOCKS`).
     """
 
-    def __init__(self, problem: Problem, runs: Sequence[Run], block: float = BLOCK) -> None:
+    def __init__(self, problem: Problem, runs: Sequence[MeasuredRun], block: float = BLOCK) -> None:
         block = block_length([run.times for run in runs], block)
         self.problem, self.runs = problem, tuple(runs)
         self.names = [run.name for run in runs]
@@ -172,7 +172,7 @@ class Absorber:
 
 
 @dataclass(frozen=True)
-class Score:
+class ScoreTest:
     """How well one direction explains a vector of residuals.
 
     Attributes:
@@ -192,7 +192,7 @@ class Score:
     spread: float
 
 
-def score(direction: Vector, residual: Vector, layout: Layout, freedom: int) -> Score:
+def score(direction: Vector, residual: Vector, stack: SampleStack, freedom: int) -> ScoreTest:
     """Test a direction, both vectors orthogonal to what calibration absorbs.
 
     The variance is that of the block sums of what is left with the direction in the model, never
@@ -200,23 +200,24 @@ def score(direction: Vector, residual: Vector, layout: Layout, freedom: int) -> 
 
     Args:
         direction, residual: see above.
-        layout: gives the blocks.
+        stack: gives the blocks.
         freedom: parameters already fitted.
     """
     square = float(direction @ direction)
     if square <= 0.0:
-        return Score(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+        return ScoreTest(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     amplitude = float(direction @ residual) / square
     rest = residual - amplitude * direction
-    sums = layout.sums(direction * rest)
-    active = max(int(np.count_nonzero(layout.sums(direction**2) > 1e-6 * square)), 2)
+    sums = stack.sums(direction * rest)
+    active = max(int(np.count_nonzero(stack.sums(direction**2) > 1e-6 * square)), 2)
     # parameters of single runs take little from the blocks of the others
-    degrees = max(layout.blocks - freedom, layout.blocks // 4, 1)
-    robust = float(sums @ sums) * layout.blocks / degrees
+    degrees = max(stack.blocks - freedom, stack.blocks // 4, 1)
+    robust = float(sums @ sums) * stack.blocks / degrees
     spread = float(np.sqrt(max(robust / square, 1.0)))
     z = amplitude * np.sqrt(square) / spread
     p_value = float(2.0 * student.sf(abs(z), max(min(degrees, active * 4), 1)))
-    return Score(amplitude, 0.5 * amplitude**2 * square, z, p_value, float(np.sqrt(square)), spread)
+    gain, size = 0.5 * amplitude**2 * square, float(np.sqrt(square))
+    return ScoreTest(amplitude, gain, z, p_value, size, spread)
 
 
 def holm(p_values: Sequence[float], tests: int = 0) -> Vector:
@@ -232,9 +233,3 @@ def holm(p_values: Sequence[float], tests: int = 0) -> Vector:
     corrected = np.empty_like(values)
     corrected[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
     return corrected
-
-
-def cosine(a: Vector, b: Vector) -> float:
-    """Of the angle between two vectors, 0 if one is nil."""
-    size = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / size if size > 0.0 else 0.0

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.parts import Channel, Parameter, Run
+from ..calibrate.parts import Channel, MeasuredRun, Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError, VariantError
 from .candidates import Candidate, Catalogue, balances, element_of
-from .linear import Absorber, Layout
+from .linear import Absorber, SampleStack
 from .models import Fitted
 from .search import Search
 from .secant import model_values
@@ -142,7 +142,7 @@ def localise(
     return found
 
 
-def _worst(search: Search, base: Fitted) -> list[Run]:
+def _worst(search: Search, base: Fitted) -> list[MeasuredRun]:
     rows = search.fitting.by_run(search.fit_data - base.fit)
     sizes = [float(np.nanmean(r**2)) for r in rows]
     order = np.argsort(sizes)[::-1][:RUNS]
@@ -162,7 +162,7 @@ class _Bench:
     """Responses of a system to the probe at one balance."""
 
     def __init__(
-        self, search: Search, base: Fitted, runs: list[Run], instance: str, port: str
+        self, search: Search, base: Fitted, runs: list[MeasuredRun], instance: str, port: str
     ) -> None:
         self.instance, self.port = instance, port
         self.names = [run.name for run in runs]
@@ -196,12 +196,13 @@ class _Bench:
             replace(data[n], data=np.column_stack([data[n].data, np.full(data[n].times.size, 0.0)]))
             for n in self.names
         ]
-        self.problem = probed._with(
+        problem = probed.changed(
             parameters=[*kept, *extra], channels=[*probed.channels, spy], runs=runs
         )
+        self.simulator = search.simulator.of(problem)
         declared = search.declared.only(self.names)
-        self.layouts = {
-            names: Layout(declared, [declared.run(n) for n in names])
+        self.stacks = {
+            names: SampleStack(declared, [declared.run(n) for n in names])
             for names in [tuple(self.names), *((n,) for n in self.names)]
         }
         self.residual: dict[tuple[str, ...], Vector] = {}
@@ -211,25 +212,24 @@ class _Bench:
             zip(search.fitting.names, search.fitting.by_run(search.fit_data - base.fit),
                 strict=True)
         )  # fmt: skip
-        coarse = model_values(base.problem, base.estimate.theta, search.fitting)
+        coarse = model_values(base.simulator, base.estimate.theta, search.fitting)
         model = dict(zip(search.fitting.names, search.fitting.by_run(coarse), strict=True))
-        for names, layout in self.layouts.items():
-            self.absorber[names] = search.absorber(base, layout)
-            self.residual[names] = self.absorber[names].rest(
-                layout.vector([rows[n] for n in names])
-            )
-            self.base[names] = layout.vector([model[n] for n in names])
+        for names, stack in self.stacks.items():
+            self.absorber[names] = search.absorber(base, stack)
+            self.residual[names] = self.absorber[names].rest(stack.vector([rows[n] for n in names]))
+            self.base[names] = stack.vector([model[n] for n in names])
 
     def at(self, names: tuple[str, ...], **values: float) -> tuple[Vector, Vector]:
         """Change of the model values, and the driver's values."""
-        theta = np.zeros(len(self.problem.parameters))
+        problem = self.simulator.problem
+        theta = np.zeros(len(problem.parameters))
         theta[: self.theta.size] = self.theta
         for name, index in self.free.items():
             theta[index] = values.get(name, 0.0)
         theta[self.free["g"]] = 1.0
-        residuals = dict(self.problem.residuals(theta, names))
-        rows = [self.problem.run(n).data / self.problem.sigma - residuals[n] for n in names]
-        change = self.layouts[names].vector([r[:, :-1] for r in rows]) - self.base[names]
+        residuals = dict(self.simulator.residuals(theta, names))
+        rows = [problem.run(n).data / problem.sigma - residuals[n] for n in names]
+        change = self.stacks[names].vector([r[:, :-1] for r in rows]) - self.base[names]
         return change, np.concatenate([r[:, -1] for r in rows])
 
     def places(self) -> list[Place]:
@@ -252,7 +252,7 @@ class _Bench:
             if place.curves:
                 place.curves.sort(key=lambda c: -c.evidence)
                 found.append(place)
-        self.problem.close()
+        self.simulator.close()
         return found
 
     def _size(self, share: dict[str, float]) -> float | None:

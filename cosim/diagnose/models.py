@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from .candidates import Candidate
-from .linear import Layout
+from .linear import SampleStack
 from .signature import Signature
 
 Vector = NDArray[np.float64]
@@ -22,6 +23,8 @@ GATE = math.log(1.0 / LEVEL)
 mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
 GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks."""
+OPEN = 4.0
+"""Mean square over the noise's from which the best model of a round evidently lacks more."""
 
 
 @dataclass
@@ -49,6 +52,11 @@ class Fitted:
     def problem(self) -> Problem:
         """What was fitted."""
         return self.estimate.problem
+
+    @property
+    def simulator(self) -> Simulator:
+        """Of what was fitted."""
+        return self.estimate.simulator
 
     @property
     def free(self) -> int:
@@ -89,15 +97,15 @@ class Gate:
         return self.gain > GATE and self.z > GATE_Z
 
 
-def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate:
+def compare(data: Vector, first: Vector, second: Vector, stack: SampleStack) -> Gate:
     """Compare two sets of model values against data (all over sigma).
 
     Where runs may turn unstable, windows that are far off count as in `loss.Windowed`. z tests
     whether the data move from the first towards the second: both are fixed beforehand.
     """
     residual, rest = data - first, data - second
-    gain = layout.cost(residual) - layout.cost(rest)
-    root = layout.root(residual, rest)
+    gain = stack.cost(residual) - stack.cost(rest)
+    root = stack.root(residual, rest)
     direction, residual = root * (second - first), root * residual
     square = float(direction @ direction)
     if square <= 0.0:
@@ -105,7 +113,7 @@ def compare(data: Vector, first: Vector, second: Vector, layout: Layout) -> Gate
     # middle of the two: positive where the second is nearer
     middle = residual - 0.5 * direction
     amplitude = float(direction @ middle)
-    sums = layout.sums(direction * (residual - direction * float(direction @ residual) / square))
+    sums = stack.sums(direction * (residual - direction * float(direction @ residual) / square))
     return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
 
 
@@ -118,3 +126,17 @@ def more_general(first: Fitted, second: Fitted) -> bool:
     same = {label.partition(" at ")[2] for label in (item.same if item is not None else ())}
     places = {second.effects[-1].place, *same}
     return first.effects[-1].place in places and first.complexity > second.complexity
+
+
+def is_open(estimate: Estimate) -> bool:
+    """Whether a fitted model evidently lacks something."""
+    return 2.0 * estimate.robust > OPEN * estimate.count
+
+
+def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
+    """Values of an effect's parameters with which it does nothing."""
+    return {
+        p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
+        for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True)
+        if p.name.startswith(effect.prefix)
+    }

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from .linear import MATERIAL, Layout
+from .linear import MATERIAL, SampleStack
 from .models import LEVEL
-from .search import Round
+from .rounds import Round
 
 POWER = 0.9
 """Probability with which an effect of the given strength is found."""
 
 
-def power(current: Round, layout: Layout) -> dict[str, dict[str, Any]]:
+def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
     """Label -> smallest detectable strength, or why the effect cannot be seen."""
     tests = max(len(current.signatures), 1)
     needed = float(norm.isf(LEVEL / tests / 2) + norm.isf(1 - POWER))
@@ -35,7 +35,7 @@ def power(current: Round, layout: Layout) -> dict[str, dict[str, Any]]:
             # the norm of what calibration leaves grows with the strength around the secant's value
             size = item.score.size / max(item.score.spread, 1.0)
             smallest = abs(item.value) * needed / size if size > 0 else math.inf
-            share = layout.largest(item.rest.astype(np.float64))
+            share = stack.largest(item.rest.astype(np.float64))
             if share > 0.0:
                 smallest = max(smallest, abs(item.value) * MATERIAL / share)
             entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError
+from ..spec.hints import Mix
 from .candidates import Candidate, balances, element_of, new_parameters
 
 MOST = 8
@@ -40,25 +41,19 @@ class Probe:
         strength: parameter of the candidate alone, as it is called where it is alone.
         names: parameters of `problem` that make up its strength: those of all elements for the
             effect on a whole vector.
-        mix: kind of its second parameter, if it has one (see `Parameter.mix`).
-        second: that parameter, called as where the candidate is alone.
+        mixed: its second parameter, if two simulations tell one (see `SearchHints.mix`), called as
+            where the candidate is alone.
         seconds: parameters of `problem` that make it up.
-        reach: bounds of that parameter.
-        tries: its parameters of which other values should be tried, and these values.
-        visits: its parameters that are tried together along a run, with the variables that tell
-            their values.
+        others: its parameters besides the strength; of one on a whole vector none is tried.
     """
 
     candidate: Candidate
     problem: Problem
     strength: Parameter
     names: tuple[str, ...]
-    mix: str = ""
-    second: str = ""
+    mixed: Parameter | None = None
     seconds: tuple[str, ...] = ()
-    reach: tuple[float, float] = (-math.inf, math.inf)
-    tries: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    visits: tuple[tuple[str, str], ...] = ()
+    others: tuple[Parameter, ...] = ()
 
     def values(
         self, strength: float, second: float, fixed: Mapping[str, float]
@@ -71,7 +66,27 @@ class Probe:
     @property
     def scanned(self) -> bool:
         """Whether all usual values of its strength are tried: a spring, whose mass oscillates."""
-        return self.candidate.refinement is not None and bool(self.strength.tries)
+        return self.candidate.refinement is not None and bool(self.strength.hints.tries)
+
+    @property
+    def mix(self) -> Mix:
+        """How two simulations tell its second parameter, "" without one."""
+        return self.mixed.hints.mix if self.mixed else ""
+
+    @property
+    def second(self) -> str:
+        """Name of its second parameter, "" without one."""
+        return self.mixed.name if self.mixed else ""
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Bounds of its second parameter."""
+        return (self.mixed.minimum, self.mixed.maximum) if self.mixed else (-math.inf, math.inf)
+
+    @property
+    def visits(self) -> list[tuple[str, str]]:
+        """Parameters that are tried together along a run, with the variables that tell them."""
+        return [(p.name, p.hints.visits) for p in self.others if p.hints.visits]
 
     @property
     def own(self) -> int:
@@ -82,7 +97,7 @@ class Probe:
     @property
     def choices(self) -> list[dict[str, float]]:
         """Parameter -> value, one parameter at a time."""
-        return [{name: value} for name, values in self.tries for value in values]
+        return [{p.name: value} for p in self.others for value in p.hints.tries]
 
 
 @dataclass(frozen=True)
@@ -137,10 +152,8 @@ class Batch:
                     problem,
                     replace(first.strength, name=own(first.strength.name)),
                     tuple(n for probe in found for n in probe.names),
-                    first.mix,
-                    own(first.second) if first.second else "",
+                    first.mixed and replace(first.mixed, name=own(first.mixed.name)),
                     tuple(n for probe in found for n in probe.seconds),
-                    first.reach,
                 )
             )
         return found
@@ -150,24 +163,12 @@ def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
     """The candidate in a problem with its effect; nothing if it has not one strength."""
     strengths, others = new_parameters(base, problem)
     own = [p for p in strengths if p.name.startswith(candidate.prefix)]
-    mixed = [p for p in others if p.mix and p.name.startswith(candidate.prefix)][:1]
-    seconds = tuple(p.name for p in mixed)
-    mix = "".join(p.mix for p in mixed)
     if len(own) != 1:
         return []
-    tries = tuple(
-        (p.name, p.tries) for p in others if p.tries and p.name.startswith(candidate.prefix)
-    )
-    visits = tuple(
-        (p.name, p.visits) for p in others if p.visits and p.name.startswith(candidate.prefix)
-    )
-    reach = (mixed[0].minimum, mixed[0].maximum) if mixed else (-math.inf, math.inf)
-    return [
-        Probe(
-            candidate, problem, own[0], (own[0].name,), mix, "".join(seconds), seconds, reach,
-            tries, visits,
-        )
-    ]  # fmt: skip
+    mine = tuple(p for p in others if p.name.startswith(candidate.prefix))
+    mixed = next((p for p in mine if p.hints.mix), None)
+    seconds = (mixed.name,) if mixed else ()
+    return [Probe(candidate, problem, own[0], (own[0].name,), mixed, seconds, mine)]
 
 
 def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:

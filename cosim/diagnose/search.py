@@ -2,49 +2,34 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.fit import Known, fit
+from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..system.provider import locate
 from ..system.variants import apply
-from .candidates import Candidate, balances, candidates
+from .candidates import Candidate, candidates
 from .deferred import corrected
 from .established import needed, settle
-from .exchange import challenged, is_open, nearly, reconsidered, restarted
-from .fitter import Say
-from .judge import ALIKE
+from .exchange import challenged, nearly, reconsidered, restarted
+from .fitter import ITERATIONS, Say
 from .late import LateFitter
-from .linear import MATERIAL, Layout, holm
-from .models import GATE, GATE_Z, LEVEL, Fitted, compare, more_general
-from .probes import Probe, batches
+from .linear import SampleStack, holm
+from .models import GATE, Fitted, compare, is_open, more_general
+from .probes import batches
+from .rounds import Round
 from .secant import Bench, model_values
-from .signature import WHOLES, Signature, groups_of, kind, merge, unscored, worthy
-from .structure import structures
+from .shortlist import promising, remaining
+from .signature import Signature, merge, worthy
+from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
-NEARLY = 0.7
-"""Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
-REFITS = 6
-PART = 0.2
-"""A candidate that gains less than this share of what the best one gains, to first order, is not
-refitted: it is no rival, and another round will ask again."""
-MEMBERS = 2
-"""Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
-SHARED = 0.5
-"""What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
-this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""
-EXTRA = 2
-"""Where something is evidently missing, so many that gain more than the best one are refitted
-though not significant: the blocks' variance is then that of what is missing. Half as much will do
-where the model is far off."""
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off."""
@@ -66,56 +51,23 @@ ROUNDS = 4
 CHECK = "validation"
 
 
-@dataclass
-class Round:
-    """One round.
-
-    Attributes:
-        base: model that the round began with.
-        signatures: scored candidates, best first.
-        corrected: p value by label, corrected for their number.
-        aside: labels of those that one run ruled out.
-        fitted: refitted candidates, best first.
-        winner: accepted one.
-        rivals: fitted ones that the data cannot tell from it.
-        scores: of these, their log likelihoods over that of the winner [nats].
-        open: whether more was so evidently missing that the choice waits for it.
-        probes: all candidates that were simulated, with the systems they were simulated in.
-        quick: what the best quick fit gained on all runs [nats].
-        near: candidates whose quick fits gained nearly as much.
-        compared: effects of the model in which its winner was last compared with others; empty if
-            that was the round's own.
-    """
-
-    base: Fitted
-    signatures: list[Signature]
-    corrected: dict[str, float]
-    aside: tuple[str, ...] = ()
-    fitted: list[Fitted] = field(default_factory=list)
-    winner: Fitted | None = None
-    rivals: list[Fitted] = field(default_factory=list)
-    scores: list[float] = field(default_factory=list)
-    open: bool = False
-    probes: dict[Candidate, Probe] = field(default_factory=dict)
-    quick: float = 0.0
-    near: frozenset[Candidate] = frozenset()
-    compared: frozenset[Candidate] = frozenset()
-
-
 class Search(LateFitter):
     """Attribution on one problem.
 
     Args:
-        problem: declared system.
+        simulator: of the declared system, without limits on time.
         say: told what is done.
         only: candidates to consider, all of the catalogue if not given.
     """
 
     def __init__(
-        self, problem: Problem, say: Say = lambda text: None, only: list[Candidate] | None = None
+        self,
+        simulator: Simulator,
+        say: Say = lambda text: None,
+        only: list[Candidate] | None = None,
     ) -> None:
-        super().__init__(problem, CHECK, say)
-        self.declared = problem
+        super().__init__(simulator, CHECK, say)
+        self.declared = problem = simulator.problem
         self.whole = only is None
         self.known = candidates(problem) if only is None else only
         self.rounds: list[Round] = []
@@ -144,9 +96,10 @@ class Search(LateFitter):
     def calibrated(self) -> Fitted:
         """Fit the declared system, errors of the communication step removed from then on."""
         raw = self.raw
-        coarse = raw._with(step=raw.search_step)
-        exact = raw.ticks and raw.search_step == raw.step
-        first = fit(coarse, None, limit=6, robust=True, polish=exact, rough=not exact)
+        step = raw.search.step
+        exact = raw.ticks and step == raw.step
+        effort = Effort("far", "polished" if exact else "draft", ITERATIONS)
+        first = fit(self.simulator.of(raw.changed(step=step)), effort=effort)
         if raw.late and typical(r for _, r in first.residuals) > OFF:
             raw = self.count_in_full()
         self.evaluations += first.evaluations
@@ -156,31 +109,34 @@ class Search(LateFitter):
         if exact:
             return self.judged(first)
         if raw.far:  # errors at such parameters are not those at the right ones, and small beside
-            self.declared = raw._with(step=raw.search_step)
-            return self.judged(fit(self.declared, first.theta, near=True, draft=True))
-        near = corrected(raw, first.theta, raw)
-        second = fit(near, first.theta, known=Known.of(first))
+            self.declared = raw.changed(step=step)
+            simulator = self.simulator.of(self.declared)
+            return self.judged(fit(simulator, first.theta, effort=DRAFT))
+        near = corrected(self.simulator.of(raw), first.theta, raw)
+        second = fit(near, first.theta, known=first.known)
         self.evaluations += second.evaluations
         self.say("errors of the exchange removed")
-        self.declared = corrected(raw, second.theta, raw)
-        if is_open(second):  # far off, its parameters' intervals mean nothing
-            return self.judged(fit(self.declared, second.theta, near=True, draft=True))
-        return self.judged(fit(self.declared, second.theta, limit=0, robust=False))
+        simulator = corrected(self.simulator.of(raw), second.theta, raw)
+        self.declared = simulator.problem
+        # far off, its parameters' intervals mean nothing
+        return self.judged(
+            fit(simulator, second.theta, effort=DRAFT if is_open(second) else POLISH)
+        )
 
-    def bench(self, base: Fitted, layout: Layout) -> Bench:
+    def bench(self, base: Fitted, stack: SampleStack) -> Bench:
         """A bench for candidates around a fitted model."""
-        problem = base.problem
-        model = model_values(problem, base.estimate.theta, layout)
+        simulator = base.simulator
+        model = model_values(simulator, base.estimate.theta, stack)
         rows = zip(
             self.fitting.names, self.fitting.by_run(self.fit_data - base.fit), strict=True
         )  # fmt: skip
         rest = dict(rows)
-        residual = layout.vector([rest[n] for n in layout.names])
-        root = layout.root(residual)
-        absorber = self.absorber(base, layout, root)
-        return Bench(problem, base.estimate.theta, layout, model, residual, absorber, root)
+        residual = stack.vector([rest[n] for n in stack.names])
+        root = stack.root(residual)
+        absorber = self.absorber(base, stack, root)
+        return Bench(simulator, base.estimate.theta, stack, model, residual, absorber, root)
 
-    def telling(self, base: Fitted) -> Layout:
+    def telling(self, base: Fitted) -> SampleStack:
         """The run with most of what the model lacks; all, if no channel exceeds its noise.
 
         Where runs may turn unstable, those much farther off than others do not count: first orders
@@ -192,13 +148,13 @@ class Search(LateFitter):
         rows = zip(self.fitting.runs, self.fitting.by_run(residual), strict=True)
         found = []
         for run, values in rows:
-            layout = Layout(self.raw, [run])
-            vector = layout.vector([values])
-            if any(s.structured for s in structures(vector, layout)):
-                found.append((float(np.mean(vector**2)), vector.size, layout))
+            stack = SampleStack(self.raw, [run])
+            vector = stack.vector([values])
+            if any(s.structured for s in whiteness_tests(vector, stack)):
+                found.append((float(np.mean(vector**2)), vector.size, stack))
         least = min((size for size, _, _ in found), default=0.0)
         most = UNEVEN * least if self.raw.unstable else np.inf
-        near = [(n * (size - 1.0), layout) for size, n, layout in found if size < most]
+        near = [(n * (size - 1.0), stack) for size, n, stack in found if size < most]
         return max(near, key=lambda item: item[0])[1] if near else self.fitting
 
     def scored(self, base: Fitted) -> Round:
@@ -211,18 +167,18 @@ class Search(LateFitter):
             self.known = candidates(base.problem)
         present = {item.label for item in base.effects}
         chosen = [c for c in self.known if c.label not in present]
-        layout = self.telling(base)
-        bench = self.bench(base, layout)
-        signatures = bench.followed(bench.begun(chosen, thorough=layout is not self.fitting))
+        stack = self.telling(base)
+        bench = self.bench(base, stack)
+        signatures = bench.followed(bench.begun(chosen, thorough=stack is not self.fitting))
         self.evaluations += bench.evaluations
         probes = {s.candidate: s.probe for s in signatures}
         aside: tuple[str, ...] = ()
-        if layout is not self.fitting:
+        if stack is not self.fitting:
             stated = {n.rpartition(".")[0] + "." for r in self.raw.runs for n in r.starts}
             kept = worthy(signatures, stated)
             labels = {s.candidate.label for s in kept}
             aside = tuple(s.candidate.label for s in signatures if s.candidate.label not in labels)
-            self.say(f"run {layout.names[0]} leaves {len(kept)} of {len(signatures)} candidates")
+            self.say(f"run {stack.names[0]} leaves {len(kept)} of {len(signatures)} candidates")
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
             self.evaluations += bench.evaluations
@@ -232,69 +188,6 @@ class Search(LateFitter):
         named |= {label: named[s.candidate.label] for s in signatures for label in s.same}
         signatures.sort(key=lambda s: -s.score.gain)
         return Round(base, signatures, named, aside, probes=probes)
-
-    def able(self, current: Round) -> list[Signature]:
-        """Candidates that show in the fitted runs and ask for enough to matter, by gain."""
-        return [
-            s
-            for s in current.signatures
-            if not s.unseen
-            and s.score.gain > GATE
-            and self.fitting.largest(s.asked) > NEARLY * MATERIAL
-        ]
-
-    def promising(self, current: Round) -> list[Signature]:
-        """Candidates worth a refit: significant, not too small to matter, the best gains first.
-
-        Where something is evidently missing and none is significant (an effect that shows in few
-        moments has few blocks to prove itself), unused runs decide alone. So they do on a few that
-        gain more than any significant one, or half as much where the model is far off.
-        """
-        able = self.able(current)
-        good = [s for s in able if current.corrected[s.candidate.label] < LEVEL]
-        if not good and self.lacking(current.base):
-            good = [s for s in able if s.score.z > GATE_Z]
-        best = max((s.score.gain for s in good), default=0.0)
-        single = balances(current.base.problem)
-        alike: Counter[tuple[str, str, str]] = Counter()
-        few = []
-        for s in good:
-            instance, port = s.candidate.instance, s.candidate.port
-            if (instance, port) in single and "." in port:
-                alike[kind(s.candidate)] += 1
-                if alike[kind(s.candidate)] > MEMBERS:
-                    continue
-            if s.score.gain > PART * best:
-                few.append(s)
-        shared = [
-            s
-            for s in few[REFITS:]
-            if s.score.gain > SHARED * best
-            and s.candidate.port
-            and (s.candidate.instance, s.candidate.port) not in single
-        ]
-        chosen = few[:REFITS] + shared[:WHOLES]
-        if chosen and self.lacking(current.base):
-            known = {s.candidate.label for s in (*good, *chosen)}
-            least = best * (SHARED if is_open(current.base.estimate) else 1.0)
-            chosen += [
-                s for s in able
-                if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
-            ][:EXTRA]  # fmt: skip
-            chosen += groups_of(chosen, able, single, PART * best)
-        return sorted(chosen, key=lambda s: -s.score.gain)
-
-    def remaining(self, current: Round, tried: list[Signature]) -> list[Signature]:
-        """The next candidates of a round, where unused runs want none of the first.
-
-        What a far-off model lacks is in the variance of its blocks, so a law far down the list by
-        significance may be the right one.
-        """
-        known = {s.candidate.label for s in tried}
-        able = [s for s in self.able(current) if s.score.z > GATE_Z]
-        best = max((s.score.gain for s in able), default=0.0)
-        few = [s for s in able if s.score.gain > PART * best]
-        return [s for s in few if s.candidate.label not in known][:REFITS]
 
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.
@@ -320,22 +213,22 @@ class Search(LateFitter):
         """
         current = self.scored(start)
         current.base = base
-        promising = self.promising(current)
-        base = self.attempted(start, current, promising)
+        first = promising(self, current)
+        base = self.attempted(start, current, first)
         if current.winner is None and is_open(base.estimate):
-            remaining = self.remaining(current, promising)
-            if remaining:
-                self.say(f"unused runs want none of them; the next {len(remaining)}:")
-                base = self.attempted(start, current, remaining)
+            others = remaining(self, current, first)
+            if others:
+                self.say(f"unused runs want none of them; the next {len(others)}:")
+                base = self.attempted(start, current, others)
         if current.winner is None:
             return current
         if not current.open:
             challenged(self, base, current)
-            self.follow(current, self.released(current.winner, base))
+            current.follow(self.released(current.winner, base))
             needed(self, base, current)
             if current.winner is None:
                 return current
-            self.follow(current, self.sharpened(current.winner, base))
+            current.follow(self.sharpened(current.winner, base))
             settle(self, base, current)
             wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
             current.rivals = self.rivals(base, current.winner, wanted)
@@ -376,7 +269,7 @@ class Search(LateFitter):
             self.finish(base, current, LOOSE if self.far(base) else CLOSE, uncorrected=uncorrected)
             current.winner = self.chosen(base, current.fitted)
             if current.winner is not None:
-                self.follow(current, self.snapped(self.released(current.winner, base), base))
+                current.follow(self.snapped(self.released(current.winner, base), base))
         return base
 
     def opened(self, base: Fitted, current: Round) -> None:
@@ -402,7 +295,7 @@ class Search(LateFitter):
         better = self.released(found, base)
         if better is found:
             better = self.sharpened(found, base, draft=True)
-        self.follow(current, self.snapped(better, base))
+        current.follow(self.snapped(better, base))
         current.open = is_open(current.winner.estimate)
         if not current.open:
             return
@@ -410,7 +303,7 @@ class Search(LateFitter):
         kept = current.winner
         swapped = reconsidered(self, kept, [current])
         if swapped is not kept:
-            self.follow(current, self.snapped(self.released(swapped, base), base))
+            current.follow(self.snapped(self.released(swapped, base), base))
             current.open = is_open(current.winner.estimate)
 
     def recount(self, current: Round) -> Fitted:
@@ -428,12 +321,6 @@ class Search(LateFitter):
         current.quick = max(self.total(base, f) for f in current.fitted)
         return base
 
-    @staticmethod
-    def follow(current: Round, better: Fitted) -> None:
-        """Let another fit of a round's winner take its place."""
-        current.fitted = [better if f is current.winner else f for f in current.fitted]
-        current.winner = better
-
     def tried(self, start: Fitted, current: Round, item: Signature, *, again: bool) -> None:
         """Refit a candidate from a model's parameters and note what that gains."""
         base, fitted = current.base, self.refit(start, item, again=again)
@@ -446,43 +333,6 @@ class Search(LateFitter):
             f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
             f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
         )
-
-    def kin(self, base: Fitted, current: Round) -> list[Signature]:
-        """Twins of what was fitted that the winner must be compared with: they have not been.
-
-        To first order they are one, but where an effect explains millions of nats, what differs in
-        the sixth digit tells its place, and a simpler law there from the winner.
-        """
-        winner = current.winner
-        if winner is None or winner.signature is None:
-            return []
-        if ALIKE * self.total(base, winner) < GATE:
-            return []
-        last, tuned = winner.effects[-1], winner.signature.tuned
-        twins = [t for f in current.fitted if f.signature is not None for t in f.signature.twins]
-        return [
-            t for t in twins
-            if t.candidate.effect == last.effect
-            or (t.candidate.place == last.place and t.tuned < tuned)
-        ]  # fmt: skip
-
-    def simpler(self, current: Round) -> list[Signature]:
-        """Laws at the winner's place whose strength is the same quantity, with fewer parameters.
-
-        A bristle gives way before it slips, so to first order it explains dry friction where a law
-        that sticks at once does not; only fits show whether the simpler one does as well.
-        """
-        winner = current.winner
-        assert winner is not None and winner.signature is not None
-        last = winner.effects[-1]
-        scored = {s.candidate: s for s in current.signatures}
-        return [
-            scored.get(candidate) or unscored(probe)
-            for candidate, probe in current.probes.items()
-            if candidate.place == last.place and candidate not in winner.effects
-            and probe.strength.name.removeprefix(candidate.prefix) == winner.quantity
-            and probe.own < winner.signature.probe.own
-        ]  # fmt: skip
 
     def finish(
         self, base: Fitted, current: Round, share: float, *, uncorrected: bool = False

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate
-from .linear import MATERIAL, Absorber, Layout, score
+from .linear import MATERIAL, Absorber, SampleStack, score
 from .probes import Batch, Probe, batches
 from .signature import EVIDENT, SHARE, Signature
 from .visits import visited
@@ -62,9 +63,9 @@ class Bench:
     """Simulates candidates around one calibrated point.
 
     Args:
-        problem: without the candidates.
+        simulator: of the problem without the candidates.
         theta: calibrated values.
-        layout: of the runs that are simulated.
+        stack: of the runs that are simulated.
         model: model values over sigma at theta.
         residual: of theta.
         absorber: of the calibration, its rows multiplied by `root`.
@@ -73,15 +74,16 @@ class Bench:
 
     def __init__(
         self,
-        problem: Problem,
+        simulator: Simulator,
         theta: Vector,
-        layout: Layout,
+        stack: SampleStack,
         model: Vector,
         residual: Vector,
         absorber: Absorber,
         root: Vector | None = None,
     ) -> None:
-        self.problem, self.theta, self.layout = problem, theta, layout
+        self.simulator, self.problem = simulator, simulator.problem
+        self.theta, self.stack = theta, stack
         self.model, self.absorber = model, absorber
         self.root = np.ones_like(residual) if root is None else root
         self.residual = absorber.rest(self.root * residual)
@@ -90,14 +92,14 @@ class Bench:
 
     def at(self, problem: Problem, values: Mapping[str, float]) -> Vector:
         """Model values over sigma with strengths set."""
-        problem.limits = patience(self.problem)
+        simulator = self.simulator.of(problem).limited(patience(self.simulator))
         theta = problem.nominal
         theta[: self.theta.size] = self.theta
         for name, value in values.items():
             theta[problem.index(name)] = value
         with self._lock:
-            self.evaluations += len(self.layout.runs)
-        found = model_values(problem, theta, self.layout)
+            self.evaluations += len(self.stack.runs)
+        found = model_values(simulator, theta, self.stack)
         if not np.max(np.abs(found), initial=0.0) < RUNAWAY:
             raise CosimError(f"{problem.name}: with {values} the simulation runs away")
         return found
@@ -110,10 +112,10 @@ class Bench:
         def one(item: Item) -> list[Trials]:
             trials = function(item)
             for problem in {id(t.probe.problem): t.probe.problem for t in trials}.values():
-                problem.close()
+                self.simulator.of(problem).close()
             return trials
 
-        with ThreadPoolExecutor(self.problem.workers) as pool:
+        with ThreadPoolExecutor(self.simulator.workers) as pool:
             return [t for found in pool.map(one, items) for t in found]
 
     def begun(self, candidates: Sequence[Candidate], *, thorough: bool = False) -> list[Trials]:
@@ -123,13 +125,13 @@ class Bench:
 
         Args:
             candidates: which; those that cannot be simulated are left out.
-            thorough: try other values of parameters that ask for it (see `Parameter.tries`).
+            thorough: try other values of parameters that ask for it (see `SearchHints.tries`).
         """
 
         def simulated(batch: Batch) -> list[Trials]:
             trials = [Trials(p, p.strength.span) for p in batch.probes(self.problem)]
             if batch.apart and len(trials) == len(batch.candidates):
-                masks = {c.label: mask[self.layout.channel]
+                masks = {c.label: mask[self.stack.channel]
                          for c, mask in batch.members if mask is not None}  # fmt: skip
                 self._together(trials, masks)
                 if thorough:
@@ -168,7 +170,7 @@ class Bench:
 
         An oscillation at a frequency that is off by a few periods over the run is as good as none.
         """
-        for value in trials.probe.strength.tries:
+        for value in trials.probe.strength.hints.tries:
             try:
                 values = trials.probe.values(value, trials.second, trials.fixed)
                 found = self._measure(
@@ -186,7 +188,7 @@ class Bench:
         return (
             found is not None
             and abs(trials.wish) < ASKED
-            and self.layout.largest(found.change.astype(np.float64)) > BEYOND
+            and self.stack.largest(found.change.astype(np.float64)) > BEYOND
         )
 
     def _together(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
@@ -258,7 +260,7 @@ class Bench:
         choices = probe.choices
         if probe.visits:
             names, variables = zip(*probe.visits, strict=True)
-            points = visited(self.problem, self.theta, self.layout.runs, variables, PLACES)
+            points = visited(self.simulator, self.theta, self.stack.runs, variables, PLACES)
             choices += [dict(zip(names, point.tolist(), strict=True)) for point in points]
         return choices
 
@@ -285,7 +287,7 @@ class Bench:
         found = trials.best
         # the best trial need not be the last one; one that should be negative asks for nothing
         asked = (found.score.amplitude or abs(trials.wish)) * found.rest.astype(np.float64)
-        return self.layout.largest(asked) > WORTH * MATERIAL
+        return self.stack.largest(asked) > WORTH * MATERIAL
 
     def continued(self, found: Sequence[Signature]) -> list[Signature]:
         """Signatures over the runs of this bench of candidates that others have measured on some.
@@ -385,7 +387,7 @@ class Bench:
         rest = self.absorber.rest(counted)
         total = float(counted @ counted)
         absorbed = 1.0 - float(rest @ rest) / total if total > 0.0 else 1.0
-        result = score(rest, self.residual, self.layout, self.theta.size)
+        result = score(rest, self.residual, self.stack, self.theta.size)
         trials.promise, trials.wish = result.gain, result.amplitude
         if trials.probe.mix:  # two values were chosen by the same data: chi square of two
             result = replace(result, p_value=float(np.exp(-0.5 * result.z**2)))
@@ -472,19 +474,17 @@ def _mismatch(item: Signature) -> float:
     return abs(float(np.log(max(item.score.amplitude, 1e-6))))
 
 
-def patience(base: Problem) -> dict[str, float]:
+def patience(base: Simulator) -> dict[str, float]:
     """Processor time that the runs may take with an effect, from what they took without."""
     return {
-        run: max(PATIENCE * cost, EASY * float(np.ptp(base.run(run).times)))
+        run: max(PATIENCE * cost, EASY * float(np.ptp(base.problem.run(run).times)))
         for run, cost in base.costs.items()
     }
 
 
-def model_values(problem: Problem, theta: Vector, layout: Layout) -> Vector:
+def model_values(simulator: Simulator, theta: Vector, stack: SampleStack) -> Vector:
     """Model values over sigma at all measured samples."""
-    runs = [run.name for run in layout.runs]
-    residuals = problem.residuals(theta, runs)
-    rows = [
-        run.data / problem.sigma - r for run, (_, r) in zip(layout.runs, residuals, strict=True)
-    ]
-    return layout.vector(rows)
+    runs = [run.name for run in stack.runs]
+    residuals, sigma = simulator.residuals(theta, runs), simulator.problem.sigma
+    rows = [run.data / sigma - r for run, (_, r) in zip(stack.runs, residuals, strict=True)]
+    return stack.vector(rows)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.parts import Parameter
 from .candidates import Candidate
-from .linear import ABSORBED, Score
+from .linear import ABSORBED, ScoreTest
 from .probes import Probe
 
 Vector = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Signature:
         rest: what of it calibration cannot absorb, stretches that are far off counted less.
         score: of `rest` against the residual.
         absorbed: share of the signature's energy that calibration absorbs.
-        second: value of the effect's second parameter (see `Parameter.mix`).
+        second: value of the effect's second parameter (see `SearchHints.mix`).
         fixed: its parameters that have another value than its FMU's.
         twins: candidates with the same signature; fits may still tell them apart.
     """
@@ -48,7 +48,7 @@ class Signature:
     value: float
     change: NDArray[np.float32]
     rest: NDArray[np.float32]
-    score: Score
+    score: ScoreTest
     absorbed: float
     second: float = 0.0
     fixed: dict[str, float] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class Signature:
 def unscored(probe: Probe) -> Signature:
     """A candidate of which only fits are judged."""
     nothing = np.zeros(0, dtype=np.float32)
-    none = Score(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    none = ScoreTest(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     return Signature(probe, probe.strength.span, nothing, nothing, none, 0.0)
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ..calibrate.loss import WINDOW, mean_squares
 from ..calibrate.nuisance import starts
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
 from ..calibrate.staged import LEAST, LEFT
 
 Vector = NDArray[np.float64]
@@ -34,18 +35,18 @@ SEEN = 1.0
 """Mean square over the noise's of a window from which that change is seen."""
 
 
-def ends(problem: Problem, theta: Vector, names: Sequence[str]) -> dict[str, int]:
+def ends(simulator: Simulator, theta: Vector, names: Sequence[str]) -> dict[str, int]:
     """Run -> samples up to where the model has left it by an instability; others are not named.
 
     Args:
-        problem: with late parameters.
+        simulator: of a problem with late parameters.
         theta: fitted parameters.
         names: runs.
     """
-    residuals = dict(problem.residuals(theta, list(names)))
+    residuals = dict(simulator.residuals(theta, list(names)))
     moved: dict[str, Vector] = {}
-    for changed in _changed(problem):
-        for name, residual in changed.residuals(theta, list(names)):
+    for changed in _changed(simulator.problem):
+        for name, residual in simulator.limited({}).of(changed).residuals(theta, list(names)):
             change = mean_squares(residual - residuals[name])
             moved[name] = np.maximum(moved.get(name, 0.0), change.max(axis=1))
     found = {}
@@ -68,9 +69,7 @@ def ended(problem: Problem, sizes: Mapping[str, int]) -> Problem:
         if run.name in sizes else run
         for run in problem.runs
     ]  # fmt: skip
-    found = problem._with(runs=runs)
-    found.limits = problem.limits
-    return found
+    return problem.changed(runs=runs)
 
 
 def _changed(problem: Problem) -> list[Problem]:
@@ -85,7 +84,7 @@ def _changed(problem: Problem) -> list[Problem]:
         found[place[p.run]][p.run] = p.set(value)
         place[p.run] += 1
     return [
-        problem._with(
+        problem.changed(
             runs=[
                 replace(run, starts={**run.starts, **moved.get(run.name, {})})
                 for run in problem.runs

@@ -8,22 +8,26 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.parts import Channel, Run
-from ..calibrate.problem import Problem
+from ..calibrate.parts import Channel, MeasuredRun
+from ..calibrate.simulator import Simulator
 from ..errors import UnknownNameError
 
 Vector = NDArray[np.float64]
 
 
 def visited(
-    problem: Problem, theta: Vector, runs: Sequence[Run], variables: Sequence[str], most: int
+    simulator: Simulator,
+    theta: Vector,
+    runs: Sequence[MeasuredRun],
+    variables: Sequence[str],
+    most: int,
 ) -> Vector:
     """Points that the variables come by in a simulation, far from each other.
 
     Each is the one farthest from those before it, so the first few already span the path.
 
     Args:
-        problem: system.
+        simulator: of the system.
         theta: its parameters.
         runs: to simulate.
         variables: full names.
@@ -32,6 +36,7 @@ def visited(
     Returns:
         one row per point; none if the system lacks a variable.
     """
+    problem = simulator.problem
     system = problem.system()
     try:
         for name in variables:
@@ -45,7 +50,8 @@ def visited(
         if run.name in names
     ]
     channels = [Channel(name, "", 1.0, name) for name in variables]
-    spy = problem._with(runs=silent, channels=channels, relative=())
+    seen = problem.changed(runs=silent, channels=channels, relative=())
+    spy = simulator.limited({}).of(seen)
     path = np.concatenate([spy.simulate(theta, run) for run in silent])
     spy.close()
     points = [path[0]]

@@ -17,12 +17,10 @@ compiled code can make the same calls; `Block` holds the arrays that go with the
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import ctypes as ct
 import math
 import os
-import sys
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,11 +30,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import EndRequest, FmuCallError, FmuFileError, ValueRangeError
+from ..errors import EndRequest, FmuCallError, ValueRangeError
 from .archive import Fmu, open_fmu
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
+from .library import bind
 from .messages import STATUS, forget, new_key, take
 from .values import check_values
 
@@ -48,58 +47,7 @@ SAME = 1e-9
 WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
 """How messages begin that are more than information."""
 
-_libraries: dict[str, Any] = {}
-_functions: dict[tuple[str, int], dict[str, Any]] = {}
 _single: set[str] = set()
-
-
-def _library(fmu: Fmu) -> Any:
-    path = str(fmu.binary)
-    if path not in _libraries:
-        try:
-            if sys.platform == "win32":
-                with os.add_dll_directory(str(fmu.binary.parent)):
-                    _libraries[path] = ct.CDLL(path)
-            else:
-                _libraries[path] = ct.CDLL(path)
-        except OSError as error:
-            raise FmuFileError(
-                f"{fmu.path}: its binary cannot be loaded ({error}); it may need a library that "
-                "this machine lacks"
-            ) from error
-        # libraries of pythonfmu release their state twice when the process ends, unless told before
-        finalize = getattr(_libraries[path], "finalizePythonInterpreter", None)
-        if finalize is not None:
-            atexit.register(finalize)
-    return _libraries[path]
-
-
-def _bound(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
-    """A binding to an FMU's library, and its functions, made once for all instances."""
-    library = _library(fmu)
-    key = str(fmu.binary), fmu.description.fmi
-    try:
-        binding = Fmi2(library) if fmu.description.fmi == 2 else Fmi3(library)
-        if key not in _functions:
-            functions = {
-                name: _prototype(library, name, signature)
-                for name, signature in binding.SIGNATURES.items()
-            }
-            for name, signature in binding.OPTIONAL.items():
-                if hasattr(library, name):
-                    functions[name] = _prototype(library, name, signature)
-            _functions[key] = functions
-    except AttributeError as error:
-        raise FmuFileError(
-            f"{fmu.path}: its binary lacks a function of FMI {fmu.description.fmi}.0 ({error})"
-        ) from error
-    return binding, _functions[key]
-
-
-def _prototype(library: Any, name: str, signature: tuple[Any, ...]) -> Any:
-    function = library[name]  # a fresh object: prototypes are not shared between bindings
-    function.argtypes, function.restype = list(signature), ct.c_int
-    return function
 
 
 @dataclass(frozen=True)
@@ -137,7 +85,7 @@ class Instance:
                 "and it already is; run the other instance in a process of its own"
             )
         self.binding: Fmi2 | Fmi3
-        self.binding, self._functions = _bound(fmu)
+        self.binding, self._functions = bind(fmu)
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments(True)
         self._warned: dict[str, float] = {}

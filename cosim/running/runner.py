@@ -195,11 +195,10 @@ def _recorded(
     """Signals to record, and notes on what a changed variant does not have."""
     needed = [name for item in scenario.references.values() for name in item.signals]
     needed += [name for check in scenario.checks for name in check.needs]
-    shown = [name for axes in scenario.plots for name in axes.needs]
-    if scenario.record is None:
-        return tuple(dict.fromkeys([*system.signals(), *needed])), []
+    shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
+    everything = system.signals() if scenario.record is None else scenario.record
     kept, notes = [], []
-    for name in (*scenario.record, *shown):
+    for name in (*everything, *shown):
         instance = name.partition(".")[0]
         try:
             system.variables(name)

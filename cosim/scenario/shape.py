@@ -28,11 +28,14 @@ OUTSIDE: dict[str, Check] = {
     "table": table, "runs": table_of(table),
 }  # fmt: skip
 """Before rows of a table are filled in, which may stand for texts and numbers."""
-_MANY = list_of(floating)
-_ONE = either("a number or a list of numbers", floating, _MANY)
+_VALUE = either("a number, a text or a truth value", number, text, flag)
+_VALUES = list_of(
+    either("a number, a text, a truth value or a row of such", _VALUE, list_of(_VALUE))
+)
 _SOURCE: dict[str, Check] = {
     "file": path, "data": path, "run": said, "column": said, "columns": list_of(said),
-    "time": said, "unit": said, "constant": _ONE, "times": _MANY, "values": _MANY,
+    "time": said, "unit": said, "constant": either("a value or a list of values", _VALUE, _VALUES),
+    "times": list_of(floating), "values": list_of(_VALUE),
     "interpolation": text,
 }  # fmt: skip
 _POINT = list_of(number, 2)
@@ -56,7 +59,7 @@ INSIDE: dict[str, Check] = {
     "duration": number, "start": number, "step": number, "tolerance": number, "algorithm": text,
     "variants": table_of(text), "parameters": table, "options": table,
     "inputs": table_of(
-        either("a number, a list of numbers or a table", floating, _MANY, table)
+        either("a value, a list of values or a table", _VALUE, _VALUES, table)
     ),
     "compare": table_of(table), "record": keyed({"signals": texts, "period": number}),
     "checks": list_of(keyed(_CHECK)), "plots": list_of(keyed(_AXES)), "plot": texts,

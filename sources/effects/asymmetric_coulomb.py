@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -34,7 +36,7 @@ A = Quantity(
     start=1.0,
     minimum=-1.0,
     maximum=1.0,
-    mix="shift",
+    hints=SearchHints(mix="shift"),
 )
 W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 

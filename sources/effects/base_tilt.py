@@ -13,12 +13,19 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 TILT = Quantity("tilt", "rad", "angle from the level, 0 = absent", start=0.01, strength=True)
-HEADING = Quantity("heading", "rad", "direction of the axis of tilt, from the x axis", mix="turn")
+HEADING = Quantity(
+    "heading",
+    "rad",
+    "direction of the axis of tilt, from the x axis",
+    hints=SearchHints(mix="turn"),
+)
 
 EFFECT = Effect(
     "base_tilt",

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -22,8 +24,15 @@ from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
 TAU_C = Quantity("tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True)
-N = Quantity("n", "1", "cycles per revolution of the shaft", start=12.0, minimum=0.1, tries=ORDERS)
-PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+N = Quantity(
+    "n",
+    "1",
+    "cycles per revolution of the shaft",
+    start=12.0,
+    minimum=0.1,
+    hints=SearchHints(tries=ORDERS),
+)
+PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
 EFFECT = Effect(
     "cogging",

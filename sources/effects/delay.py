@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.history import NEVER, PERIOD, History
@@ -31,7 +33,7 @@ T_D = Quantity(
     minimum=0.0,
     maximum=100.0,
     strength=True,
-    lattice=PERIOD.starts()[0],
+    hints=SearchHints(lattice=PERIOD.starts()[0]),
     variability="fixed",
 )
 

@@ -14,13 +14,18 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 SLOPE = Quantity("slope", "rad", "angle of the slope, 0 = absent", start=0.005, strength=True)
 HEADING = Quantity(
-    "heading", "rad", "direction in which the floor rises, from the world x axis", mix="turn"
+    "heading",
+    "rad",
+    "direction in which the floor rises, from the world x axis",
+    hints=SearchHints(mix="turn"),
 )
 
 EFFECT = Effect(

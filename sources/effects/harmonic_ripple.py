@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -24,7 +26,7 @@ A = Quantity(
     "a", "N.m", "amplitude on the joint, 0 = absent", start=1.0, nominal=1.0, strength=True
 )
 N = Quantity("N", "1", "ratio of the gear", start=101.0, minimum=0.1)
-PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
 EFFECT = Effect(
     "harmonic_ripple",

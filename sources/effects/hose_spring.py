@@ -9,6 +9,8 @@ Source: Hooke's law.
 
 from __future__ import annotations
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -17,7 +19,9 @@ from ..quantity import Quantity
 K = Quantity(
     "k", "N.m/rad", "stiffness, 0 = absent", start=2.0, minimum=0.0, nominal=1.0, strength=True
 )
-THETA_0 = Quantity("theta_0", "rad", "angle at which the hose hangs free", mix="shift")
+THETA_0 = Quantity(
+    "theta_0", "rad", "angle at which the hose hangs free", hints=SearchHints(mix="shift")
+)
 
 EFFECT = Effect(
     "hose_spring",

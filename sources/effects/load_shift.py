@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -25,7 +27,10 @@ SHIFT = Quantity(
     strength=True,
 )
 DIRECTION = Quantity(
-    "direction", "rad", "direction of the shift, 0 forward, positive to the left", mix="turn"
+    "direction",
+    "rad",
+    "direction of the shift, 0 forward, positive to the left",
+    hints=SearchHints(mix="turn"),
 )
 
 EFFECT = Effect(

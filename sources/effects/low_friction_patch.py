@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -24,8 +26,10 @@ REDUCTION = Quantity(
     maximum=1.0,
     strength=True,
 )
-X_P = Quantity("x_p", "m", "world position of the centre", start=0.5, visits="pose_x")
-Y_P = Quantity("y_p", "m", "world position of the centre", visits="pose_y")
+X_P = Quantity(
+    "x_p", "m", "world position of the centre", start=0.5, hints=SearchHints(visits="pose_x")
+)
+Y_P = Quantity("y_p", "m", "world position of the centre", hints=SearchHints(visits="pose_y"))
 RADIUS = Quantity("radius", "m", "radius of the patch", start=0.3, minimum=1e-3)
 
 EFFECT = Effect(

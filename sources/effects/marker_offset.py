@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -22,7 +24,10 @@ DISTANCE = Quantity(
     "distance", "m", "offset of the marker, 0 = absent", start=0.01, minimum=0.0, strength=True
 )
 DIRECTION = Quantity(
-    "direction", "rad", "direction of the offset in the body, 0 forward, left > 0", mix="turn"
+    "direction",
+    "rad",
+    "direction of the offset in the body, 0 forward, left > 0",
+    hints=SearchHints(mix="turn"),
 )
 
 EFFECT = Effect(

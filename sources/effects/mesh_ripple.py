@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -29,8 +31,15 @@ EPS = Quantity(
     start=2e-4,
     strength=True,
 )
-N = Quantity("n", "1", "cycles per revolution of the output", start=30.0, minimum=0.1, tries=ORDERS)
-PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+N = Quantity(
+    "n",
+    "1",
+    "cycles per revolution of the output",
+    start=30.0,
+    minimum=0.1,
+    hints=SearchHints(tries=ORDERS),
+)
+PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
 EFFECT = Effect(
     "mesh_ripple",

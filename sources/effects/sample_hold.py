@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.history import NEVER
@@ -31,7 +33,7 @@ T_S = Quantity(
     minimum=0.0,
     strength=True,
     variability="fixed",
-    tries=PERIODS,
+    hints=SearchHints(tries=PERIODS),
 )
 HELD = Quantity("held", "1", "value at the last sample")
 STARTED = Quantity("started", "1", "1 once the first sample is taken")

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -20,8 +22,15 @@ from ..laws.orders import ORDERS
 from ..quantity import Quantity
 
 R = Quantity("r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True)
-N = Quantity("n", "1", "cycles per revolution of the motor", start=12.0, minimum=0.1, tries=ORDERS)
-PSI = Quantity("psi", "rad", "phase at angle 0", mix="turn")
+N = Quantity(
+    "n",
+    "1",
+    "cycles per revolution of the motor",
+    start=12.0,
+    minimum=0.1,
+    hints=SearchHints(tries=ORDERS),
+)
+PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
 EFFECT = Effect(
     "torque_ripple",

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.angle import shaft_angle
@@ -21,7 +23,9 @@ from ..quantity import Quantity
 M_U = Quantity(
     "m_u", "N.m", "weight times its distance from the axis, 0 = absent", start=0.2, strength=True
 )
-PSI = Quantity("psi", "rad", "angle of the weight from below at shaft angle 0", mix="turn")
+PSI = Quantity(
+    "psi", "rad", "angle of the weight from below at shaft angle 0", hints=SearchHints(mix="turn")
+)
 
 EFFECT = Effect(
     "unbalance",

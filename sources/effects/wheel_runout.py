@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -18,7 +20,9 @@ from ..quantity import Quantity
 E = Quantity(
     "e", "m", "amplitude of the radius, 0 = absent", start=5e-4, nominal=1e-3, strength=True
 )
-PHI_0 = Quantity("phi_0", "rad", "wheel angle at which the radius is largest", mix="turn")
+PHI_0 = Quantity(
+    "phi_0", "rad", "wheel angle at which the radius is largest", hints=SearchHints(mix="turn")
+)
 
 EFFECT = Effect(
     "wheel_runout",

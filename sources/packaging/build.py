@@ -19,6 +19,7 @@ from typing import Literal
 import casadi as ca
 
 from cosim import spec
+from cosim.spec import hints
 from cosim.spec.variant import Name
 
 from ..function import Functions, build_functions
@@ -100,12 +101,7 @@ def component_json(variant: Variant) -> bytes:
             if variable.of_effect and variable.quantity.strength
         ],
     }
-    for hint, plural in (
-        ("mix", "mixes"), ("tries", "tries"), ("lattice", "lattices"), ("visits", "visits")
-    ):  # fmt: skip
-        hints = {v.name: getattr(v.quantity, hint) for v in model.of_role("parameter")}
-        if hints := {name: value for name, value in hints.items() if value}:
-            content[plural] = hints
+    content |= hints.to_json({v.name: v.quantity.hints for v in model.of_role("parameter")})
     return (json.dumps(content, indent=2) + "\n").encode()
 
 

@@ -17,34 +17,52 @@ def _plain(component: str) -> dict[str, Model]:
     return {name: build_model(f"{component}/{name}") for name in fidelities(component)}
 
 
-@lru_cache(maxsize=1)
-def names() -> tuple[str, ...]:
-    """Canonical names of all catalogued variants.
+@lru_cache(maxsize=None)
+def names(component: str = "") -> tuple[str, ...]:
+    """Canonical names of all catalogued variants, or of those of one component.
 
     Every fidelity of every component, for the other devices too where their values are baked into
     the code (elsewhere they only change start values); and every effect once per component, on the
     highest fidelity that has a balance for it. Any other combination can be built by its name.
     """
+    if not component:
+        return tuple(name for each in components() for name in names(each))
     found: list[str] = []
-    for component, declared in components().items():
-        models = _plain(component)
-        found += [f"{component}/{fidelity}" for fidelity in models]
-        for device in devices(component):
-            if device != declared.device:
-                found += [
-                    f"{component}.{device}/{fidelity}"
-                    for fidelity, model in models.items()
-                    if model.baked
-                ]
-        for effect, module in effects().items():
-            fitting = [
-                fidelity
+    declared = components()[component]
+    models = _plain(component)
+    found += [f"{component}/{fidelity}" for fidelity in models]
+    for device in devices(component):
+        if device != declared.device:
+            found += [
+                f"{component}.{device}/{fidelity}"
                 for fidelity, model in models.items()
-                if any(not misfit(module.EFFECT, b) for b in model.balances.values())
+                if model.baked
             ]
-            if fitting:
-                found.append(f"{component}/{fitting[-1]}+{effect}")
+    for effect, module in effects().items():
+        fitting = [
+            fidelity
+            for fidelity, model in models.items()
+            if any(not misfit(module.EFFECT, b) for b in model.balances.values())
+        ]
+        if fitting:
+            found.append(f"{component}/{fitting[-1]}+{effect}")
     return tuple(found)
+
+
+def overview() -> list[dict[str, Any]]:
+    """Every component with its fidelities, simplest first, and its devices.
+
+    No model is built, so that this answers at once; `describe` says what a variant offers.
+    """
+    return [
+        {
+            "component": name,
+            "description": declared.text,
+            "fidelities": list(fidelities(name)),
+            "devices": list(devices(name)),
+        }
+        for name, declared in components().items()
+    ]
 
 
 def candidates(name: str) -> list[tuple[str, str, str]]:
@@ -81,7 +99,7 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
 def _has_place(effect: str) -> bool:
     """Whether an effect sits at a point in the world."""
     values = vars(effects()[effect]).values()
-    return any(isinstance(v, Quantity) and v.visits for v in values)
+    return any(isinstance(v, Quantity) and v.hints.visits for v in values)
 
 
 def refinements(name: str) -> list[dict[str, Any]]:

@@ -25,6 +25,8 @@ from dataclasses import replace
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from .. import ur5_arm as qs
 from ..component import Fidelity, Solver
 from ..model import Model
@@ -43,7 +45,7 @@ C = Quantity(
     nominal=1e-4,
     size=6,
     strength=True,
-    tries=COMPLIANCES,
+    hints=SearchHints(tries=COMPLIANCES),
 )
 T_D = Quantity(
     "t_d",

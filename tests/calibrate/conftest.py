@@ -10,6 +10,7 @@ import pytest
 
 from cosim.calibrate import Problem, read_problem
 from cosim.data.signals import Table
+from tests.problems import simulator
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "scenarios" / "motor_bench" / "data" / "MB-12"
@@ -19,7 +20,7 @@ LENGTH = 2001
 @pytest.fixture(scope="session")
 def measured() -> Problem:
     """The committed data set."""
-    return read_problem(DATA, workers=2)
+    return read_problem(DATA)
 
 
 @pytest.fixture(scope="session")
@@ -54,13 +55,13 @@ def short(measured: Problem) -> Problem:
             ("check", "validation", sines[::-1] + stairs - sines[-1]),
         )
     ]
-    return measured._with(runs=runs)
+    return measured.changed(runs=runs)
 
 
 @pytest.fixture(scope="session")
 def exact(short: Problem, truth: np.ndarray) -> dict[str, np.ndarray]:
     """What the channels read without noise."""
-    return {run.name: short.simulate(truth, run) for run in short.runs}
+    return {run.name: simulator(short).simulate(truth, run) for run in short.runs}
 
 
 @pytest.fixture

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 
+from cosim.calibrate.differences import directional, jacobian
 from cosim.calibrate.estimate import channel_rms
-from cosim.calibrate.fit import fit
-from cosim.calibrate.problem import Problem
+from cosim.calibrate.fit import Effort, fit
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
+from cosim.calibrate.simulator import Simulator
 from cosim.errors import FmuCallError
+from tests.problems import simulator
 
 
 @pytest.mark.slow
@@ -17,7 +21,7 @@ def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
     covered, errors = [], []
     for seed in range(6):
         problem = noisy(seed)
-        estimate = fit(problem)
+        estimate = fit(simulator(problem))
         known = estimate.identifiable
         assert known.sum() == 5  # all but eta, J_load and b
         deviation = estimate.deviation[known]
@@ -25,7 +29,7 @@ def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
         covered += ((estimate.low <= truth) & (truth <= estimate.high))[known].tolist()
         # Student's factor of 30 blocks is 2.04; 4 s of data have four blocks of a second
         assert np.max((estimate.high - estimate.low)[known] / deviation) < 2.0 * 2.1
-        problem.close()
+        simulator(problem).close()
     # 30 cases at 95 %: fewer than 25 has a probability of 6e-4
     assert np.sum(covered) >= 25
     # standard deviations off by a factor of 2 would give 2 or 0.5; 30 cases scatter by 0.13
@@ -35,7 +39,7 @@ def test_parameters_are_recovered_with_honest_intervals(noisy, truth) -> None:
 @pytest.mark.slow
 def test_inseparable_parameters_are_named(noisy) -> None:
     problem = noisy(10)
-    estimate = fit(problem, polish=False)
+    estimate = fit(simulator(problem), effort=Effort(end="intervals"))
     flags = dict(zip(problem.names, estimate.identifiable.tolist(), strict=True))
     assert not flags["eta"] and not flags["J_load"] and not flags["b"]
     assert flags["K_t"] and flags["Kp_v"] and flags["acc_max"]
@@ -54,7 +58,7 @@ def test_inseparable_parameters_are_named(noisy) -> None:
 
 def test_residuals_of_the_truth_are_noise(noisy, truth) -> None:
     problem = noisy(1)
-    rms = channel_rms(problem, problem.residuals(truth))
+    rms = channel_rms(problem, simulator(problem).residuals(truth))
     # 4002 samples per channel: 5 standard deviations are 5/sqrt(2 * 4002) = 0.056
     assert all(abs(value - 1.0) < 0.06 for value in rms.values())
 
@@ -65,7 +69,7 @@ def test_gaps_are_left_out(noisy, truth) -> None:
     data = {run.name: run.data.copy() for run in problem.runs}
     data["sines"][300:700, 0] = np.nan
     data["stairs"][:, 3] = np.nan
-    estimate = fit(problem.with_data(data), polish=False)
+    estimate = fit(simulator(problem.with_data(data)), effort=Effort(end="intervals"))
     fitted = [data[name] for name in ("sines", "stairs")]
     assert estimate.count == sum(int(np.isfinite(item).sum()) for item in fitted)
     error = np.abs(estimate.theta - truth)[estimate.identifiable]
@@ -80,19 +84,23 @@ def test_effects_without_strength_change_nothing(short, truth) -> None:
     strength = next(p for p in added if p.strength)
     assert (strength.name, strength.nominal) == ("load.coulomb.tau_c", 0.0)
     theta = np.concatenate([truth, [p.nominal for p in added]])
-    assert np.array_equal(effect.simulate(theta, "sines"), short.simulate(truth, "sines"))
+    assert np.array_equal(
+        simulator(effect).simulate(theta, "sines"), simulator(short).simulate(truth, "sines")
+    )
     theta[effect.index("load.coulomb.tau_c")] = 0.5
-    assert not np.array_equal(effect.simulate(theta, "sines"), short.simulate(truth, "sines"))
+    assert not np.array_equal(
+        simulator(effect).simulate(theta, "sines"), simulator(short).simulate(truth, "sines")
+    )
 
 
 def test_directional_derivatives_are_those_of_the_jacobian(short, truth) -> None:
-    jacobian = short.jacobian(truth, ["sines"], relative=1e-2)[0]
+    along = jacobian(simulator(short), truth, ["sines"], relative=1e-2)[0]
     random = np.random.default_rng(0)
     directions = np.linalg.qr(random.normal(size=(truth.size, truth.size)))[0]
-    other = short.directional(truth, "sines", directions, relative=1e-2)
-    difference = np.linalg.norm((jacobian.values - other.values) * short.scale)
+    other = directional(simulator(short), truth, "sines", directions, relative=1e-2)
+    difference = np.linalg.norm((along.values - other.values) * short.scale)
     # both are differences over 1 % of the spans; limits and ticks make them scatter
-    assert difference < 0.05 * np.linalg.norm(jacobian.values * short.scale)
+    assert difference < 0.05 * np.linalg.norm(along.values * short.scale)
 
 
 @pytest.mark.parametrize("central", [False, True])
@@ -101,16 +109,16 @@ def test_a_difference_that_cannot_be_simulated_is_taken_on_the_other_side(
     short, truth, monkeypatch, sign, central
 ) -> None:
     """One simulation of hundreds that a solver gives up must not end a fit."""
-    whole = short.jacobian(truth, ["sines"], central=central)[0].values
-    simulate = Problem.simulate
+    whole = jacobian(simulator(short), truth, ["sines"], central=central)[0].values
+    simulate = Simulator.simulate
 
     def strict(self, theta, run):
         if sign * (theta[2] - truth[2]) > 0.0:
             raise FmuCallError("it took too long")
         return simulate(self, theta, run)
 
-    monkeypatch.setattr(Problem, "simulate", strict)
-    found = short.jacobian(truth, ["sines"], central=central)[0].values
+    monkeypatch.setattr(Simulator, "simulate", strict)
+    found = jacobian(simulator(short), truth, ["sines"], central=central)[0].values
     others = [i for i in range(truth.size) if i != 2]
     assert np.array_equal(found[:, :, others], whole[:, :, others])
     # one-sided differences over a thousandth of the span
@@ -122,26 +130,37 @@ def test_a_difference_that_cannot_be_simulated_is_taken_on_the_other_side(
             raise FmuCallError("it took too long")
         return simulate(self, theta, run)
 
-    monkeypatch.setattr(Problem, "simulate", refused)
+    monkeypatch.setattr(Simulator, "simulate", refused)
     with pytest.raises(FmuCallError, match="too long"):
-        short.jacobian(truth, ["sines"], central=central)
+        jacobian(simulator(short), truth, ["sines"], central=central)
 
 
 def test_held_parameters_leave(short, truth) -> None:
     held = short.hold({"J_load": float(truth[4])})
     assert "J_load" not in held.names
     rest = np.delete(truth, 4)
-    assert np.array_equal(held.simulate(rest, "sines"), short.simulate(truth, "sines"))
+    assert np.array_equal(
+        simulator(held).simulate(rest, "sines"), simulator(short).simulate(truth, "sines")
+    )
 
 
 @pytest.mark.slow
 def test_sensitivity(noisy, truth) -> None:
     problem = noisy(3).only(["sines"])
-    correlation = correlation_index(problem, truth, 60, width=0.3)
+    correlation = correlation_index(simulator(problem), truth, 60, width=0.3)
     assert correlation.samples == 60
     # the digital twin paper's 20 sets: 0.444 for one parameter
     assert significance_limit(20, 1) == pytest.approx(0.444, abs=5e-4)
     assert all(-1.0 <= value <= 1.0 for value in correlation.index.values())
-    estimate = fit(problem, truth, robust=False, polish=False)
+    estimate = fit(simulator(problem), truth, effort=Effort("near", "intervals"))
     values = local(estimate)
     assert values["Kp_v"] > values["b"] > 0.0
+
+
+def test_a_problem_stays_what_it_is(short) -> None:
+    with pytest.raises(FrozenInstanceError):
+        short.step = 0.5 * short.step
+    with pytest.raises(FrozenInstanceError):
+        short.model.instances = {}
+    finer = short.changed(step=0.5 * short.step)
+    assert finer.step == 0.5 * short.step and finer.model is short.model

@@ -10,28 +10,29 @@ import pytest
 from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.parts import Coarse
 from cosim.errors import ScenarioError, UnknownNameError
+from tests.problems import simulator
 
 
 def test_settings_hold_at_the_search_step_only_and_stay_near(short: Problem, truth) -> None:
     run = short.runs[0]
     coarse = Coarse(5e-4, {"extrapolation": 1}, {"motor.T_current": 2.5e-4})
-    problem = short._with(search=coarse)
-    exact = short.simulate(truth, run)
-    np.testing.assert_array_equal(problem.simulate(truth, run), exact)
+    problem = short.changed(search=coarse)
+    exact = simulator(short).simulate(truth, run)
+    np.testing.assert_array_equal(simulator(problem).simulate(truth, run), exact)
     assert problem.system().members["motor"].parameters["T_current"] == 5e-5  # the rig's
-    quick = problem._with(step=coarse.step)
-    assert quick.session(run).master.options == {"extrapolation": 1}
+    quick = problem.changed(step=coarse.step)
+    assert simulator(quick).session(run).master.options == {"extrapolation": 1}
     assert quick.system().members["motor"].parameters["T_current"] == 2.5e-4
-    changed = quick.simulate(truth, run)
+    changed = simulator(quick).simulate(truth, run)
     # a current loop five times slower and a torque without the delay of a tick: below the noise
     difference = np.sqrt(np.mean((changed - exact) ** 2, axis=0)) / short.sigma
     assert np.all(difference < 1.0) and np.max(difference) > 0.0
     for item in (problem, quick):
-        item.close()
+        simulator(item).close()
 
 
 def test_unknown_names_in_search_parameters_are_refused(short: Problem) -> None:
-    wrong = short._with(step=5e-4, search=Coarse(5e-4, {}, {"motor.T_curent": 2.5e-4}))
+    wrong = short.changed(step=5e-4, search=Coarse(5e-4, {}, {"motor.T_curent": 2.5e-4}))
     with pytest.raises(UnknownNameError, match="T_curent"):
         wrong.system()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from cosim.calibrate.fit import Descent
+from cosim.calibrate.descent import Descent
 from cosim.calibrate.weak import confirmed
 
 # two nearly collinear columns, and a third one that both share something with
@@ -57,10 +57,13 @@ def linear(matrix: np.ndarray) -> SimpleNamespace:
     problem = SimpleNamespace(
         lower=np.full(size, -1.0), upper=np.full(size, 1.0), scale=np.ones(size),
         parameters=[item] * size,
-        residuals=lambda theta, purpose: [("run", -(matrix @ theta)[:, None])],
     )  # fmt: skip
+    simulator = SimpleNamespace(
+        residuals=lambda theta, purpose: [("run", -(matrix @ theta)[:, None])]
+    )
     return SimpleNamespace(
-        problem=problem, theta=np.zeros(size), residuals=[("run", np.zeros((len(matrix), 1)))],
+        problem=problem, simulator=simulator, theta=np.zeros(size),
+        residuals=[("run", np.zeros((len(matrix), 1)))],
         purpose="identification", jacobian=[slopes],
     )  # fmt: skip
 
@@ -96,7 +99,10 @@ def test_a_direction_that_rounding_has_turned_is_judged_by_what_no_other_can_und
 def test_a_point_that_rounds_past_a_bound_is_tried_at_the_bound() -> None:
     run = Descent.__new__(Descent)
     run.problem = SimpleNamespace(  # type: ignore[assignment]
-        lower=np.zeros(1), upper=np.array([0.3]), residuals=lambda theta, purpose: [theta]
+        lower=np.zeros(1), upper=np.array([0.3])
+    )
+    run.simulator = SimpleNamespace(  # type: ignore[assignment]
+        residuals=lambda theta, purpose: [theta]
     )
     run.purpose, run.theta, run.cost = "identification", np.array([0.1]), 1.0
     run.total = lambda theta, residuals: 0.0  # type: ignore[method-assign]

@@ -10,6 +10,7 @@ import pytest
 from benchmarks.real_logs import ends
 from cosim.calibrate import Problem, read_problem
 from cosim.errors import ScenarioError
+from tests.problems import simulator
 
 HEAD = """
 system = "system.toml"
@@ -57,12 +58,12 @@ def problem_of(folder: Path, text: str, **content: np.ndarray) -> Problem:
     (folder / "system.toml").write_text(
         'description = "Base."\n[instances]\nbase = "diff_drive.neato/rolling"\n'
     )
-    return read_problem(folder, workers=1)
+    return read_problem(folder)
 
 
 def worst(problem: Problem) -> float:
     """Largest residual over sigma with the true track."""
-    found = problem.residuals(np.array([0.235]), None)
+    found = simulator(problem).residuals(np.array([0.235]), None)
     return max(float(np.nanmax(np.abs(values))) for _, values in found)
 
 
@@ -76,7 +77,7 @@ def test_windows_begin_at_the_measured_pose(tmp_path: Path) -> None:
     assert problem.run("one 2").times[-1] == pytest.approx(5.0)
     # 1e-5 sigma is 0.1 um over 0.75 m: the solver's error on a circle is smaller
     assert worst(problem) < 1e-5
-    found = ends(problem, np.array([0.25]), {"position": ["x", "y"], "yaw": "yaw"})
+    found = ends(simulator(problem), np.array([0.25]), {"position": ["x", "y"], "yaw": "yaw"})
     error = found["one (identification)"]
     assert error.shape == (4, 3)
     # a track of 0.25 m instead of 0.235 m turns by 5 s * 0.1 m/s * (1/0.235 - 1/0.25) too little

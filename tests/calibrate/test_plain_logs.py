@@ -11,6 +11,7 @@ from scipy.io import savemat
 from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.mapping import snapped
 from cosim.errors import ScenarioError
+from tests.problems import simulator
 
 MAPPING = """
 system = "motor_bench"
@@ -71,7 +72,7 @@ def test_other_clocks_scales_and_signs(
     else:
         savemat(tmp_path / "one.mat", content)
     (tmp_path / "dataset.toml").write_text(MAPPING.replace("SUFFIX", suffix))
-    problem = read_problem(tmp_path, workers=1)
+    problem = read_problem(tmp_path)
     one = problem.run("one")
     assert one.times == pytest.approx(run.times, abs=1e-9)  # 7e4 ms in doubles
     assert one.data[:, 0] == pytest.approx(current, abs=1e-12)  # factors 1000 and back
@@ -81,7 +82,7 @@ def test_other_clocks_scales_and_signs(
     # interpolated over 4 ms at accelerations up to 2e4 rad/s2: 4e-3^2/8 * 2e4 = 0.04 rad
     assert np.max(np.abs(one.data[good, 1] - angle[good])) < 0.04
     assert problem.channels[0].unit == "A"
-    assert problem.simulate(problem.nominal, "one").shape == one.data.shape
+    assert simulator(problem).simulate(problem.nominal, "one").shape == one.data.shape
 
 
 def test_faults_of_a_mapping_are_named(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from cosim.calibrate.problem import Problem
 from cosim.calibrate.refinement import Refinement
 from cosim.diagnose.candidates import candidates
 from sources.packaging.catalog import refinements
+from tests.problems import simulator
 
 HELD = (("signed", 0.0),)
 ELASTIC = Refinement("elastic", "elastic", "k", "k", held=HELD)
@@ -15,12 +16,12 @@ PLAY = Refinement("backlash", "elastic+backlash@spring", "spring.backlash.gap", 
 
 
 def residual_size(problem: Problem, theta: np.ndarray, data: np.ndarray) -> float:
-    model = problem.simulate(theta, "sines")
+    model = simulator(problem).simulate(theta, "sines")
     return float(np.sqrt(np.mean(((model - data) / problem.sigma) ** 2)))
 
 
 def test_the_stiff_limit_is_the_declared_gearbox(short: Problem, truth: np.ndarray) -> None:
-    rigid = short.simulate(truth, "sines")
+    rigid = simulator(short).simulate(truth, "sines")
     elastic = ELASTIC.added_to(short, "gearbox")
     (compliance,) = [p for p in elastic.parameters if p.inverse]
     theta = elastic.nominal

@@ -12,10 +12,11 @@ import pytest
 from cosim.calibrate import Problem
 from cosim.calibrate.validate import Finding, _check_swaps, check_data, check_model
 from cosim.data.signals import Table
+from tests.problems import simulator
 
 
 def findings(problem: Problem) -> list[Finding]:
-    return check_data(problem) + check_model(problem)
+    return check_data(problem) + check_model(simulator(problem))
 
 
 def changed(problem: Problem, column: str, function) -> Problem:
@@ -87,7 +88,7 @@ def test_swapped_columns(noisy) -> None:
     channels = [replace(c, unit="A") if c.name == "voltage" else c for c in problem.channels]
     order = [0, 2, 1, 3]
     data = {run.name: run.data[:, order] for run in problem.runs}
-    found = findings(problem._with(channels=channels).with_data(data))
+    found = findings(problem.changed(channels=channels).with_data(data))
     columns = {"current", "voltage"}
     assert any(
         f.kind in ("swapped", "unit") and set(f.column.split(" and ")) & columns for f in found
@@ -122,7 +123,7 @@ def test_short_run_and_clock_that_goes_back(noisy) -> None:
         replace(second, times=times),
         third,
     ]
-    found = check_data(problem._with(runs=runs))
+    found = check_data(problem.changed(runs=runs))
     assert {(f.kind, f.run) for f in found} >= {("short", "sines"), ("clock", "stairs")}
     assert all(f.column == "time" for f in found)
 
@@ -163,6 +164,6 @@ def test_all_problems_are_listed_at_once(noisy) -> None:
         if run.name == "check" else run
         for run in problem.runs
     ]  # fmt: skip
-    found = findings(problem._with(runs=runs))
+    found = findings(problem.changed(runs=runs))
     assert {"frozen", "sign", "constant"} <= {f.kind for f in found}
     assert any(f.column == "speed_set" and f.run == "check" for f in found)

@@ -7,13 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cosim.calibrate.differences import smoothest
-from cosim.calibrate.fit import Descent
+from cosim.calibrate.descent import Descent
+from cosim.calibrate.differences import jacobian, smoothest
 from cosim.calibrate.loss import Squares
 from cosim.calibrate.normal import Normal
 from cosim.calibrate.parts import Sensitivity
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.calibrate.valley import profiled
+from tests.problems import simulator
 
 RANDOM = np.random.default_rng(8)
 TRUE = RANDOM.standard_normal((400, 3)) * np.array([300.0, 300.0, 30.0])
@@ -29,8 +31,10 @@ def at_minimum(matrix: np.ndarray) -> Descent:
     run.problem = SimpleNamespace(  # type: ignore[assignment]
         lower=np.full(3, -1.0), upper=np.full(3, 0.5), scale=np.ones(3), nominal=np.zeros(3),
         parameters=parameters, run=lambda name: SimpleNamespace(times=times),
-        residuals=lambda theta, purpose: [("run", -(matrix @ theta)[:, None])],
     )  # fmt: skip
+    run.simulator = SimpleNamespace(  # type: ignore[assignment]
+        residuals=lambda theta, purpose: [("run", -(matrix @ theta)[:, None])]
+    )
     run.theta, run.purpose, run.loss = np.zeros(3), "identification", Squares()
     run.drawn = np.zeros(3, dtype=bool)
     run.residuals, run.cost = [("run", np.zeros((len(matrix), 1)))], 0.0
@@ -78,16 +82,16 @@ def test_derivatives_beside_a_jump_come_from_a_finer_step(
     place, span = short.index("K_t"), short.scale[short.index("K_t")]
     slope, steps = 50.0, []
 
-    def simulate(self: Problem, values: np.ndarray, run: object) -> np.ndarray:
+    def simulate(self: Simulator, values: np.ndarray, run: object) -> np.ndarray:
         away = (values[place] - theta[place]) / span
         steps.append(abs(away))
         rows = slope * away + (100.0 if away > edge else 0.0)
-        return np.full(data.shape, rows) * self.sigma
+        return np.full(data.shape, rows) * self.problem.sigma
 
     data = run.data
-    monkeypatch.setattr(Problem, "simulate", simulate)
-    coarse = short.jacobian(theta, [run.name], columns=[place], relative=1e-2)
-    found = smoothest(short, theta, coarse)
+    monkeypatch.setattr(Simulator, "simulate", simulate)
+    coarse = jacobian(simulator(short), theta, [run.name], columns=[place], relative=1e-2)
+    found = smoothest(simulator(short), theta, coarse)
     assert found[0].columns.tolist() == [place]
     told = float(np.nanmax(found[0].values[:, :, 0])) * span
     # exact: the model is linear on both sides of the jump

@@ -13,12 +13,13 @@ from cosim.diagnose import exchange
 from cosim.diagnose.fitter import Fitter
 from cosim.diagnose.secant import Bench
 from cosim.errors import FmuCallError
+from cosim.spec.hints import SearchHints
 
 
 def search(best: float, place: int = 0) -> Any:
     """Costs that are least at one value, as of play or of a smoothed sign."""
     cost = lambda _, theta: 1e3 * abs(np.log(theta[place] / best))  # noqa: E731
-    return SimpleNamespace(cost=cost)
+    return SimpleNamespace(cost=cost, simulator=SimpleNamespace(of=lambda problem: problem))
 
 
 @pytest.mark.parametrize(("best", "found"), [(9.0, 8.0), (0.5, 1.0), (1e9, 16.0)])
@@ -26,7 +27,7 @@ def test_a_strength_is_doubled_as_long_as_that_is_better(best: float, found: flo
     """And never past its bound; not at all where the first order was right or asked for more."""
     problem: Any = SimpleNamespace(index=lambda _: 0, lower=np.array([0.0]), upper=np.array([16.0]))
     start, it = np.array([1.0]), search(best)
-    end = Fitter._doubled(it, problem, start, it.cost(None, start), "gap")
+    end = Fitter._doubled(it, SimpleNamespace(problem=problem), start, it.cost(None, start), "gap")
     assert end[0] == found and start[0] == 1.0
 
 
@@ -58,7 +59,7 @@ def test_of_usual_strengths_the_best_is_kept_though_none_leads_there() -> None:
         return 0.0
 
     probe = SimpleNamespace(
-        strength=SimpleNamespace(tries=(1.0, 2.0, 4.0, 8.0)), problem=None,
+        strength=SimpleNamespace(hints=SearchHints(tries=(1.0, 2.0, 4.0, 8.0))), problem=None,
         values=lambda value, *_: {"c": value},
     )  # fmt: skip
     trials: Any = SimpleNamespace(probe=probe, second=0.0, fixed={}, best=None, open=True)
@@ -81,7 +82,7 @@ def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(
 
     whole = SimpleNamespace(names=["law.tau_c"], parameters=[], runs=())
     whole.with_parameters = lambda _: whole
-    whole._with = lambda **_: whole
+    whole.changed = lambda **_: whole
     whole.hold = lambda values: held.append(values) or whole
 
     def fitted(problem: Any, theta: Any, close: Any) -> Any:
@@ -101,6 +102,7 @@ def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(
     )
     it: Any = SimpleNamespace(
         raw=SimpleNamespace(unstable=unstable), say=lambda _: None, fitted=fitted,
+        simulator=SimpleNamespace(of=lambda problem: problem),
         again=lambda found, *_: found,
     )  # fmt: skip
     found = Fitter.sharper(it, model, SimpleNamespace(problem=None))  # type: ignore[arg-type]

@@ -10,16 +10,17 @@ import pytest
 
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.bursts import bursts, times
-from cosim.diagnose.linear import Layout
+from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
 from cosim.report.page import _bursts
+from tests.problems import simulator
 
 FIRST, LAST = 500, 540
 
 
 def test_windows_with_a_burst_and_their_neighbours_are_found() -> None:
     run: Any = SimpleNamespace(name="A", times=np.arange(200) / 100, data=np.zeros((200, 2)))
-    layout = Layout(SimpleNamespace(channels=[0, 1], unstable=False), [run])  # type: ignore[arg-type]
+    layout = SampleStack(SimpleNamespace(channels=[0, 1], unstable=False), [run])  # type: ignore[arg-type]
     residual = np.random.default_rng(0).standard_normal((200, 2))
     assert bursts(residual.ravel(), layout) == {}
     residual[105:115, 1] = 20.0
@@ -34,7 +35,7 @@ def test_a_burst_pulls_no_parameter(clean_bench: Problem) -> None:
     data[FIRST:LAST, 2] += 80.0 * clean_bench.sigma[2]
     values = []
     for problem in (clean_bench, clean_bench.with_data({run.name: data})):
-        search = Search(problem, only=[])
+        search = Search(simulator(problem), only=[])
         fitted = search.calibrated()
         values.append(fitted.estimate)
         found = bursts(search.fit_data - fitted.fit, search.fitting)

@@ -13,6 +13,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.nuisance import settled
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -23,16 +24,17 @@ def left(problem: Problem, truth: dict[str, float]) -> dict[str, float]:
     for name, value in truth.items():
         if name in problem.names:
             theta[problem.index(name)] = value
-    theta = settled(problem, theta, [run.name for run in problem.runs])
-    found = channel_rms(problem, problem.residuals(theta, None))
-    problem.close()
+    runner = simulator(problem)
+    theta = settled(runner, theta, [run.name for run in problem.runs])
+    found = channel_rms(problem, runner.residuals(theta, None))
+    runner.close()
     return found
 
 
 def test_with_both_effects_the_logs_hold_noise_alone(tmp_path: Path) -> None:
     truth = write(tmp_path, 0.3, 0.2, 1)
     assert (truth[SWIVEL], truth[FLOOR]) == (0.3, 0.2)
-    declared = read_problem(tmp_path, workers=2)
+    declared = read_problem(tmp_path)
     assert {r.purpose for r in declared.runs} == {"identification", "validation"}
     lacking = left(declared, truth)
     assert lacking["base_y"] > 2.0 and lacking["motor_current_l"] > 2.0
@@ -46,5 +48,5 @@ def test_with_both_effects_the_logs_hold_noise_alone(tmp_path: Path) -> None:
 
 def test_without_them_the_declared_model_is_right(tmp_path: Path) -> None:
     truth = write(tmp_path, 0.0, 0.0, 2)
-    found = left(read_problem(tmp_path, workers=2), truth)
+    found = left(read_problem(tmp_path), truth)
     assert np.allclose(list(found.values()), 1.0, atol=0.04)

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnose.linear import Layout
-from cosim.diagnose.search import REFITS, Search
+from cosim.calibrate.simulator import Simulator
+from cosim.diagnose.exchange import kin
+from cosim.diagnose.linear import SampleStack
+from cosim.diagnose.search import Search
 from cosim.diagnose.secant import PATIENCE
+from cosim.diagnose.shortlist import REFITS, promising
 from cosim.errors import CosimError
 
 MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
@@ -30,7 +33,7 @@ def chosen(
     gains: dict[str, float], monkeypatch: pytest.MonkeyPatch, doubtful: tuple[str, ...] = ()
 ) -> list[str]:
     """Labels that are refitted, of `effect at instance.port` -> gain, all significant but some."""
-    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: MEMBERS)
+    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: MEMBERS)
     signatures = []
     for label, gain in sorted(gains.items(), key=lambda item: -item[1]):
         instance, port = label.partition(" at ")[2].split(".", 1)
@@ -48,8 +51,7 @@ def chosen(
     search: Any = SimpleNamespace(
         fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: True
     )
-    search.able = lambda current: Search.able(search, current)
-    return [s.candidate.label for s in Search.promising(search, round_)]
+    return [s.candidate.label for s in promising(search, round_)]
 
 
 def test_members_that_look_alike_do_not_crowd_out_their_group(
@@ -110,11 +112,11 @@ def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> N
     elsewhere = model(signature("coulomb", "gearbox.flange_a", 0, simpler, general))
     found: Any = SimpleNamespace(winner=winner, fitted=[winner, elsewhere])
     search: Any = SimpleNamespace(total=lambda *_: 1e6)  # nats, of which the data see 1e-5
-    assert Search.kin(search, winner, found) == [same, simpler, general]
+    assert kin(search, winner, found) == [same, simpler, general]
     search.total = lambda *_: 1e5  # of these they do not
-    assert Search.kin(search, winner, found) == []
+    assert kin(search, winner, found) == []
     search.total, found.winner = lambda *_: 1e6, elsewhere
-    assert Search.kin(search, winner, found) == [simpler]
+    assert kin(search, winner, found) == [simpler]
 
 
 def test_start_values_that_cannot_be_estimated_leave_the_winner(
@@ -123,11 +125,12 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    problem = SimpleNamespace(costs={}, runs=(), late=())
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: problem)
+    simulator = SimpleNamespace(costs={}, limited=lambda limits: simulator)
+    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
     monkeypatch.setattr("cosim.diagnose.late.released", fail)
     estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
-    winner: Any = SimpleNamespace(problem=problem, estimate=estimate)
+    problem = SimpleNamespace(runs=(), late=())
+    winner: Any = SimpleNamespace(problem=problem, simulator=simulator, estimate=estimate)
     said: list[str] = []
     search: Any = SimpleNamespace(
         raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append, _settled=None
@@ -146,11 +149,11 @@ def test_start_values_stay_where_a_joint_fit_loses_them(
 
     def model(cost: float) -> Any:
         estimate = SimpleNamespace(theta=None, robust=cost, count=2)
-        return SimpleNamespace(problem=problem, estimate=estimate)
+        return SimpleNamespace(problem=None, simulator=simulator, estimate=estimate)
 
-    problem = SimpleNamespace(costs={}, runs=(), late=(), limits={})
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: problem)
-    monkeypatch.setattr("cosim.diagnose.late.released", lambda *_: (problem, None, 5.0))
+    simulator = SimpleNamespace(limited=lambda limits: simulator)
+    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
+    monkeypatch.setattr("cosim.diagnose.late.released", lambda *_: (simulator, None, 5.0))
     monkeypatch.setattr("cosim.diagnose.late.late_estimated", lambda _: True)
     monkeypatch.setattr("cosim.diagnose.late.patience", lambda _: {})
     said: list[str] = []
@@ -212,7 +215,7 @@ def test_a_law_more_general_than_a_rival_is_none() -> None:
 def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: set())
+    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: set())
 
     def refitted(lacking: bool, z: float) -> int:
         candidate = SimpleNamespace(label="a", effect="a", instance="motor", port="winding")
@@ -223,8 +226,7 @@ def test_without_significance_unused_runs_decide_where_something_is_evidently_mi
             fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking
         )
         found: Any = SimpleNamespace(signatures=[item], corrected={"a": 0.8}, base=near())
-        search.able = lambda current: Search.able(search, current)
-        return len(Search.promising(search, found))
+        return len(promising(search, found))
 
     assert refitted(True, 2.5) == 1
     assert refitted(False, 2.5) == 0  # at the noise: nothing to look for
@@ -254,7 +256,7 @@ def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
     said: list[str] = []
     effect = SimpleNamespace(label="delay at motor.command")
     quick: Any = SimpleNamespace(
-        effects=(effect,), problem=None, estimate=SimpleNamespace(theta=None)
+        effects=(effect,), simulator=None, estimate=SimpleNamespace(theta=None)
     )
     search: Any = SimpleNamespace(raw=None, say=said.append)
     assert Search.sharpened(search, quick, quick) is quick
@@ -277,7 +279,7 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
     expected: list[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("cosim.diagnose.search.balances", lambda problem: set())
+    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: set())
     signatures = [
         SimpleNamespace(
             candidate=SimpleNamespace(label=label, effect=label, instance="motor", port="command"),
@@ -295,8 +297,7 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
         signatures=signatures, base=near(mean_square),
         corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
     )  # fmt: skip
-    search.able = lambda current: Search.able(search, current)
-    assert [s.candidate.label for s in Search.promising(search, found)] == expected
+    assert [s.candidate.label for s in promising(search, found)] == expected
 
 
 @pytest.mark.parametrize(
@@ -309,14 +310,12 @@ def test_quick_fits_have_a_limit_on_time(
 ) -> None:
     search: Any = Search.__new__(Search)
     search.judged = lambda estimate: estimate
-    monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda problem, *_, **__: problem.limits)
-    monkeypatch.setattr("cosim.diagnose.fitter.Known.of", lambda estimate: None)
+    monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda simulator, *_, **__: simulator.limits)
+    problem = SimpleNamespace(run=lambda name: SimpleNamespace(times=np.arange(301) / 10))
     known: Any = None if close is None else SimpleNamespace(
-        problem=SimpleNamespace(
-            costs={"A": close}, run=lambda name: SimpleNamespace(times=np.arange(301) / 10)
-        )
+        simulator=SimpleNamespace(problem=problem, costs={"A": close}), known=None
     )  # fmt: skip
-    limits = search.fitted(SimpleNamespace(limits={}), [0.0], known)
+    limits = search.fitted(Simulator(problem), [0.0], known)  # type: ignore[arg-type]
     assert limits == ({} if limit is None else {"A": pytest.approx(limit)})
 
 
@@ -344,7 +343,7 @@ def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others
     problem: Any = SimpleNamespace(
         channels=[SimpleNamespace(name="y")], runs=runs, unstable=unstable
     )
-    layout = Layout(problem, runs)
+    layout = SampleStack(problem, runs)
     vector = layout.vector([run.data for run in runs])
     search: Any = SimpleNamespace(raw=problem, fitting=layout, fit_data=vector)
     search.lacking = lambda base: Search.lacking(search, base)

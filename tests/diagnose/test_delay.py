@@ -12,6 +12,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -29,14 +30,16 @@ def problem(late: Bench, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
     (place,) = write_sets(
         tmp_path_factory.mktemp("late"), [late], SHEET, 73, 5.0, ("ST", "LV", "MX")
     )
-    found = read_problem(place, workers=2)
+    found = read_problem(place)
     yield found
-    found.close()
+    simulator(found).close()
 
 
 def test_a_delay_of_held_commands_is_found_to_the_sample(problem: Problem, late: Bench) -> None:
     told: list[str] = []
-    search = Search(problem, told.append, [c for c in candidates(problem) if c.label in LABELS])
+    search = Search(
+        simulator(problem), told.append, [c for c in candidates(problem) if c.label in LABELS]
+    )
     base = search.calibrated()
     assert len(base.estimate.at_bound) > 4  # where no first order leads to a delay
     winner = search.round(base).winner
@@ -60,7 +63,7 @@ def test_a_delay_of_held_commands_is_found_to_the_sample(problem: Problem, late:
 def test_what_is_found_at_once_is_not_sought_again(clean_bench: Problem) -> None:
     told: list[str] = []
     known = [c for c in candidates(clean_bench) if c.label in LABELS]
-    search = Search(clean_bench, told.append, known)
+    search = Search(simulator(clean_bench), told.append, known)
     assert search.round(search.calibrated()).winner is None
     search.close()
     assert not any("nominal values" in line for line in told)

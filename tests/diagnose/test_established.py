@@ -11,6 +11,7 @@ import pytest
 from cosim.calibrate.parts import Parameter
 from cosim.diagnose import established
 from cosim.diagnose.models import Gate
+from cosim.diagnose.rounds import Round
 from cosim.errors import CosimError
 
 TOTALS = {"bristle": 1e5, "coulomb": 1e5 - 300.0, "cogging": 5e4}
@@ -40,8 +41,7 @@ def judge(**more: Any) -> Any:
     return SimpleNamespace(
         total=lambda base, fitted: TOTALS[fitted.effects[-1].effect],
         accepted=lambda base, fitted: True, sharpened=lambda fitted, base: fitted,
-        say=lambda text: None, raw=SimpleNamespace(unstable=True),
-        follow=lambda stage, fitted: None, **more,
+        say=lambda text: None, raw=SimpleNamespace(unstable=True), **more,
     )  # fmt: skip
 
 
@@ -63,9 +63,10 @@ def test_a_law_of_which_only_a_simpler_one_shows_is_that(
         lambda search, base, stage: compared.append(stage.winner.effects[-1].effect),
     )  # fmt: skip
     winner = law("bristle", 3, known=known)
-    stage: Any = SimpleNamespace(winner=winner, fitted=[winner, *(law(n, 1) for n in others)])
+    fits = [winner, *(law(n, 1) for n in others)]
+    stage = Round(winner, [], {}, fitted=fits, winner=winner)
     established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
-    assert stage.winner.effects[-1].effect == named
+    assert stage.winner is not None and stage.winner.effects[-1].effect == named
     assert compared == [named] * (named == "coulomb")
 
 

@@ -15,7 +15,9 @@ from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.exchange import challenged, reconsidered
 from cosim.diagnose.models import Fitted
-from cosim.diagnose.search import Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -30,8 +32,10 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Search, Ro
     folder = tmp_path_factory.mktemp("benches")
     bench = Bench(draw(np.random.default_rng(3)).parameters, "coulomb", 0.4)
     (place,) = write_sets(folder, [bench], SHEET, 5, 2.0, ("ST", "MS", "LW"))
-    problem = read_problem(place, workers=2)
-    search = Search(problem, only=[c for c in candidates(problem) if c.label in (RIGHT, WRONG)])
+    problem = read_problem(place)
+    search = Search(
+        simulator(problem), only=[c for c in candidates(problem) if c.label in (RIGHT, WRONG)]
+    )
     base = search.calibrated()
     found = search.scored(base)
     for item in found.signatures:
@@ -92,11 +96,11 @@ def test_it_is_where_a_later_effect_has_joined(stage: tuple[Search, Round]) -> N
 @pytest.mark.parametrize("truth", ["coulomb", "asymmetric_coulomb"])
 def test_a_simpler_law_is_named_where_it_does_as_well(truth: str, known_before: bool) -> None:
     """Whether it was fitted before or its score was too poor for that."""
-    rig = example(EXAMPLE, 3.0, 2)
+    rig = example(EXAMPLE, 3.0)
     labels = ("coulomb at load.flange", "asymmetric_coulomb at load.flange")
     known = [c for c in catalogue(rig) if c.label in labels]
     (item,) = [c for c in known if c.effect == truth]
-    search = Search(made(rig, item, 1.0, 7).problem, only=known)
+    search = Search(simulator(made(rig, item, 1.0, 7).problem), only=known)
     base = search.calibrated()
     stage = search.scored(base)
     for signature in stage.signatures:

@@ -8,18 +8,20 @@ from pathlib import Path
 import pytest
 
 from benchmarks.own_plant import example, made
-from cosim.calibrate.parts import Run
+from cosim.calibrate.parts import MeasuredRun
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.experiment import propose, scaled
-from cosim.diagnose.search import Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
 EXAMPLE = Path(__file__).parents[2] / "scenarios/motor_bench/data/MB-12"
 
 
-def varied(run: Run, factor: float, name: str, purpose: str) -> Run:
+def varied(run: MeasuredRun, factor: float, name: str, purpose: str) -> MeasuredRun:
     """A run with scaled inputs."""
     found = scaled(run, factor)
     assert found is not None
@@ -28,7 +30,7 @@ def varied(run: Run, factor: float, name: str, purpose: str) -> Run:
 
 def attributed(problem: Problem, known: list[Candidate]) -> Round:
     """One round over these candidates."""
-    search = Search(problem, only=known)
+    search = Search(simulator(problem), only=known)
     try:
         return search.round(search.calibrated())
     finally:
@@ -39,10 +41,10 @@ def attributed(problem: Problem, known: list[Candidate]) -> Round:
 def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
     truth: str, size: float
 ) -> None:
-    rig = example(EXAMPLE, 4.0, 2)
+    rig = example(EXAMPLE, 4.0)
     step = next(run for run in rig.runs if run.name == "ST1")
     slow = [varied(step, 0.4, "A", "identification"), varied(step, 0.4, "B", "validation")]
-    rig = rig._with(runs=slow, parameters=[p for p in rig.parameters if not p.run])
+    rig = rig.changed(runs=slow, parameters=[p for p in rig.parameters if not p.run])
     labels = ("coulomb at load.flange", "stribeck at load.flange")
     known = [c for c in candidates(rig) if c.label in labels]
     (item,) = [c for c in known if c.effect == truth]
@@ -57,7 +59,7 @@ def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
         varied(run, proposal["input_factor"], f"P{i}", "identification")
         for i in range(proposal["repetitions"])
     ]
-    second = attributed(made(rig._with(runs=[*slow, *more]), item, size, 5).problem, known)
+    second = attributed(made(rig.changed(runs=[*slow, *more]), item, size, 5).problem, known)
     assert second.winner is not None and second.rivals == []
     assert second.winner.effects[-1].effect == truth
     costs = {f.effects[-1].effect: f.estimate.cost for f in second.fitted}

@@ -9,7 +9,9 @@ import pytest
 
 from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.search import OFF, Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import OFF, Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -38,12 +40,12 @@ def test_where_everything_is_far_off_residuals_count_in_full(
     clean_bench: Problem, offset: float
 ) -> None:
     # a parameter that counts as a start value of its runs
-    unstable = clean_bench._with(late=clean_bench.parameters[:1])
+    unstable = clean_bench.changed(late=clean_bench.parameters[:1])
     data = {
         run.name: run.data + offset * unstable.sigma * np.sign(np.sin(60.0 * run.times))[:, None]
         for run in unstable.runs
     }
-    search = Search(unstable.with_data(data), only=[])
+    search = Search(simulator(unstable.with_data(data)), only=[])
     fitted = search.calibrated()
     search.close()
     far = typical([search.fit_data[:, None] - fitted.fit[:, None]]) > OFF
@@ -57,19 +59,19 @@ def test_where_everything_is_far_off_residuals_count_in_full(
         np.array_equal(run.data, measured[run.name], True) for run in fitted.problem.runs
     ]
     assert as_measured == [far] * len(measured)
-    assert fitted.problem.step == search.raw.search_step
+    assert fitted.problem.step == search.raw.search.step
 
 
 @pytest.mark.parametrize("near", [True, False])
 def test_moments_count_little_again_once_the_model_is_near(
     clean_bench: Problem, near: bool
 ) -> None:
-    unstable = clean_bench._with(late=clean_bench.parameters[:1])
+    unstable = clean_bench.changed(late=clean_bench.parameters[:1])
     data = {
         run.name: run.data + 40.0 * unstable.sigma * np.sign(np.sin(60.0 * run.times))[:, None]
         for run in unstable.runs
     }
-    search = Search(unstable.with_data(data), only=[])
+    search = Search(simulator(unstable.with_data(data)), only=[])
     base = search.calibrated()
     search.close()
     better = replace(base, fit=search.fit_data.copy(), check=search.check_data.copy())

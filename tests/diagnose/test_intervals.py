@@ -14,6 +14,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +25,7 @@ STRENGTH = "load.flange.coulomb.tau_c"
 
 def calibrated(problem: Problem, label: str = LABEL) -> Estimate:
     """The declared parameters and the effect."""
-    search = Search(problem, only=[c for c in candidates(problem) if c.label == label])
+    search = Search(simulator(problem), only=[c for c in candidates(problem) if c.label == label])
     winner = search.round(search.calibrated()).winner
     search.close()
     assert winner is not None
@@ -36,7 +37,7 @@ def test_a_factor_on_all_torques_stays_open(tmp_path: Path) -> None:
     bench = benches(3, 12, 61)[13]
     assert bench.effect == "coulomb"
     (place,) = write_sets(tmp_path, [bench], SHEET, 5, 2.0)
-    estimate = calibrated(read_problem(place, workers=2))
+    estimate = calibrated(read_problem(place))
     names = list(estimate.problem.names)
     for name, value in {**bench.parameters, STRENGTH: bench.size}.items():
         k = names.index(name)
@@ -51,7 +52,7 @@ def test_a_valley_beside_limits_stays_open(tmp_path: Path) -> None:
     assert bench.effect == "saturation"
     (place,) = write_sets(tmp_path, [bench], SHEET, 121)
     estimate = calibrated(
-        read_problem(place, workers=2), "torque_constant_saturation at motor.torque_constant"
+        read_problem(place), "torque_constant_saturation at motor.torque_constant"
     )
     names = list(estimate.problem.names)
     for name, value in bench.parameters.items():
@@ -66,7 +67,7 @@ def test_a_valley_beside_limits_stays_open(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", [4, 6])
 def test_what_the_data_tell_stays_told(seed: int) -> None:
-    rig = example(EXAMPLE, 4.0, 2)
+    rig = example(EXAMPLE, 4.0)
     (item,) = [c for c in catalogue(rig) if c.label == LABEL]
     truth = made(rig, item, 1.0, seed)
     estimate = calibrated(truth.problem)

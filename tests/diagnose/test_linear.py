@@ -9,21 +9,20 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.loss import DOUBTFUL, WINDOW, Huber, Squares, Windowed, mean_squares
-from cosim.diagnose.linear import Absorber, Layout, holm, score
+from cosim.diagnose.linear import Absorber, SampleStack, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
-from cosim.diagnose.structure import MATERIAL as MATERIAL_RMS
-from cosim.diagnose.structure import structures
+from cosim.diagnose.whiteness import CALIBRATED, whiteness_tests
 
 RATE, SECONDS = 100, 40
 
 
-def layout(unstable: bool = False) -> Layout:
+def layout(unstable: bool = False) -> SampleStack:
     """One run of one channel, sampled at `RATE`."""
     times = np.arange(RATE * SECONDS) / RATE
     run: Any = SimpleNamespace(name="A", times=times, data=np.zeros((times.size, 1)))
     problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")], unstable=unstable)
-    return Layout(problem, [run])
+    return SampleStack(problem, [run])
 
 
 def p_values(correlated: bool, trials: int = 400) -> np.ndarray:
@@ -172,7 +171,7 @@ def test_windows_of_vectors_are_those_of_arrays() -> None:
     rows[3:9, 1] = np.nan
     runs: Any = [SimpleNamespace(name=n, times=times, data=rows) for n in "AB"]
     problem: Any = SimpleNamespace(channels=[SimpleNamespace(name=n) for n in "yz"], unstable=True)
-    place = Layout(problem, runs)
+    place = SampleStack(problem, runs)
     vector = place.vector([rows, 3.0 * rows])
     both = place.vector([mean_squares(rows), mean_squares(3.0 * rows)])
     assert place.mean_squares(vector) == pytest.approx(both, rel=1e-12)
@@ -183,7 +182,7 @@ def test_windows_of_vectors_are_those_of_arrays() -> None:
     )
     # where no run turns unstable, what is far off counts in full
     problem.unstable = False
-    place = Layout(problem, runs)
+    place = SampleStack(problem, runs)
     assert place.cost(vector) == pytest.approx(0.5 * float(vector @ vector), rel=1e-12)
     assert np.all(place.root(vector) == 1.0)
 
@@ -224,7 +223,7 @@ def test_a_burst_is_no_structure_and_what_lasts_is() -> None:
     burst[1000:1040] = 20.0  # 0.4 s of 40 s: 1 % of the windows
     lasting[::10] = 20.0 * np.sqrt(40 / (place.size / 10))  # the same energy, all the time
     for extra, expected in ((0.0, False), (burst, False), (lasting + 0.5, True)):
-        (found,) = structures(noise + extra, place)
+        (found,) = whiteness_tests(noise + extra, place)
         assert found.structured is expected
-    (found,) = structures(noise + burst, place)
-    assert found.rms > 2.0 and found.lasting < MATERIAL_RMS
+    (found,) = whiteness_tests(noise + burst, place)
+    assert found.rms > 2.0 and found.lasting < CALIBRATED

@@ -12,6 +12,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.localise import localise, regressed
 from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -48,10 +49,10 @@ def test_the_missing_force_is_found_where_it_acts(tmp_path: Path) -> None:
     (folder,) = write_sets(
         tmp_path, [Bench(plain.parameters, "supply_sag", SIZE)], SHEET, 5, 2.0, ("ST", "MS", "LW")
     )
-    problem = read_problem(folder, workers=2)
+    problem = read_problem(folder)
     wanted = {("motor", "winding"), ("load", "flange")}
     chosen = {(c.instance, c.port): c for c in candidates(problem)}
-    search = Search(problem, only=[chosen[place] for place in sorted(wanted)])
+    search = Search(simulator(problem), only=[chosen[place] for place in sorted(wanted)])
     places = localise(search, search.calibrated(), search.known, print)
     assert {(p.instance, p.port) for p in places} == wanted
     best, other = places

@@ -18,8 +18,10 @@ from cosim.calibrate.parts import Parameter
 from cosim.cli.diagnose import _value
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
-from cosim.diagnose.search import Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import Search
 from cosim.report.page import _interval, _starts, page
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -42,10 +44,10 @@ def sets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
 
 def searched(folder: Path, choice: set[str] = CHOICE) -> tuple[Search, Round]:
     """One round over a part of the catalogue."""
-    problem = read_problem(folder, workers=2)
+    problem = read_problem(folder)
     chosen = [c for c in candidates(problem) if c.effect in choice]
     assert len({c.effect for c in chosen}) == len(choice)
-    search = Search(problem, only=chosen)
+    search = Search(simulator(problem), only=chosen)
     return search, search.round(search.calibrated())
 
 
@@ -79,11 +81,11 @@ def test_a_law_is_not_mistaken_for_one_that_contains_it(sets: dict[str, Path]) -
 
 
 def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
-    problem = read_problem(sets["supply_sag"], workers=2)
+    problem = read_problem(sets["supply_sag"])
     chosen = [
         c for c in candidates(problem) if c.effect in {"battery_sag", "brush_drop", "elastic"}
     ]
-    search = Search(problem, only=chosen)
+    search = Search(simulator(problem), only=chosen)
     result = _searched(search, [], tmp_path, lambda text: None, time.perf_counter())
     search.close()
     table = result.to_dict()
@@ -100,23 +102,23 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
 
 
 def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, Path]) -> None:
-    problem = read_problem(sets["clean"], workers=2)
+    problem = read_problem(sets["clean"])
     viscous = [c for c in candidates(problem) if c.effect == "viscous" and c.instance == "load"]
-    search = Search(problem, only=viscous)
+    search = Search(simulator(problem), only=viscous)
     stage = search.scored(search.calibrated())
     assert [s.unseen for s in stage.signatures] == [True]
     assert isinstance(viscous[0], Candidate)
 
 
 def test_start_values_that_were_estimated_are_reported(sets: dict[str, Path]) -> None:
-    problem = read_problem(sets["clean"], workers=2)
+    problem = read_problem(sets["clean"])
     late = [
         Parameter(f"theta_0@{run.name}", "rad", 0.0, -1.0, 1.0, (("encoder.theta", 2.0),),
                   "nuisance", run.name, late=True)
         for run in problem.runs
     ]  # fmt: skip
     own = problem.with_parameters([*problem.parameters, late[0]])
-    after: Any = SimpleNamespace(problem=own.hold({late[0].name: 0.125})._with(late=late[:1]))
+    after: Any = SimpleNamespace(problem=own.hold({late[0].name: 0.125}).changed(late=late[:1]))
     found = Diagnosis(problem, "effect_found", "", after=after).start_values()
     assert found == {problem.runs[0].name: {"theta_0": 0.125}}
     assert "theta_0" in _starts(found) and "0.125" in _starts(found)

@@ -11,7 +11,9 @@ import pytest
 from benchmarks.motor_plant import Bench, draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.search import Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import Search
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -33,9 +35,9 @@ def sets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
 
 
 def searched(folder: Path) -> Round:
-    problem = read_problem(folder, workers=2)
+    problem = read_problem(folder)
     chosen = [c for c in candidates(problem) if c.label in CHOICE]
-    search = Search(problem, only=chosen)
+    search = Search(simulator(problem), only=chosen)
     found = search.round(search.calibrated())
     search.close()
     return found

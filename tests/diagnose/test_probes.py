@@ -10,10 +10,11 @@ import pytest
 
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
-from cosim.diagnose.linear import Absorber, Layout
+from cosim.diagnose.linear import Absorber, SampleStack
 from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches
 from cosim.diagnose.secant import Bench, _shared, model_values
 from cosim.errors import CosimError
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -73,7 +74,7 @@ def test_an_effect_among_others_does_what_it_does_alone(
 ) -> None:
     known = [c for c in candidates(clean_bench) if c.effect in effects]
     assert len({c.instance for c in known}) >= 2
-    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
     several = [b for b in batches(known, clean_bench) if b.change != b.members[0][0].change]
     assert any(len(effects_of(b)) > 1 for b in several) == shared
     for batch in several:
@@ -85,8 +86,8 @@ def test_an_effect_among_others_does_what_it_does_alone(
                 theta = one.problem.nominal
                 for name, value in one.values(0.01, 0.0, {}).items():
                     theta[one.problem.index(name)] = value
-                values.append(model_values(one.problem, theta, layout))
-                one.problem.close()
+                values.append(model_values(simulator(one.problem), theta, layout))
+                simulator(one.problem).close()
             # effects of strength 0 are absent exactly, so nothing but bits may be compared
             assert np.array_equal(*values)
 
@@ -110,19 +111,19 @@ def test_few_fmus_serve_many_candidates(clean_bench: Problem) -> None:
 
 def test_the_angle_of_an_effect_is_found_without_a_search(clean_bench: Problem) -> None:
     (wanted,) = [c for c in candidates(clean_bench) if c.label == "unbalance at load.flange"]
-    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
     theta = clean_bench.nominal
-    model = model_values(clean_bench, theta, layout)
+    model = model_values(simulator(clean_bench), theta, layout)
     (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
     strength, angle = 0.02, 2.2  # small against what moves the shaft, in no special direction
     point = probe.problem.nominal
     for name, value in probe.values(strength, angle, {}).items():
         point[probe.problem.index(name)] = value
-    seen = model_values(probe.problem, point, layout) - model
-    probe.problem.close()
+    seen = model_values(simulator(probe.problem), point, layout) - model
+    simulator(probe.problem).close()
     jacobian = np.zeros((layout.size, len(clean_bench.parameters)))
     absorber = Absorber(jacobian, clean_bench)
-    place = Bench(clean_bench, theta, layout, model, seen, absorber)
+    place = Bench(simulator(clean_bench), theta, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted]))
     # the signature is linear in the strength to a percent, and so is the angle
     assert found.second == pytest.approx(angle, abs=0.02)
@@ -136,17 +137,17 @@ def test_the_asymmetry_of_friction_is_found_without_a_search(
     (wanted,) = [
         c for c in candidates(clean_bench) if c.label == "asymmetric_coulomb at load.flange"
     ]
-    layout = Layout(clean_bench, clean_bench.chosen("identification"))
-    model = model_values(clean_bench, clean_bench.nominal, layout)
+    layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
+    model = model_values(simulator(clean_bench), clean_bench.nominal, layout)
     (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
     assert probe.reach == (-1.0, 1.0)
     point = probe.problem.nominal
     for name, value in probe.values(0.02, asymmetry, {}).items():
         point[probe.problem.index(name)] = value
-    seen = model_values(probe.problem, point, layout) - model
-    probe.problem.close()
+    seen = model_values(simulator(probe.problem), point, layout) - model
+    simulator(probe.problem).close()
     absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
-    place = Bench(clean_bench, clean_bench.nominal, layout, model, seen, absorber)
+    place = Bench(simulator(clean_bench), clean_bench.nominal, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted]))
     # linear in both to a few percent: the speed at which the sign is smoothed is passed elsewhere
     assert found.second == pytest.approx(asymmetry, abs=0.05)
@@ -156,20 +157,20 @@ def test_the_asymmetry_of_friction_is_found_without_a_search(
 
 def test_cycles_per_revolution_are_tried(clean_bench: Problem) -> None:
     (wanted,) = [c for c in candidates(clean_bench) if c.effect == "torque_ripple"]
-    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
     theta = clean_bench.nominal
-    model = model_values(clean_bench, theta, layout)
+    model = model_values(simulator(clean_bench), theta, layout)
     (probe,) = Batch(None, ((wanted, None),)).probes(clean_bench)
-    ((name, tried),) = probe.tries
+    ((name, tried),) = [(p.name, p.hints.tries) for p in probe.others if p.hints.tries]
     assert 7.0 in tried
     truth = probe.values(0.01, 0.7, {name: 7.0})
     point = probe.problem.nominal
     for full, value in truth.items():
         point[probe.problem.index(full)] = value
-    seen = model_values(probe.problem, point, layout) - model
-    probe.problem.close()
+    seen = model_values(simulator(probe.problem), point, layout) - model
+    simulator(probe.problem).close()
     absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
-    place = Bench(clean_bench, theta, layout, model, seen, absorber)
+    place = Bench(simulator(clean_bench), theta, layout, model, seen, absorber)
     (found,) = place.followed(place.begun([wanted], thorough=True))
     assert found.fixed == {name: 7.0}
     assert found.second == pytest.approx(0.7, abs=0.02)  # linear in the strength to a percent
@@ -192,10 +193,10 @@ def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it() -> None:
 def test_a_simulation_that_runs_away_is_refused(
     clean_bench: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    layout = Layout(clean_bench, clean_bench.chosen("identification"))
+    layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
     nothing = np.zeros(layout.size)
     absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
-    place = Bench(clean_bench, clean_bench.nominal, layout, nothing, nothing, absorber)
+    place = Bench(simulator(clean_bench), clean_bench.nominal, layout, nothing, nothing, absorber)
     for value in (1e30, np.nan):
         monkeypatch.setattr(
             "cosim.diagnose.secant.model_values", lambda *_, v=value: np.full(layout.size, v)

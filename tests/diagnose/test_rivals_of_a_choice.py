@@ -11,7 +11,9 @@ import pytest
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.exchange import MOST, _alike, _others, restarted
 from cosim.diagnose.models import GATE, Gate
-from cosim.diagnose.search import CLOSE, Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import CLOSE, Search
+from tests.problems import simulator
 
 
 class Law(NamedTuple):
@@ -26,20 +28,16 @@ def fit(effect: str, place: str, gain: float, own: int = 1) -> Any:
     return SimpleNamespace(effects=(law,), signature=signature, complexity=9, gain=gain)
 
 
-SEARCH: Any = SimpleNamespace(
-    total=lambda base, f: f.gain,
-    accepted=lambda base, f: True,
-    kin=lambda base, stage: [],
-    simpler=lambda stage: [],
-)
+SEARCH: Any = SimpleNamespace(total=lambda base, f: f.gain, accepted=lambda base, f: True)
 
 
 def stage(fits: Iterable[Any]) -> Any:
     """A round whose first fit has won."""
     fitted = list(fits)
     return SimpleNamespace(
-        fitted=fitted, winner=fitted[0], base=None, near=frozenset(), quick=fitted[0].gain
-    )
+        fitted=fitted, winner=fitted[0], base=None, near=frozenset(), quick=fitted[0].gain,
+        simpler=list,
+    )  # fmt: skip
 
 
 def places(found: list[Any]) -> list[Law]:
@@ -76,7 +74,7 @@ def test_a_fit_without_corrections_gets_them_before_its_other_parameters_are_tri
     clean_bench: Problem, monkeypatch: pytest.MonkeyPatch, uncorrected: bool
 ) -> None:
     """They would make up for errors of the communication step."""
-    search = Search(clean_bench, only=[])
+    search = Search(simulator(clean_bench), only=[])
     base = search.calibrated()
     search.close()
     base.gate = Gate(100.0, 10.0)
@@ -126,7 +124,7 @@ def test_where_unused_runs_want_none_what_gains_little_beside_the_best_is_not_fi
 def rough(effect: str, robust: float) -> Any:
     """A quick fit that is still far off."""
     law = SimpleNamespace(label=effect)
-    problem = SimpleNamespace(runs=(), _with=lambda runs: None)
+    problem = SimpleNamespace(runs=(), changed=lambda runs: None)
     return SimpleNamespace(
         effects=(law,), signature=law, problem=problem, p_value=0.0, check=None,
         estimate=SimpleNamespace(robust=robust),
@@ -206,7 +204,7 @@ LABELS = [f"law {index}" for index in range(10)]
     ids=["found by the second", "found by none", "found by the first", "near the noise"],
 )
 def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_none_of_the_first(
-    mean_square: float, right: str, attempts: list[list[str]]
+    mean_square: float, right: str, attempts: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     signatures = [
         SimpleNamespace(
@@ -227,11 +225,10 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
 
     current = SimpleNamespace(signatures=signatures, winner=None, open=True)
     search: Any = SimpleNamespace(
-        scored=lambda start: current, promising=lambda current: signatures[:2],
-        attempted=attempted, say=lambda text: None, fitting=SimpleNamespace(largest=float),
+        scored=lambda start: current, attempted=attempted, say=lambda text: None,
+        fitting=SimpleNamespace(largest=float),
     )  # fmt: skip
-    search.able = lambda current: Search.able(search, current)
-    search.remaining = lambda *known: Search.remaining(search, *known)
+    monkeypatch.setattr("cosim.diagnose.search.promising", lambda *_: signatures[:2])
     found = Search._round(search, cast(Any, base), cast(Any, base))
     assert made == attempts
     assert (found.winner is not None) is any(right in labels for labels in attempts)

@@ -10,6 +10,7 @@ import pytest
 from benchmarks.own_plant import catalogue, example, made
 from cosim.diagnose.search import Search
 from cosim.diagnose.secant import Trials
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -22,12 +23,11 @@ def test_what_a_signal_lacks_in_time_is_named(truth: str) -> None:
     """On average a hold is a delay, and a period that is wrong by a percent samples at other times
     after a second; a limit that is far too low lets nothing through and so tells nothing.
     """
-    rig = example(EXAMPLE, 3.0, 2)
+    rig = example(EXAMPLE, 3.0)
     known = [c for c in catalogue(rig) if c.label in LABELS]
     (item,) = [c for c in known if c.label == truth]
-    search = Search(
-        made(rig, item, 1e-3 if item.effect == "rate_limit" else 1.0, 11).problem, only=known
-    )
+    plant = made(rig, item, 1e-3 if item.effect == "rate_limit" else 1.0, 11)
+    search = Search(simulator(plant.problem), only=known)
     winner = search.round(search.calibrated()).winner
     search.close()
     assert winner is not None and winner.effects[-1].label == truth

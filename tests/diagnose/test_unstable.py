@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.calibrate.fit import fit
+from cosim.calibrate.fit import POLISH, fit
 from cosim.calibrate.loss import WINDOW
-from cosim.calibrate.parts import Parameter, Run
+from cosim.calibrate.parts import MeasuredRun, Parameter
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.diagnosis import Diagnosis, _judge, _shortened
 from cosim.diagnose.models import Fitted
-from cosim.diagnose.search import Round, Search
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import Search
 from cosim.diagnose.unstable import ended, ends
 from cosim.errors import FmuCallError
 from cosim.report.page import _ended
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -33,16 +36,16 @@ def turning(clean_bench: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
     for run in clean_bench.runs:
         turn[run.name] = run.times[run.times.size // 2]
 
-    def simulate(self: Problem, theta: np.ndarray, run: Run | str) -> np.ndarray:
-        run = self.run(run) if isinstance(run, str) else run
-        found = self.values(theta, run)
+    def simulate(self: Simulator, theta: np.ndarray, run: MeasuredRun | str) -> np.ndarray:
+        run = self.problem.run(run) if isinstance(run, str) else run
+        found = self.problem.values(theta, run)
         values = found["encoder.size"] * np.sin(2.0 * run.times)
         if run.name == first:
             turned = 0.3 * np.sin(STEEP * found["encoder.angle"])
             values = values + np.where(run.times < turn[run.name], 0.0, turned)
-        return np.tile(values, (len(self.channels), 1)).T
+        return np.tile(values, (len(self.problem.channels), 1)).T
 
-    monkeypatch.setattr(Problem, "simulate", simulate)
+    monkeypatch.setattr(Simulator, "simulate", simulate)
     monkeypatch.setattr(Problem, "_has", lambda *_: True)
     size = Parameter("size", "m", SIZE, 0.0, 4.0, (("encoder.size", 1.0),), span=1.0)
     late = [
@@ -54,11 +57,12 @@ def turning(clean_bench: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
     ]  # fmt: skip
     runs = [replace(r, starts={**r.starts, "encoder.angle": ANGLE}) for r in clean_bench.runs]
     channels = [replace(c, sigma=SIGMA) for c in clean_bench.channels]
-    problem = clean_bench.with_parameters([size])._with(runs=runs, channels=channels, late=late)
+    problem = clean_bench.with_parameters([size]).changed(runs=runs, channels=channels, late=late)
     random = np.random.default_rng(5)
     theta = problem.nominal
     data = {
-        run.name: (v := problem.simulate(theta, run)) + SIGMA * random.standard_normal(v.shape)
+        run.name: (v := simulator(problem).simulate(theta, run))
+        + SIGMA * random.standard_normal(v.shape)
         for run in problem.runs
     }
     return problem.with_data(data)
@@ -66,7 +70,7 @@ def turning(clean_bench: Problem, monkeypatch: pytest.MonkeyPatch) -> Problem:
 
 def elsewhere(problem: Problem, angle: float) -> Problem:
     """The problem with another start angle."""
-    return problem._with(
+    return problem.changed(
         runs=[replace(r, starts={**r.starts, "encoder.angle": angle}) for r in problem.runs]
     )
 
@@ -75,7 +79,7 @@ def test_a_run_ends_where_an_instability_takes_the_model_off(turning: Problem) -
     names = [run.name for run in turning.runs]
     first = turning.chosen("identification")[0]
     wrong = elsewhere(turning, ANGLE + 0.003)
-    found = ends(wrong, turning.nominal, names)
+    found = ends(simulator(wrong), turning.nominal, names)
     middle = first.times.size // 2
     assert set(found) == {first.name}
     assert middle - WINDOW < found[first.name] <= middle
@@ -86,9 +90,9 @@ def test_a_run_ends_where_an_instability_takes_the_model_off(turning: Problem) -
 
 def test_a_model_that_leaves_no_run_or_lacks_something_else_loses_none(turning: Problem) -> None:
     names = [run.name for run in turning.runs]
-    assert ends(turning, turning.nominal, names) == {}
+    assert ends(simulator(turning), turning.nominal, names) == {}
     far = np.array([SIZE * 1.2])  # far off in all runs, from the beginning
-    found = ends(turning, far, names)
+    found = ends(simulator(turning), far, names)
     first = turning.chosen("identification")[0]
     # runs that are not sensitive count in full; the sensitive one counts until it is
     assert set(found) == {first.name} and found[first.name] >= first.times.size // 2 - WINDOW
@@ -101,15 +105,15 @@ Found = tuple[Diagnosis, Search, Fitted, Round]
 def found_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Found]:
     """A diagnosis whose only round found a model; nothing is exchanged in steps."""
 
-    def exact(problem: Problem, *_: Any) -> dict[str, float]:
-        return {run.name: 0.0 for run in problem.runs}
+    def exact(simulator: Simulator, *_: Any) -> dict[str, float]:
+        return {run.name: 0.0 for run in simulator.problem.runs}
 
     for module in ("fitter", "diagnosis"):
         monkeypatch.setattr(f"cosim.diagnose.{module}.step_error", exact)
 
     def found(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Found:
-        search = Search(problem, say, only=[])
-        model = search.judged(fit(problem, problem.nominal, limit=0, robust=False))
+        search = Search(simulator(problem), say, only=[])
+        model = search.judged(fit(simulator(problem), problem.nominal, effort=POLISH))
         result = Diagnosis(problem, "", "", search, model)
         return result, search, model, Round(model, [], {}, winner=model)
 

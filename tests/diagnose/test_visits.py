@@ -11,6 +11,7 @@ import pytest
 from cosim.calibrate import Problem, read_problem
 from cosim.diagnose.visits import visited
 from sources.packaging.catalog import candidates
+from tests.problems import simulator
 
 DATA = Path(__file__).resolve().parents[2] / "scenarios" / "motor_bench" / "data" / "MB-12"
 
@@ -18,15 +19,15 @@ DATA = Path(__file__).resolve().parents[2] / "scenarios" / "motor_bench" / "data
 @pytest.fixture(scope="module")
 def bench() -> Problem:
     """The committed data set."""
-    problem = read_problem(DATA, workers=1)
-    return problem._with(step=problem.search_step)
+    problem = read_problem(DATA)
+    return problem.changed(step=problem.search.step)
 
 
 def test_the_first_points_span_the_path(bench: Problem) -> None:
     run = bench.runs[0]
     names = ("load.angle", "load.w")
-    points = visited(bench, bench.nominal, [run], names, 6)
-    many = visited(bench, bench.nominal, [run], names, 200)
+    points = visited(simulator(bench), bench.nominal, [run], names, 6)
+    many = visited(simulator(bench), bench.nominal, [run], names, 200)
     assert points.shape == (6, 2)
     assert np.array_equal(many[:6], points)
     # each one is farther from those before it than any later one is from all of them
@@ -37,7 +38,9 @@ def test_the_first_points_span_the_path(bench: Problem) -> None:
 
 
 def test_a_system_without_the_variable_has_no_such_places(bench: Problem) -> None:
-    found = visited(bench, bench.nominal, [bench.runs[0]], ("load.angle", "load.nowhere"), 6)
+    found = visited(
+        simulator(bench), bench.nominal, [bench.runs[0]], ("load.angle", "load.nowhere"), 6
+    )
     assert found.shape == (0, 2)
 
 

@@ -15,6 +15,7 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.search import Search
 from cosim.diagnose.signature import worthy
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
@@ -47,13 +48,13 @@ def arm(folder: Path, cold: float, seed: int) -> Problem:
             f"duration_s = {time[-1]}\nstarted_s_after_power_on = {begun}\n"
         )
     (folder / "set.toml").write_text(text, encoding="utf-8")
-    problem = read_problem(folder, workers=2)
+    problem = read_problem(folder)
     data = {}
     for run in problem.runs:
         theta = problem.nominal
         fading = np.exp(-(BEGUN[run.name] + SECONDS / 2) / TIME)
         theta[problem.index("b_2")] = WARM * (1.0 + cold * fading)
-        model = problem.simulate(theta, run)
+        model = simulator(problem).simulate(theta, run)
         data[run.name] = model + problem.sigma * random.standard_normal(model.shape)
     return problem.with_data(data)
 
@@ -62,7 +63,7 @@ def arm(folder: Path, cold: float, seed: int) -> Problem:
 def test_friction_that_fades_from_run_to_run(cold: float, tmp_path: Path) -> None:
     """And nothing is named where it does not."""
     problem = arm(tmp_path, cold, 3)
-    search = Search(problem, only=[c for c in candidates(problem) if c.label in LABELS])
+    search = Search(simulator(problem), only=[c for c in candidates(problem) if c.label in LABELS])
     found = search.round(search.calibrated()).winner
     search.close()
     if cold == 0.0:

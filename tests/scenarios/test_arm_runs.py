@@ -11,6 +11,7 @@ import pytest
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.installation import places
+from tests.problems import simulator
 
 BENCH = places.scenarios() / "mobile_manipulator_bench"
 FOLDED = (3.14, -1.95, 2.25, -1.87, -1.57, 0.0)
@@ -43,17 +44,15 @@ def data_set(folder: Path, swing: float) -> Path:
 
 def simulated(problem: Problem) -> dict[str, np.ndarray]:
     """Channel -> values over the sensor's noise."""
-    values = problem.simulate(problem.nominal, "A") / problem.sigma
-    problem.close()
+    values = simulator(problem).simulate(problem.nominal, "A") / problem.sigma
+    simulator(problem).close()
     return dict(zip((c.name for c in problem.channels), values.T, strict=True))
 
 
 def test_a_folded_arm_is_the_mass_that_the_base_carries(tmp_path: Path) -> None:
     folder = data_set(tmp_path / "folded", 0.0)
-    alone = simulated(read_problem(folder, workers=1))
-    both = simulated(
-        read_problem(folder, workers=1, mapping=BENCH / "arm.toml", only={"arm_moves": False})
-    )
+    alone = simulated(read_problem(folder))
+    both = simulated(read_problem(folder, mapping=BENCH / "arm.toml", only={"arm_moves": False}))
     assert np.ptp(alone["base_x"]) > 1000.0
     for name, values in alone.items():
         # the servos give way by some 1e-4 rad; currents show that where the set speed has corners
@@ -63,12 +62,12 @@ def test_a_folded_arm_is_the_mass_that_the_base_carries(tmp_path: Path) -> None:
 
 def test_a_swinging_arm_shows_on_the_base(tmp_path: Path) -> None:
     folder = data_set(tmp_path / "swings", 0.4)
-    problem = read_problem(folder, workers=1)
+    problem = read_problem(folder)
     assert problem.runs == ()
     (read,) = problem.further
     swinging = read()
     alone = simulated(
-        read_problem(folder, workers=1, mapping=BENCH / "dataset.toml", only={"arm_moves": True})
+        read_problem(folder, mapping=BENCH / "dataset.toml", only={"arm_moves": True})
     )
     both = simulated(swinging)
     # 1.6 rad/s^2 on a few tenths of a kg.m2 turn the base against its drives: more than their noise
@@ -80,7 +79,7 @@ def test_a_swinging_arm_shows_on_the_base(tmp_path: Path) -> None:
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_tool_is_where_the_folded_arm_holds_it(tmp_path: Path, axis: str) -> None:
     folder = data_set(tmp_path / "folded", 0.0)
-    both = read_problem(folder, workers=1, mapping=BENCH / "arm.toml", only={"arm_moves": False})
+    both = read_problem(folder, mapping=BENCH / "arm.toml", only={"arm_moves": False})
     found = simulated(both)
     heading = found["base_phi"] * 0.0005
     base = {a: found[f"base_{a}"] * 0.0003 for a in "xy"}

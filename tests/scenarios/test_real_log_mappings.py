@@ -9,8 +9,10 @@ import pytest
 
 from benchmarks.real_logs import errors, inverse, model_of
 from cosim.calibrate import read_problem
+from cosim.calibrate.differences import jacobian
 from cosim.files import read_toml
 from cosim.installation import places
+from tests.problems import simulator
 
 MAPPINGS = ("emps/dataset.toml", "emps/open_loop.toml", "bam_servo/dataset.toml",
             "kmutt_dcmotor/dataset.toml", "ur10e/dataset.toml", "ur10e/friction.toml")  # fmt: skip
@@ -47,16 +49,16 @@ def test_mapping_fits_its_system(name: str, tmp_path: Path) -> None:
     write_logs(tmp_path, mapping)
     problem = read_problem(tmp_path, mapping=mapping)
     assert {run.purpose for run in problem.runs} == {"identification", "validation"}
-    for _, residual in problem.residuals(problem.nominal, [problem.runs[0].name]):
+    for _, residual in simulator(problem).residuals(problem.nominal, [problem.runs[0].name]):
         assert np.isfinite(residual).all()
     # every parameter moves the model: it names variables that exist and matter
     silent = {"tau_c"}  # friction of an arm that is hardly moved
     columns = problem.columns(problem.runs[0].name)
-    item = problem.jacobian(problem.nominal, [problem.runs[0].name], central=False)[0]
+    item = jacobian(simulator(problem), problem.nominal, [problem.runs[0].name], central=False)[0]
     moved = np.any(item.values != 0.0, axis=(0, 1))
     names = {problem.names[i] for i, seen in zip(columns, moved, strict=True) if not seen}
     assert names <= silent | {n for n in names if n.startswith(("h_", "J_"))}
-    problem.close()
+    simulator(problem).close()
 
 
 @pytest.mark.slow
@@ -68,10 +70,10 @@ def test_models_of_the_benchmark_can_be_simulated(name: str, tmp_path: Path) -> 
     table = read_toml(folder / "models.toml")
     last = model_of(problem, table["model"][-1], {})
     assert len(last.parameters) != len(problem.parameters)
-    rows = errors(last, last.nominal, 0.0)
+    rows = errors(simulator(last), last.nominal, 0.0)
     assert len(rows) == len(problem.runs) * len(problem.channels)
     assert np.isfinite([value for _, _, values in rows for value in values]).all()
-    last.close()
+    simulator(last).close()
 
 
 def test_inverse_model_of_its_own_motion_needs_the_commanded_force(tmp_path: Path) -> None:
@@ -79,7 +81,7 @@ def test_inverse_model_of_its_own_motion_needs_the_commanded_force(tmp_path: Pat
     write_logs(tmp_path, folder / "dataset.toml")
     problem = read_problem(tmp_path, mapping=folder / "dataset.toml")
     theta, name = problem.nominal, problem.runs[0].name
-    ((_, residual),) = problem.residuals(theta, [name])
+    ((_, residual),) = simulator(problem).residuals(theta, [name])
     model = problem.run(name).data - residual * problem.sigma
     problem = problem.with_data({name: model})
     entry = read_toml(folder / "models.toml")["inverse"]
@@ -91,4 +93,4 @@ def test_inverse_model_of_its_own_motion_needs_the_commanded_force(tmp_path: Pat
     heavier = theta * np.where([n == "M" for n in problem.names], 1.1, 1.0)
     wrong = inverse(problem, heavier, problem.run(name), entry) or (0.0, 0.0)
     assert wrong[1] > 0.5  # a tenth of the mass is worth some 0.8 % of the force here
-    problem.close()
+    simulator(problem).close()

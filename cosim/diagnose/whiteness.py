@@ -1,4 +1,4 @@
-"""Does a residual hold more than noise? Size, slow parts and correlation, by channel and run."""
+"""Does a residual hold more than white noise? Size, slow parts, correlation, by channel."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ..calibrate.loss import WINDOW
-from .linear import Layout
+from .linear import SampleStack
 
 Vector = NDArray[np.float64]
 BURST = 0.01
 """Share of the windows, those with the largest residuals, that do not count. Where casters turn
 over the smallest difference decides when: for some tenths of a second a model that is right is off
 by tens of sigma. What lasts no longer in all runs together is no ground to look for a cause."""
-MATERIAL = 1.1
+CALIBRATED = 1.1
 """RMS over noise up to which a model counts as calibrated: the sheets give noise to a few percent,
 and thousands of samples make any smaller excess significant without making it worth a cause."""
 
 
 @dataclass(frozen=True)
-class Structure:
+class WhitenessTest:
     """Test of one channel in some runs.
 
     Attributes:
@@ -46,7 +46,7 @@ class Structure:
     @property
     def structured(self) -> bool:
         """More than noise, and enough to look for a cause."""
-        return self.p_value < 0.01 and self.lasting > MATERIAL
+        return self.p_value < 0.01 and self.lasting > CALIBRATED
 
     def to_dict(self) -> dict[str, float | bool | str]:
         """As in the JSON."""
@@ -58,11 +58,11 @@ class Structure:
         }  # fmt: skip
 
 
-def structures(residual: Vector, layout: Layout) -> list[Structure]:
-    """Test each channel over all runs of a layout."""
-    rows = layout.by_run(residual)
+def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]:
+    """Test each channel over all runs of a stack."""
+    rows = stack.by_run(residual)
     found = []
-    for column, channel in enumerate(layout.problem.channels):
+    for column, channel in enumerate(stack.problem.channels):
         squares, products, pairs, count = 0.0, 0.0, 0, 0
         windows = np.empty((0, WINDOW))
         for values in rows:
@@ -86,7 +86,7 @@ def structures(residual: Vector, layout: Layout) -> list[Structure]:
         lasting = float(np.mean(sizes[kept])) if sizes.size else variance
         p_value = float(chi2.sf(np.sum(sums[kept]), kept.size)) if sums.size else 1.0
         found.append(
-            Structure(channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
+            WhitenessTest(channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
                       float(np.sqrt(slow)), float(correlation), freedom, p_value)
         )  # fmt: skip
     return found

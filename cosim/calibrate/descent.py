@@ -1,0 +1,258 @@
+"""Levenberg-Marquardt and Gauss-Newton steps of a bounded weighted least-squares fit.
+
+Parameters are scaled by their spans, so that combinations that the runs cannot tell apart stay
+where they began. Limits whose integrators stop tick by tick make the cost stepwise: the Jacobian is
+taken over wide steps first, and a search along its main directions, which needs no derivatives,
+ends the fit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ..errors import FmuCallError
+from .differences import UNEVEN, directional, jacobian, smoothest, unevenness
+from .known import STEP, Known
+from .loss import Loss, Squares
+from .normal import BOUNDS, KNOWN, Normal, cost_of, drawn, gradient
+from .simulator import Simulator
+
+Vector = NDArray[np.float64]
+STEPS = (2e-2, STEP, 1e-2)
+"""Steps of differences over the span, from the first iterations to the last."""
+REUSED = 0.02
+"""A Jacobian is used again after a step that lowered the cost by this fraction."""
+CORRECTIONS = 4
+"""Steps at most with the Jacobian of a point that is close."""
+ROUGH = 0.1
+"""Unevenness of derivatives that go on being those of jumps: others are taken along directions."""
+CALM = 0.8
+"""Share of the information on a direction that runs without jumps give: then derivatives do."""
+RENEWALS, DRAFTED = 5, 3
+"""Jacobians that a fit from close by takes at most, and that a draft takes."""
+FIRM = 1e-9
+"""Damping of a Gauss-Newton step, relative to the information, with which a quick fit begins."""
+PARTS = (1.0, 0.3, 0.1)
+"""Shares of a step that are tried."""
+SHORTER = 8
+"""Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
+SETTLED = 0.2
+"""Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
+EVEN, ROUGHLY = 1e-3, 1e-2
+"""Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
+second for drafts."""
+
+
+class Descent:
+    """A point on its way to the minimum, with what was simulated there last."""
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        purpose: str | Iterable[str],
+        theta: Vector,
+        begun: int | None = None,
+    ) -> None:
+        self.simulator = simulator
+        self.problem = problem = simulator.problem
+        self.purpose = purpose if isinstance(purpose, str) else list(purpose)
+        self.theta = np.clip(theta, problem.lower, problem.upper)
+        self.loss: Loss = Squares()
+        self.uneven = False
+        self.promised = math.inf
+        self.damping = FIRM
+        self.begun = simulator.evaluations if begun is None else begun
+        self.drawn = drawn(problem)
+        self.residuals = simulator.residuals(self.theta, self.purpose)
+        self.cost = self.total(self.theta, self.residuals)
+
+    def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
+        """Cost with the bounds as a weak prior, which decides where the data are silent."""
+        p = self.problem
+        away = ((theta - p.nominal) / p.scale)[self.drawn]
+        return cost_of(p, theta, residuals, self.loss) + 0.5 * BOUNDS * float(away @ away)
+
+    def count(self, loss: Loss) -> None:
+        """Count residuals in another way from here on."""
+        self.loss = loss
+        self.cost = self.total(self.theta, self.residuals)
+
+    def normal(self, relative: float, central: bool) -> Normal:
+        """Normal equations here, from differences with steps of this share of the spans."""
+        self.jacobian = jacobian(
+            self.simulator, self.theta, self.purpose, central=central, relative=relative
+        )
+        normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
+        return self._directed(normal, set(normal.rough), relative) if normal.rough else normal
+
+    def _directed(self, normal: Normal, rough: set[str], relative: float) -> Normal:
+        """Normal equations with the derivatives of runs that jump taken along main directions."""
+        for place, item in enumerate(self.jacobian):
+            if item.run in rough:
+                part = normal.calm[np.ix_(item.columns, item.columns)]
+                self.jacobian[place] = directional(
+                    self.simulator, self.theta, item.run, np.linalg.eigh(part)[1],
+                    relative=relative,
+                )  # fmt: skip
+        return Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
+
+    def smooth(self) -> None:
+        """Last steps, with derivatives that avoid jumps; long ones across them have led here."""
+        p = self.problem
+        if p.unstable:  # rough at any step
+            return
+        self.uneven = any(unevenness(p, item) > UNEVEN for item in self.jacobian)
+        if not self.uneven:
+            return
+        self.jacobian = smoothest(self.simulator, self.theta, self.jacobian)
+        normal = Normal(p, self.theta, self.jacobian, self.residuals, self.loss)
+        jumps = {item.run for item in self.jacobian if unevenness(p, item) > ROUGH}
+        if rough := jumps & set(normal.rough):
+            normal = self._directed(normal, rough, STEPS[-1])
+        self.settle(normal, CORRECTIONS)
+
+    def attempt(self, theta: Vector) -> bool:
+        """Go there, inside the bounds, if it is better."""
+        theta = np.clip(theta, self.problem.lower, self.problem.upper)  # sums round past them
+        if np.array_equal(theta, self.theta):
+            return False
+        try:
+            residuals = self.simulator.residuals(theta, self.purpose)
+        except FmuCallError:
+            return False
+        cost = self.total(theta, residuals)
+        if not cost < self.cost:
+            return False
+        self.theta, self.residuals, self.cost = theta, residuals, cost
+        return True
+
+    def step(self, normal: Normal, damping: float) -> Vector:
+        """Damped Gauss-Newton step inside the bounds; `promised` says what it should gain.
+
+        It goes to the minimum of the quadratic within the bounds: cutting off parameters that would
+        leave them spoils the step along collinear ones.
+        """
+        p = self.problem
+        size = self.theta.size
+        whole = normal.matrix + np.diag(BOUNDS * self.drawn)
+        gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
+        ridge = damping * np.trace(whole) / size + 1e-9
+        values, vectors = np.linalg.eigh(whole)
+        # information taken off for jumps may leave a direction with none at all
+        root = np.sqrt(np.maximum(values, 0.0) + ridge)
+        along = (vectors.T @ gradient) / root
+        change = vectors @ (along / root)
+        low, high = (p.lower - self.theta) / p.scale, (p.upper - self.theta) / p.scale
+        if np.any(change < low) or np.any(change > high):
+            matrix = root[:, None] * vectors.T
+            change = lsq_linear(matrix, along, (low, high), method="bvls").x
+        self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
+        return np.asarray(np.clip(self.theta + change * p.scale, p.lower, p.upper))
+
+    def descend(self, relative: float, limit: int, tolerance: float) -> None:
+        """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
+
+        A Jacobian costs as many simulations as there are parameters, a step one; so a Jacobian is
+        used again as long as steps with it pay.
+        """
+        damping = 1e-6
+        for _ in range(limit):
+            normal = self.normal(relative, central=False)
+            first = self.cost
+            for _ in range(8):
+                if self.attempt(self.step(normal, damping)):
+                    damping = max(damping * 0.1, 1e-12)
+                    break
+                damping = max(damping, 1e-9) * 10.0
+            else:
+                return
+            before = first
+            while before - self.cost > REUSED * before:
+                before = self.cost
+                normal.gradient = self.gradient()
+                if not self.attempt(self.step(normal, damping)):
+                    break
+            if first - self.cost <= tolerance * max(first, 1.0):
+                return
+
+    def follow(self, known: Known, limit: int, share: float) -> None:
+        """Gauss-Newton with a Jacobian from close by; only what it lacks is differentiated.
+
+        Parameters that were there before hardly change what they do when one is added, so a step
+        costs one simulation and one for each new parameter.
+        """
+        damping = FIRM
+        for _ in range(limit):
+            self.jacobian = known.extended(self.simulator, self.theta, self.purpose)
+            normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
+            before = self.cost
+            if self.settle(normal, 1, damping) or before - self.cost <= self.enough(share):
+                return
+            damping = max(0.1 * self.damping, FIRM)
+
+    def enough(self, share: float) -> float:
+        """Fall of the cost below which a fit ends: a share of what is left beyond the noise."""
+        noise = 0.5 * float(sum(np.isfinite(r).sum() for _, r in self.residuals))
+        return max(SETTLED, share * (self.cost - noise))
+
+    def gradient(self) -> Vector:
+        """J^T r with the last Jacobian and the present residuals."""
+        return gradient(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
+
+    def settle(self, normal: Normal, limit: int, damping: float = FIRM) -> bool:
+        """Damped steps with one Jacobian; whether they came to where it promises no more."""
+        for _ in range(limit):
+            self.damping = damping
+            whole = self.step(normal, damping)
+            if abs(self.promised) < SETTLED:
+                return True
+            # a limit or a threshold is passed: the direction is right, but not so far
+            if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
+                for _ in range(SHORTER):
+                    damping = self.damping = max(damping, 1e-7) * 30.0
+                    if self.attempt(self.step(normal, damping)):
+                        break
+                else:
+                    return False
+            damping = max(damping * 0.1, 1e-12)
+            normal.gradient = self.gradient()
+        return False
+
+    def correct(self, *, draft: bool = False) -> Normal:
+        """Steps with a Jacobian taken here, and with another one as long as they lead far.
+
+        Args:
+            draft: only to be compared: one-sided differences, and fewer of them.
+        """
+        for _ in range(DRAFTED if draft else RENEWALS):
+            before = self.cost
+            normal = self.normal(STEPS[-1], central=not draft)
+            enough = self.enough(ROUGHLY if draft else EVEN)
+            if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
+                break
+        return normal
+
+    def polish(self) -> None:
+        """Search along the main directions of the normal matrix, without derivatives."""
+        p = self.problem
+        normal = self.correct()
+        if not normal.rough:
+            return
+        values, vectors = np.linalg.eigh(normal.matrix)
+        for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
+            if value < 1.0 / KNOWN**2 or float(direction @ normal.calm @ direction) > CALM * value:
+                continue
+            size = 1.0 / math.sqrt(value)
+            for sign in (1.0, -1.0):
+                length = size
+                while self.attempt(
+                    np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
+                ):
+                    length *= 2.0
+                if length > size:
+                    break

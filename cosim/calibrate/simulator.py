@@ -1,0 +1,158 @@
+"""Simulates a problem: with prepared sessions that are shared, in threads, within limits on time.
+
+Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
+nothing was measured.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+
+from ..data.segments import relative_pose
+from ..errors import FmuCallError
+from ..master.master import Master
+from ..master.session import Session
+from .parts import COINCIDENT, MeasuredRun, Sampler, Vector
+from .pool import Key, Ran, SessionPool
+from .problem import Problem
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Simulator:
+    """Runs a problem.
+
+    Args:
+        problem: what is simulated.
+        workers: threads, one per core if not given.
+        limits: processor time that runs may take [s], by run; no limit for others.
+        pool: sessions shared with other simulators.
+
+    Attributes:
+        evaluations: simulated runs so far, without those known from before.
+        costs: processor time that a run took, the last time [s].
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        workers: int | None = None,
+        limits: Mapping[str, float] | None = None,
+        pool: SessionPool | None = None,
+    ) -> None:
+        self.problem = problem
+        self.workers = workers or os.cpu_count() or 1
+        self.limits: Mapping[str, float] = dict(limits or {})
+        self.evaluations = 0
+        self.costs: dict[str, float] = {}
+        self._pool = pool or SessionPool()
+        self._lock = threading.Lock()
+
+    def of(self, problem: Problem) -> Simulator:
+        """A simulator of another problem with the same sessions, threads and limits."""
+        return Simulator(problem, workers=self.workers, limits=self.limits, pool=self._pool)
+
+    def limited(self, limits: Mapping[str, float]) -> Simulator:
+        """The same with these limits instead."""
+        return Simulator(self.problem, workers=self.workers, limits=limits, pool=self._pool)
+
+    # -- one run -----------------------------------------------------------------------------------
+
+    def _key(self, run: MeasuredRun) -> Key:
+        interval = float(np.median(np.diff(run.times)))
+        spans = (float(run.times[0]), float(run.times[-1]), interval, run.lead)
+        return Key(self.problem.kind, (run.name, spans, id(run.inputs)))
+
+    def session(self, run: MeasuredRun) -> Session:
+        """A new prepared run."""
+        problem = self.problem
+        master = Master(problem.plain(), problem.algorithm, problem.step, options=problem.options)
+        interval = problem.period or float(np.median(np.diff(run.times)))
+        every = max(round(interval / problem.step), 1)
+        size = every * problem.step
+        first = float(run.times[0]) - run.lead
+        last = float(run.times[-1]) + max(channel.shift for channel in problem.channels)
+        count = math.ceil((last - first) / size - COINCIDENT)
+        return Session(
+            master,
+            count * size,
+            inputs=run.inputs,
+            record=list(dict.fromkeys(channel.signal for channel in problem.channels)),
+            every=every,
+            start=first if abs(first) > COINCIDENT * interval else 0.0,
+        )
+
+    def simulate(self, theta: Vector, run: MeasuredRun | str) -> Vector:
+        """What the channels would read: one row per sample.
+
+        Raises:
+            StepError: an FMU failed, or the run exceeded its limit.
+            ValueRangeError: a value outside the bounds that its FMU declares.
+        """
+        problem = self.problem
+        run = problem.run(run) if isinstance(run, str) else run
+        ran = self._ran(problem.values(theta, run), run)
+        with self._lock:
+            self.costs[run.name] = ran.cost
+        place = {name: column for column, name in enumerate(ran.names)}
+        sampler = Sampler(run.times, ran.times)
+        read = np.column_stack(
+            [c.of(sampler, ran.rows[:, place[c.signal]]) for c in problem.channels]
+        )
+        for names in problem.relative:
+            pose = [[c.name for c in problem.channels].index(name) for name in names]
+            read[:, pose] = relative_pose(read[:, pose], run.anchor)
+        return read
+
+    def _ran(self, values: dict[str, float], run: MeasuredRun) -> Ran:
+        key, limit = self._key(run), self.limits.get(run.name, math.inf)
+        if (known := self._pool.ran(key, values, limit)) is not None:
+            return known
+        with self._lock:
+            self.evaluations += 1
+            session = self._pool.take(key) or self.session(run)
+        begun = time.thread_time()
+        try:
+            times, rows = session.run(values, limit=limit)
+        except FmuCallError:
+            session.close()
+            raise
+        ran = Ran(session.names, times, rows, time.thread_time() - begun, run.inputs)
+        self._pool.give(key, session, run.inputs)
+        self._pool.remember(key, values, ran)
+        return ran
+
+    # -- many --------------------------------------------------------------------------------------
+
+    def spread(self, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Apply a function that simulates to items, in threads."""
+        self.problem.plain()  # FMUs are built once, before threads ask for them
+        if self.workers == 1 or len(items) < 2:
+            return [function(item) for item in items]
+        with ThreadPoolExecutor(self.workers) as threads:
+            return list(threads.map(function, items))
+
+    def residuals(
+        self, theta: Vector, purpose: str | Iterable[str] | None = "identification"
+    ) -> list[tuple[str, Vector]]:
+        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all)."""
+        runs = self.problem.chosen(purpose)
+        models = self.spread(lambda run: self.simulate(theta, run), runs)
+        return [
+            (run.name, (run.data - model) / self.problem.sigma)
+            for run, model in zip(runs, models, strict=True)
+        ]
+
+    def close(self) -> None:
+        """Free the idle sessions of this kind of problem; it can still be simulated."""
+        self._pool.close(self.problem.kind)

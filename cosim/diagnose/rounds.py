@@ -1,0 +1,69 @@
+"""One round of attribution: what was scored and fitted in it, and what won."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .candidates import Candidate
+from .models import Fitted
+from .probes import Probe
+from .signature import Signature, unscored
+
+
+@dataclass
+class Round:
+    """One round.
+
+    Attributes:
+        base: model that the round began with.
+        signatures: scored candidates, best first.
+        corrected: p value by label, corrected for their number.
+        aside: labels of those that one run ruled out.
+        fitted: refitted candidates, best first.
+        winner: accepted one.
+        rivals: fitted ones that the data cannot tell from it.
+        scores: of these, their log likelihoods over that of the winner [nats].
+        open: whether more was so evidently missing that the choice waits for it.
+        probes: all candidates that were simulated, with the systems they were simulated in.
+        quick: what the best quick fit gained on all runs [nats].
+        near: candidates whose quick fits gained nearly as much.
+        compared: effects of the model in which its winner was last compared with others; empty if
+            that was the round's own.
+    """
+
+    base: Fitted
+    signatures: list[Signature]
+    corrected: dict[str, float]
+    aside: tuple[str, ...] = ()
+    fitted: list[Fitted] = field(default_factory=list)
+    winner: Fitted | None = None
+    rivals: list[Fitted] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
+    open: bool = False
+    probes: dict[Candidate, Probe] = field(default_factory=dict)
+    quick: float = 0.0
+    near: frozenset[Candidate] = frozenset()
+    compared: frozenset[Candidate] = frozenset()
+
+    def follow(self, better: Fitted) -> None:
+        """Let another fit of the winner take its place."""
+        self.fitted = [better if f is self.winner else f for f in self.fitted]
+        self.winner = better
+
+    def simpler(self) -> list[Signature]:
+        """Laws at the winner's place whose strength is the same quantity, with fewer parameters.
+
+        A bristle gives way before it slips, so to first order it explains dry friction where a law
+        that sticks at once does not; only fits show whether the simpler one does as well.
+        """
+        winner = self.winner
+        assert winner is not None and winner.signature is not None
+        last = winner.effects[-1]
+        scored = {s.candidate: s for s in self.signatures}
+        return [
+            scored.get(candidate) or unscored(probe)
+            for candidate, probe in self.probes.items()
+            if candidate.place == last.place and candidate not in winner.effects
+            and probe.strength.name.removeprefix(candidate.prefix) == winner.quantity
+            and probe.own < winner.signature.probe.own
+        ]  # fmt: skip

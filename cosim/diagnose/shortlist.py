@@ -1,0 +1,94 @@
+"""Which of the scored candidates of a round are refitted."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from .candidates import balances
+from .judge import Judge
+from .linear import MATERIAL
+from .models import GATE, GATE_Z, LEVEL, is_open
+from .rounds import Round
+from .signature import WHOLES, Signature, groups_of, kind
+
+NEARLY = 0.7
+"""Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
+REFITS = 6
+PART = 0.2
+"""A candidate that gains less than this share of what the best one gains, to first order, is not
+refitted: it is no rival, and another round will ask again."""
+MEMBERS = 2
+"""Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
+SHARED = 0.5
+"""What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
+this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""
+EXTRA = 2
+"""Where something is evidently missing, so many that gain more than the best one are refitted
+though not significant: the blocks' variance is then that of what is missing. Half as much will do
+where the model is far off."""
+
+
+def able(judge: Judge, current: Round) -> list[Signature]:
+    """Candidates that show in the fitted runs and ask for enough to matter, by gain."""
+    return [
+        s
+        for s in current.signatures
+        if not s.unseen
+        and s.score.gain > GATE
+        and judge.fitting.largest(s.asked) > NEARLY * MATERIAL
+    ]
+
+
+def promising(judge: Judge, current: Round) -> list[Signature]:
+    """Candidates worth a refit: significant, not too small to matter, the best gains first.
+
+    Where something is evidently missing and none is significant (an effect that shows in few
+    moments has few blocks to prove itself), unused runs decide alone. So they do on a few that
+    gain more than any significant one, or half as much where the model is far off.
+    """
+    seen = able(judge, current)
+    good = [s for s in seen if current.corrected[s.candidate.label] < LEVEL]
+    if not good and judge.lacking(current.base):
+        good = [s for s in seen if s.score.z > GATE_Z]
+    best = max((s.score.gain for s in good), default=0.0)
+    single = balances(current.base.problem)
+    alike: Counter[tuple[str, str, str]] = Counter()
+    few = []
+    for s in good:
+        instance, port = s.candidate.instance, s.candidate.port
+        if (instance, port) in single and "." in port:
+            alike[kind(s.candidate)] += 1
+            if alike[kind(s.candidate)] > MEMBERS:
+                continue
+        if s.score.gain > PART * best:
+            few.append(s)
+    shared = [
+        s
+        for s in few[REFITS:]
+        if s.score.gain > SHARED * best
+        and s.candidate.port
+        and (s.candidate.instance, s.candidate.port) not in single
+    ]
+    chosen = few[:REFITS] + shared[:WHOLES]
+    if chosen and judge.lacking(current.base):
+        known = {s.candidate.label for s in (*good, *chosen)}
+        least = best * (SHARED if is_open(current.base.estimate) else 1.0)
+        chosen += [
+            s for s in seen
+            if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
+        ][:EXTRA]  # fmt: skip
+        chosen += groups_of(chosen, seen, single, PART * best)
+    return sorted(chosen, key=lambda s: -s.score.gain)
+
+
+def remaining(judge: Judge, current: Round, tried: list[Signature]) -> list[Signature]:
+    """The next candidates of a round, where unused runs want none of the first.
+
+    What a far-off model lacks is in the variance of its blocks, so a law far down the list by
+    significance may be the right one.
+    """
+    known = {s.candidate.label for s in tried}
+    seen = [s for s in able(judge, current) if s.score.z > GATE_Z]
+    best = max((s.score.gain for s in seen), default=0.0)
+    few = [s for s in seen if s.score.gain > PART * best]
+    return [s for s in few if s.candidate.label not in known][:REFITS]

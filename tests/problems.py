@@ -1,0 +1,14 @@
+"""Simulators of calibration problems that share their sessions among the tests."""
+
+from __future__ import annotations
+
+from cosim.calibrate.pool import SessionPool
+from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
+
+SESSIONS = SessionPool()
+
+
+def simulator(problem: Problem, workers: int = 2) -> Simulator:
+    """Without limits on time."""
+    return Simulator(problem, workers=workers, pool=SESSIONS)
