@@ -13,6 +13,7 @@ import itertools
 import json
 import sys
 from collections import Counter
+from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +29,7 @@ from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .linearize import linearize_command
+from .streams import print_json, stdout_for_json
 from .study import study_command
 
 if TYPE_CHECKING:
@@ -126,7 +128,7 @@ def fmus_list(
     if component and not entries:
         raise VariantError(f"no variant of a component {component!r}; see 'cosim fmus list'")
     if as_json:
-        _print_json(entries)
+        print_json(entries)
         return
     table = _table("variant", "inputs", "outputs", "parameters", "description")
     for entry in entries:
@@ -179,7 +181,7 @@ def fmus_build(
         )
     paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
     if as_json:
-        _print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
+        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
     else:
         for item in paths:
             typer.echo(item["file"])
@@ -220,7 +222,7 @@ def fmus_check(
             for finding in findings:
                 typer.echo(f"  {finding}")
     if as_json:
-        _print_json({"checked": len(results), "with_problems": bad, "problems": results})
+        print_json({"checked": len(results), "with_problems": bad, "problems": results})
     if bad:
         raise CheckError(f"{bad} of {len(results)} FMUs have problems")
 
@@ -238,7 +240,7 @@ def list_scenarios(as_json: AsJson = False) -> None:
 
     files = scenario.scenario_files()
     if as_json:
-        _print_json(
+        print_json(
             [
                 {
                     "scenario": file.name,
@@ -331,7 +333,7 @@ def run_command(
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         _say(f"note: {note}")
     if as_json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
     else:
         _print_result(result)
     failed = [label for label, check in result.checks.items() if not check.ok]
@@ -434,14 +436,11 @@ def _say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _print_json(content: Any) -> None:
-    typer.echo(json.dumps(content, indent=2))
-
-
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        app()
+        with stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+            app()
     except CosimError as error:
         _say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):
