@@ -14,6 +14,7 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,6 +30,7 @@ from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .linearize import linearize_command
+from .streams import print_json, stdout_for_json
 from .study import study_command
 
 if TYPE_CHECKING:
@@ -132,7 +134,7 @@ def fmus_list(
             f"{listing((entry['component'] for entry in _components()), component)}"
         )
     if as_json:
-        _print_json(entries)
+        print_json(entries)
         return
     table = _table("variant", "inputs", "outputs", "parameters", "description")
     for entry in entries:
@@ -229,7 +231,7 @@ def fmus_build(
         )
     paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
     if as_json:
-        _print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
+        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
     else:
         for item in paths:
             typer.echo(item["file"])
@@ -287,7 +289,7 @@ def fmus_check(
             for finding in findings:
                 typer.echo(f"  {finding}")
     if as_json:
-        _print_json({"checked": len(results), "with_problems": bad, "problems": results})
+        print_json({"checked": len(results), "with_problems": bad, "problems": results})
     if bad:
         raise CheckError(f"{bad} of {len(results)} FMUs have problems")
 
@@ -305,7 +307,7 @@ def list_scenarios(as_json: AsJson = False) -> None:
 
     files = scenario.scenario_files()
     if as_json:
-        _print_json(
+        print_json(
             [
                 {
                     "scenario": file.name,
@@ -398,7 +400,7 @@ def run_command(
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         _say(f"note: {note}")
     if as_json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
     else:
         _print_result(result)
     failed = [label for label, check in result.checks.items() if not check.ok]
@@ -501,14 +503,11 @@ def _say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _print_json(content: Any) -> None:
-    typer.echo(json.dumps(content, indent=2))
-
-
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        app()
+        with stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+            app()
     except CosimError as error:
         _say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):

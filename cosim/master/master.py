@@ -110,6 +110,7 @@ class Master:
         signals = spread(self.system, inputs or {})
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         times[-1] = start + duration
+        carried = self._objects(signals, times)
         return Outline(
             system=self.system,
             scenario=self.scenario,
@@ -122,8 +123,8 @@ class Master:
             observed=observed,
             every=every,
             signals=signals,
-            external=self._external(signals, times),
-            objects=self._objects(signals, times),
+            external=self._external(signals, times, carried),
+            objects=carried,
         )
 
     def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
@@ -154,13 +155,17 @@ class Master:
             raise GraphError(f"{name} is of type {variables[0].type} and cannot be recorded")
         return self.system.elements(name)
 
-    def _external(self, signals: Mapping[str, Signal], times: Vector) -> Vector:
+    def _external(
+        self, signals: Mapping[str, Signal], times: Vector, carried: Mapping[int, Sequence[Any]]
+    ) -> Vector:
+        """Values of the driven inputs; in place of `carried` objects a number for each."""
         table = np.empty((times.size, len(signals)))
         for column, (name, signal) in enumerate(signals.items()):
-            if self.system.declaration(name).type in OBJECTS:
-                table[:, column] = 0.0
+            if column in carried:
+                codes = {item: code for code, item in enumerate(dict.fromkeys(carried[column]))}
+                table[:, column] = [codes[item] for item in carried[column]]
                 continue
-            values = np.asarray(signal.at(times), dtype=np.float64)
+            values = self._numbers(name, signal, times)
             unit = self.system.unit(name)
             if signal.unit and unit:
                 try:
@@ -179,13 +184,24 @@ class Master:
             table[:, column] = values
         return table
 
+    def _numbers(self, name: str, signal: Signal, times: Vector) -> Vector:
+        """Values of a driven input that travels as a number; names of an enumeration count."""
+        declared = self.system.declaration(name)
+        exact = objects(signal, times)
+        if not exact and not declared.items:
+            return np.asarray(signal.at(times), dtype=np.float64)
+        given = exact or signal.at(times).tolist()
+        scalar, where = replace(declared, dimensions=()), f"input {name} from {signal.text}"
+        checked = {item: check_values(where, [scalar], item)[0] for item in dict.fromkeys(given)}
+        return np.array([float(checked[item]) for item in given])
+
     def _objects(self, signals: Mapping[str, Signal], times: Vector) -> dict[int, list[Any]]:
         """Values of the driven inputs that travel as objects, by their column."""
         found = {}
         for column, (name, signal) in enumerate(signals.items()):
             declared = self.system.declaration(name)
             if declared.type in OBJECTS:
-                given = objects(signal, times)
+                given = objects(signal, times) or signal.at(times).tolist()
                 where = f"input {name} from {signal.text}"
                 scalar = replace(declared, dimensions=())
                 found[column] = [check_values(where, [scalar], item)[0] for item in given]

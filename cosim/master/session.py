@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Any, Self
 
@@ -134,12 +134,15 @@ class Session:
         initialize(run)
         try:
             self._execution.begin()
-            with suppress(EndRequest):  # an end that an FMU asks for is one
+            try:
                 self._advance_within(limit)
-            self._execution.finish()
+            except EndRequest as request:  # an end that an FMU asks for is one
+                self._execution.finish(request)
+            else:
+                self._execution.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self._execution.stopped(error, keep=False) from error
-        return self.times[: run.row], run.rows[: run.row].copy()
+        return run.recorded_times(), run.rows[: run.row].copy()
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):

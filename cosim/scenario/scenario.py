@@ -310,8 +310,17 @@ class _Reader:
                 self.file.logs[key] = read_log(self.folder / entry["file"])
         return self.file.logs[key]
 
-    def samples(self, what: str, entry: Any, column: str) -> tuple[Any, Any, str, str]:
-        """Times, values, unit and text of a column of a log, or of an inline table."""
+    def samples(
+        self, what: str, entry: Any, column: str, *, exact: bool = False
+    ) -> tuple[Any, Any, str, str]:
+        """Times, values, unit and text of a column of a log, or of an inline table.
+
+        Args:
+            what: needs them, for error texts.
+            entry: says where they are.
+            column: of the log.
+            exact: as they are, where doubles do not carry them.
+        """
         if "times" in entry:
             if "values" not in entry:
                 raise self.fail(f"{what}: times without values")
@@ -327,7 +336,10 @@ class _Reader:
         log = self.log(entry)
         unit = entry.get("unit", log.units.get(column, ""))
         text = f"{log.name}:{column}"
-        return log[str(entry.get("time", "time"))], log[column], unit, text
+        times = log[str(entry.get("time", "time"))]
+        if exact and column in log.exact:
+            return times, log.exact[column], unit, text
+        return times, log[column], unit, text
 
     def signal(self, name: str, entry: Any) -> Signal | SignalVector:
         """The signal of an input, or those of all elements of a vector input."""
@@ -354,7 +366,7 @@ class _Reader:
         )
 
     def table_signal(self, what: str, entry: Any, column: str, hold: Any) -> Table:
-        times, values, unit, text = self.samples(what, entry, column)
+        times, values, unit, text = self.samples(what, entry, column, exact=hold == "hold")
         return Table(
             times, values, unit=unit, interpolation=hold, text=text, extend="times" in entry
         )

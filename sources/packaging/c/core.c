@@ -6,6 +6,7 @@
    [time, x, xdot, u, y, p, z, solver.method, solver.step, solver.tolerance].
    Everything that a saved state must hold is in Memory, a plain struct. */
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>

@@ -1,8 +1,10 @@
 /* -- sample clocks ----------------------------------------------------------------------------- */
 
-/* Ticks lie at k*T. One within 1e-7 T of the end of a step belongs to the next step, at whose beginning
-   it is due, so that rounding of k*H and k*T cannot split one instant into two. */
+/* Ticks lie at k*T. One within 1e-7 T and the rounding of t of the end of a step belongs to the next
+   step, at whose beginning it is due, so that rounding of k*H and k*T cannot split one instant into two. */
 #define SLACK 1e-7
+
+static double slack(double period, double t) { return SLACK * period + 4 * DBL_EPSILON * fabs(t); }
 
 static int start_clocks(Instance *c) {
 #if NC
@@ -13,7 +15,7 @@ static int start_clocks(Instance *c) {
   for (int k = 0; k < NC; k++) {
     if (!(m->period[k] > 0))
       return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, m->period[k]);
-    m->tick[k] = ceil(m->v[0] / m->period[k] - SLACK);
+    m->tick[k] = ceil((m->v[0] - slack(m->period[k], m->v[0])) / m->period[k]);
     m->next[k] = m->tick[k] * m->period[k];
   }
 #else
@@ -28,7 +30,7 @@ static void run_ticks(Instance *c) {
   Memory *m = &c->m;
   double *v = m->v, z[NZ + 1];
   for (int k = 0; k < NC; k++) {
-    if (!(m->next[k] <= v[0] + SLACK * m->period[k])) continue;
+    if (!(m->next[k] <= v[0] + slack(m->period[k], v[0]))) continue;
     const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
     double *res[] = {z};
     UPDATES[k](arg, res, 0, 0, 0);
@@ -46,7 +48,7 @@ static void run_ticks(Instance *c) {
 static double next_tick(const Instance *c, double end) {
   double first = end;
   for (int k = 0; k < NC; k++)
-    if (c->m.next[k] < end - SLACK * c->m.period[k] && c->m.next[k] < first) first = c->m.next[k];
+    if (c->m.next[k] + slack(c->m.period[k], c->m.next[k]) < end && c->m.next[k] < first) first = c->m.next[k];
   return first;
 }
 
