@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import need_function, need_number, need_table, need_text
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
 from ..errors import StepError, UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
+from ..master.algorithms import names
 from ..master.master import Master
 from ..master.outline import Outline
 from ..master.session import Session
@@ -342,7 +344,7 @@ def find_runs(
 
 
 def run(
-    name: str,
+    name: Path | str,
     *,
     variants: Mapping[str, str] | None = None,
     parameters: Mapping[str, Any] | None = None,
@@ -376,6 +378,22 @@ def run(
     Raises:
         CosimError: see `errors`.
     """
+    name = str(name) if isinstance(name, Path) else name
+    need_text("the scenario to run", name, 'give its name or path, as in run("motor_bench")')
+    for what, table, example in (
+        ("variants", variants, 'variants={"gearbox": "lossy"}'),
+        ("parameters", parameters, 'parameters={"load.J": 0.09}'),
+        ("options", options, 'options={"extrapolation": 1}'),
+    ):
+        need_table(f"{what} of a run", table or {}, example)
+    for key, wanted in (variants or {}).items():
+        need_text(f"the variant of {key}", wanted, 'write variants={"gearbox": "lossy"}')
+    for what, value in (("step", step), ("duration", duration), ("time limit isolate", isolate)):
+        if value is not None:
+            need_number(f"{what} of a run", value, "give it in seconds")
+    if algorithm is not None:
+        need_text("the algorithm of a run", algorithm, f"take one of {', '.join(names())}")
+    need_function("progress of a run", progress)
     if provider is None:
         provider = builder.default_provider()
     whole, text, wanted, items = find_runs(name, folder, duration, step)
