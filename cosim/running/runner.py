@@ -196,21 +196,25 @@ def _recorded(
 ) -> tuple[tuple[str, ...], list[str]]:
     """Signals to record, and notes on what a changed variant does not have."""
     needed = [name for item in scenario.references.values() for name in item.signals]
-    needed += [name for check in scenario.checks for name in check.needs]
     shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
     everything = system.signals() if scenario.record is None else scenario.record
-    kept, notes = [], []
-    for name in (*everything, *shown):
+    notes = []
+
+    def has(name: str) -> bool:
         instance = name.partition(".")[0]
         try:
             system.variables(name)
-            kept.append(name)
         except UnknownNameError:
             if instance not in changed:
                 raise
             reference = system.members[instance].reference
             notes.append(f"{name} is not recorded: {reference} has none")
-    return tuple(dict.fromkeys([*kept, *needed])), notes
+            return False
+        return True
+
+    kept = list(filter(has, (*everything, *shown)))
+    checked = filter(has, (name for check in scenario.checks for name in check.needs))
+    return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
 
 
 @dataclass(frozen=True)
@@ -219,6 +223,7 @@ class Prepared:
 
     Attributes:
         scenario: what is run.
+        declared: instance -> variant that the scenario declares.
         variants: instance -> variant that is used.
         master: system, algorithm and step.
         record: signals to record.
@@ -227,6 +232,7 @@ class Prepared:
     """
 
     scenario: Scenario
+    declared: Mapping[str, str]
     variants: Mapping[str, str]
     master: Master
     record: tuple[str, ...]
@@ -265,7 +271,10 @@ class Prepared:
             variants=self.variants,
             recording=recording,
             comparisons=comparisons,
-            checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
+            checks=tuple(
+                evaluate(check, recording, comparisons, check.unfit(self.declared, self.variants))
+                for check in self.scenario.checks
+            ),
             wall_s=wall_s,
             fmu_steps=int(recording.provenance["fmu_steps"]),
             notes=(*self.notes, *recording.notes),
@@ -295,7 +304,7 @@ def prepare(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
         isolate=isolate, options=scenario.options,
     )  # fmt: skip
-    return Prepared(scenario, instances, master, record, _every(scenario), (*notes, *others))
+    return Prepared(scenario, usual, instances, master, record, _every(scenario), (*notes, *others))
 
 
 def run_scenario(
