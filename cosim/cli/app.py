@@ -403,7 +403,7 @@ def run_command(
         print_json(result.to_dict())
     else:
         _print_result(result)
-    failed = [label for label, check in result.checks.items() if not check.ok]
+    failed = [label for label, check in result.checks.items() if check.failed]
     if failed:
         shown = "; ".join(failed[:5]) + ("; ..." if len(failed) > 5 else "")
         raise CheckError(f"{len(failed)} of {len(result.checks)} checks failed: {shown}")
@@ -457,18 +457,20 @@ def _print_result(result: Result) -> None:
         console.print(table)
     shown = content["checks"]
     if len(shown) > SHOWN:
-        shown = [item for item in shown if not item["ok"]]
-        console.print(
-            f"{len(content['checks']) - len(shown)} of {len(content['checks'])} checks ok"
-        )
+        shown = [item for item in shown if item["ok"] is False]
+        met = sum(item["ok"] is True for item in content["checks"])
+        console.print(f"{met} of {len(content['checks'])} checks ok")
     if shown:
         table = _table("check", "value", "limit", "", "source")
         for item in shown:
-            outcome = "ok" if item["ok"] else "FAILED"
+            outcome = {True: "ok", False: "FAILED", None: "not judged"}[item["ok"]]
             limit = item["limit"]
             bound = f"{limit:.4g}" if isinstance(limit, float) else str(limit)
-            table.add_row(item["name"], f"{item['value']:.4g}", bound, outcome, item["source"])
+            value = "-" if item["value"] is None else f"{item['value']:.4g}"
+            table.add_row(item["name"], value, bound, outcome, item["source"])
         console.print(table)
+    for reason, names in _unjudged(content["checks"]).items():
+        console.print(f"not judged: {', '.join(names)}: {reason}", soft_wrap=True)
     folders = list(dict.fromkeys(str(path.parent) for path in result.files))
     if len(folders) > SHOWN_FOLDERS:
         console.print(f"in {len(folders) - 1} folders below {folders[-1]}", soft_wrap=True)
@@ -477,6 +479,15 @@ def _print_result(result: Result) -> None:
     pictures = [path for path in result.files if path.suffix == ".png"]
     for path in pictures[-1:] if pictures and pictures[-1].name == "overview.png" else pictures:
         console.print(f"picture: {path}", soft_wrap=True)
+
+
+def _unjudged(checks: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Why checks are not judged -> their names."""
+    found: dict[str, list[str]] = {}
+    for item in checks:
+        if "not_judged" in item:
+            found.setdefault(item["not_judged"], []).append(item["name"])
+    return found
 
 
 # -- frame -----------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import wrong
 from ..errors import ValueRangeError
 
 Vector = NDArray[np.float64]
@@ -212,4 +213,6 @@ def as_signal(value: Signal | float | str | bytes | Callable[[Vector], ArrayLike
         return Constant(value)
     if hasattr(value, "at"):
         return value  # type: ignore[return-value]
+    if not callable(value):
+        raise wrong("what drives an input", value, "a signal, a number, a text or a function")
     return Function(value)

@@ -239,6 +239,14 @@ class _Reader:
                 checks.append(read_check(entry, references))
             except ValueError as error:
                 raise self.fail(str(error)) from error
+        system = self.system()
+        for check in checks:
+            for name in check.holds_for or ():
+                if name not in system.instances:
+                    raise self.fail(
+                        f"check {check.name!r}: holds_for names no instance {name!r}; "
+                        f"{listing(system.instances, name)}"
+                    )
         period = self.optional(record, "period")
         signals = record.get("signals")
         return Scenario(
@@ -248,7 +256,7 @@ class _Reader:
             question=table.get("question", ""),
             expected=table.get("expected", ""),
             source=table.get("source", ""),
-            system=self.system(),
+            system=system,
             duration=self.number("duration"),
             start=self.number("start", 0.0),
             step=self.number("step"),
