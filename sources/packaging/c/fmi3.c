@@ -90,7 +90,7 @@ EXPORT fmi3Status fmi3SetFloat64(Instance *c, const uint32_t vr[], size_t n, con
 
 EXPORT fmi3Status fmi3GetInt64(Instance *c, const uint32_t vr[], size_t n, int64_t values[], size_t nv) {
   for (size_t i = 0; i < n; i++) {
-    if (vr[i] != METHOD || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
+    if (vr[i] != METHOD + c->first || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
     values[i] = (int64_t)c->m.v[METHOD];
   }
   return OK;
@@ -98,7 +98,7 @@ EXPORT fmi3Status fmi3GetInt64(Instance *c, const uint32_t vr[], size_t n, int64
 
 EXPORT fmi3Status fmi3SetInt64(Instance *c, const uint32_t vr[], size_t n, const int64_t values[], size_t nv) {
   for (size_t i = 0; i < n; i++) {
-    if (vr[i] != METHOD || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
+    if (vr[i] != METHOD + c->first || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
     if (c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
     const int status = set_value(c, METHOD, (double)values[i]);
     if (status != OK) return status;

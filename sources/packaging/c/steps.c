@@ -174,19 +174,20 @@ static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const 
   double s[NV] = {0}, dxdot[NX + 1], dy[NY + 1];
   double *v = c->m.v;
   for (size_t i = 0; i < nk; i++) {
-    uint32_t k = knowns[i];
+    const uint32_t k = knowns[i] - c->first;
     if (k >= NV || (k >= IXD && k < IU) || (k >= IY && k < IP) || k >= IS)
-      return report(c, ERROR, "%s: no directional derivative with respect to value reference %u", MODEL, k);
+      return report(c, ERROR, "%s: no directional derivative with respect to value reference %u", MODEL,
+                    knowns[i]);
     s[k] = seed[i];
   }
   const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP, s, s + IX, s + IZ, s + IU, s + IP};
   double *res[] = {dxdot, dy};
   f_directional(arg, res, 0, 0, 0);
   for (size_t i = 0; i < nu; i++) {
-    uint32_t k = unknowns[i];
+    const uint32_t k = unknowns[i] - c->first;
     if (k >= IXD && k < IU) result[i] = dxdot[k - IXD];
     else if (k >= IY && k < IP) result[i] = dy[k - IY];
-    else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, k);
+    else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, unknowns[i]);
     if (!isfinite(result[i]))
       return report(c, ERROR, "%s: directional derivative of %s is not finite (%g) at time %.9g s", MODEL, NAMES[k],
                     result[i], v[0]);
