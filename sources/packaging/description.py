@@ -264,9 +264,8 @@ def describe_fmi3(
         providesDirectionalDerivatives=True,
     )
     ET.SubElement(root, "ModelExchange", common)
-    ET.SubElement(
-        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
-    )
+    simulation = _attributes(canHandleVariableCommunicationStepSize=True, hasEventMode=True)
+    ET.SubElement(root, "CoSimulation", common | simulation)
     listed = [entries[0], *(entry for _, entry in shown_entries(entries))]
     _units(root, listed)
     if any(entry.part == "solver" for entry in listed):

@@ -50,6 +50,7 @@ typedef struct {
 typedef struct {
   Memory m;
   int model_exchange;
+  int event_mode; /* of co-simulation, FMI 3: the importer may ask for the ticks at its points */
   int version;
   uint32_t first; /* value reference of the time */
   int logging;

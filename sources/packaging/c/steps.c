@@ -1,7 +1,9 @@
 /* -- sample clocks ----------------------------------------------------------------------------- */
 
 /* Ticks lie at k*T. One within 1e-7 T of the end of a step belongs to the next step, at whose beginning
-   it is due, so that rounding of k*H and k*T cannot split one instant into two. */
+   it is due, so that rounding of k*H and k*T cannot split one instant into two. An importer that uses the
+   event mode of co-simulation (FMI 3) has it executed there, with the inputs of that point, as in model
+   exchange. */
 #define SLACK 1e-7
 
 static int start_clocks(Instance *c) {
@@ -40,6 +42,13 @@ static void run_ticks(Instance *c) {
 #else
   (void)c;
 #endif
+}
+
+/* Whether a clock is due at the present time. */
+static int tick_due(const Instance *c) {
+  for (int k = 0; k < NC; k++)
+    if (c->m.next[k] <= c->m.v[0] + SLACK * c->m.period[k]) return 1;
+  return 0;
 }
 
 /* Time of the first tick that lies clearly before `end`, else `end`. */
@@ -130,7 +139,6 @@ static int terminate(Instance *c) {
   return status;
 }
 
-/* Model exchange only: co-simulation is in step mode once it is initialized. */
 static int change_mode(Instance *c, int from, int to, const char *call) {
   const int status = only_in(c, IN(from), call);
   if (status == OK) c->m.mode = to;
@@ -140,6 +148,7 @@ static int change_mode(Instance *c, int from, int to, const char *call) {
 static int set_time(Instance *c, double time) {
   const int status = only_in(c, IN(EVENT) | IN(CONTINUOUS), "setting the time");
   if (status != OK) return status;
+  if (!c->model_exchange) return report(c, ERROR, "%s: the time of co-simulation is set by its steps", MODEL);
   if (!isfinite(time)) return report(c, ERROR, "%s: time cannot be set to %g: not finite", MODEL, time);
   c->m.v[0] = time;
   c->m.stale = 1;
@@ -165,7 +174,7 @@ static int leave_initialization(Instance *c) {
   status = check_finite(c, IXD, NX);
   if (status == OK) status = check_finite(c, IY, NY);
   if (status != OK) return status;
-  c->m.mode = c->model_exchange ? EVENT : STEPPING;
+  c->m.mode = c->model_exchange || c->event_mode ? EVENT : STEPPING;
   return OK;
 }
 
