@@ -49,7 +49,7 @@ static void run_ticks(Instance *c) {
 /* Whether a clock is due at the present time. */
 static int tick_due(const Instance *c) {
   for (int k = 0; k < NC; k++)
-    if (c->m.next[k] <= c->m.v[0] + SLACK * c->m.period[k]) return 1;
+    if (c->m.next[k] <= c->m.v[0] + slack(c->m.period[k], c->m.v[0])) return 1;
   return 0;
 }
 
