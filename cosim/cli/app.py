@@ -9,34 +9,28 @@ imported by the command, so that `--help` answers at once.
 
 from __future__ import annotations
 
-import itertools
 import json
 import sys
-from collections import Counter
-from collections.abc import Sequence
 from contextlib import nullcontext
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError, listing
-from ..installation import places
-from ..installation.builder import default_provider, naming_errors, sources
+from ..errors import CheckError, CosimError, InputError
+from ..installation.builder import default_provider
 from ..master import algorithms
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
+from .fmus import fmus_app
 from .linearize import linearize_command
+from .output import AsJson, new_table, open_console, say
 from .streams import print_json, stdout_for_json
 from .study import study_command
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
-
     from ..running.runner import Result
 
 app = typer.Typer(
@@ -45,9 +39,6 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
-)
-fmus_app = typer.Typer(
-    help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
 )
 app.add_typer(fmus_app, name="fmus")
 app.command("calibrate")(calibrate_command)
@@ -58,242 +49,10 @@ app.command("draw")(draw_command)
 app.command("study")(study_command)
 
 
-class Kind(StrEnum):
-    """Kinds of FMUs that can be built."""
-
-    native = "native"
-    python = "python"
-
-
-class Platform(StrEnum):
-    """Platforms that FMUs can be built for."""
-
-    host = "host"
-    all = "all"
-
-
 SHOWN = 40
 """Comparisons and passed checks that are printed; more are in result.json only."""
 SHOWN_FOLDERS = 8
 """Folders of results that are named one by one."""
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to stdout.")]
-
-
-# -- fmus ------------------------------------------------------------------------------------------
-
-
-def _describe_file(path: Path) -> dict[str, Any]:
-    """What `fmus list` says, from an FMU instead of the sources."""
-    from ..fmu.archive import open_fmu
-
-    description = open_fmu(path).description
-
-    def listed(causality: Any) -> list[dict[str, str]]:
-        return [
-            {"name": v.name, "unit": v.symbol, "description": v.text}
-            for v in description.of(causality)
-        ]
-
-    return {
-        "variant": description.extra.get("variant", description.name),
-        "component": description.extra.get("component", ""),
-        "fidelity": description.extra.get("fidelity", ""),
-        "effects": description.extra.get("effects", []),
-        "inputs": listed("input"),
-        "outputs": listed("output"),
-        "parameters": listed("parameter"),
-        "states": [],
-        "description": description.text,
-    }
-
-
-@fmus_app.command("list")
-def fmus_list(
-    component: Annotated[str, typer.Argument(help="Variants of this component.")] = "",
-    every: Annotated[bool, typer.Option("--all", help="All variants of all components.")] = False,
-    containing: Annotated[
-        str, typer.Option("--filter", help="Only variants whose name contains this.")
-    ] = "",
-    as_json: AsJson = False,
-) -> None:
-    """List the component catalogue: components, or variants with what they offer.
-
-    With --json always variants, of all components if none is named.
-
-    Example: `cosim fmus list`, `cosim fmus list gearbox`, `cosim fmus list --filter backlash`
-    """
-    if not (component or every or containing or as_json):
-        _print_components(_components())
-        return
-    entries = [
-        entry for entry in _variants(component, containing) if containing in entry["variant"]
-    ]
-    if component and not entries and not containing:
-        raise VariantError(
-            f"no variant of a component {component!r}; "
-            f"{listing((entry['component'] for entry in _components()), component)}"
-        )
-    if as_json:
-        print_json(entries)
-        return
-    table = _table("variant", "inputs", "outputs", "parameters", "description")
-    for entry in entries:
-        counts = [str(len(entry[key])) for key in ("inputs", "outputs", "parameters")]
-        table.add_row(entry["variant"], *counts, entry["description"])
-    _console().print(table)
-
-
-def _components() -> list[dict[str, Any]]:
-    """The catalogue by component: from the sources, else from the installed FMUs."""
-    try:
-        found: list[dict[str, Any]] = sources("packaging.catalog").overview()
-        return found
-    except VariantError:
-        if places.in_checkout():
-            raise
-    grouped: dict[str, dict[str, Any]] = {}
-    for entry in map(_describe_file, sorted(places.fmus().rglob("*.fmu"))):
-        group = grouped.setdefault(
-            entry["component"],
-            {"component": entry["component"], "description": entry["description"],
-             "fidelities": [], "devices": []},
-        )  # fmt: skip
-        if entry["fidelity"] not in group["fidelities"]:
-            group["fidelities"].append(entry["fidelity"])
-    return list(grouped.values())
-
-
-def _variants(component: str, containing: str) -> list[dict[str, Any]]:
-    try:
-        catalog = sources("packaging.catalog")
-    except VariantError:
-        if places.in_checkout():
-            raise
-        found = [_describe_file(path) for path in sorted(places.fmus().rglob("*.fmu"))]
-        return [entry for entry in found if _is_of(entry["variant"], component)]
-    known = [entry["component"] for entry in catalog.overview()]
-    if component and component not in known:
-        return []
-    with naming_errors():
-        return [catalog.describe(n) for n in catalog.names(component) if containing in n]
-
-
-def _print_components(entries: list[dict[str, Any]]) -> None:
-    table = _table("component", "fidelities", "devices", "description")
-    for entry in entries:
-        lists = [", ".join(entry[key]) for key in ("fidelities", "devices")]
-        table.add_row(entry["component"], *lists, entry["description"])
-    _console().print(table)
-    _say("'cosim fmus list COMPONENT' has the variants of one with their inputs and outputs")
-
-
-def _is_of(variant: str, component: str) -> bool:
-    from ..system import variants
-
-    return not component or variants.component(variant) == component
-
-
-@fmus_app.command("build")
-def fmus_build(
-    variants: Annotated[
-        list[str] | None,
-        typer.Argument(help="E.g. gearbox/elastic+backlash, or gearbox for its fidelities [all]."),
-    ] = None,
-    fmi: Annotated[int, typer.Option(help="FMI version.", min=2, max=3)] = 2,
-    kind: Annotated[Kind, typer.Option(help="C code, or the Python twin.")] = Kind.native,
-    platform: Annotated[
-        Platform, typer.Option(help="This machine, or all five platforms.")
-    ] = Platform.host,
-    out: Annotated[Path | None, typer.Option(help="Folder; below it fmi2, fmi3, python.")] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Build FMUs of variants.
-
-    Example: `cosim fmus build gearbox/elastic+backlash --fmi 3 --out fmus`
-    """
-    build_many = sources("packaging.build").build_many
-    folder = out or (places.fmus() if places.in_checkout() else Path("fmus"))
-    with naming_errors():
-        names = _asked(variants or ())
-        for name in names if variants else ():  # bad names are found before anything is built
-            sources("variant").build_model(name)
-    if kind is Kind.python and fmi == 3:
-        raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
-    done = itertools.count(1)
-    with naming_errors():
-        built = build_many(
-            names,
-            out=folder,
-            fmi=fmi,
-            kind=kind.value,
-            platform=platform.value,
-            progress=lambda name, path: _say(f"{next(done)}/{len(names)} {name}: {path}"),
-        )
-    paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
-    if as_json:
-        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
-    else:
-        for item in paths:
-            typer.echo(item["file"])
-
-
-def _asked(variants: Sequence[str]) -> list[str]:
-    """Names of variants; a component means all of its fidelities, nothing means everything."""
-    catalog = sources("packaging.catalog")
-    if not variants:
-        return list(catalog.names())
-    fidelities = {entry["component"]: entry["fidelities"] for entry in catalog.overview()}
-    return [
-        name
-        for asked in variants
-        for name in (
-            [f"{asked}/{fidelity}" for fidelity in fidelities[asked]]
-            if asked in fidelities
-            else [asked]
-        )
-    ]
-
-
-@fmus_app.command("check")
-def fmus_check(
-    files: Annotated[
-        list[Path] | None, typer.Argument(help=".fmu files; those of the library if none is given.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check FMUs, ours or anybody's, without running anything of them.
-
-    Errors break the standard of FMI, or keep masters from running the FMU; warnings are allowed,
-    but others may stumble over them.
-
-    Example: `cosim fmus check gearbox.fmu`
-    """
-    from ..fmu.check import check
-
-    paths = list(files or sorted(places.fmus().rglob("*.fmu")))
-    for path in paths:
-        if not path.is_file():
-            raise FmuFileError(f"{path}: there is no such file")
-    if not paths:
-        raise InputError(f"{places.fmus()}: has no .fmu; build some with 'cosim fmus build'")
-    results = {}
-    bad = 0
-    for path in paths:
-        findings = check(path)
-        results[str(path)] = [finding.to_dict() for finding in findings]
-        bad += any(finding.severity == "error" for finding in findings)
-        if not as_json:
-            counts = Counter(finding.severity for finding in findings)
-            shown = ", ".join(f"{number} {kind}(s)" for kind, number in counts.items())
-            typer.echo(f"{path}: {shown or 'ok'}")
-            for finding in findings:
-                typer.echo(f"  {finding}")
-    if as_json:
-        print_json({"checked": len(results), "with_problems": bad, "problems": results})
-    if bad:
-        raise CheckError(f"{bad} of {len(results)} FMUs have problems")
-
-
 # -- scenarios -------------------------------------------------------------------------------------
 
 
@@ -319,12 +78,12 @@ def list_scenarios(as_json: AsJson = False) -> None:
             ]
         )
         return
-    table = _table("scenario", "system", "runs", "description")
+    table = new_table("scenario", "system", "runs", "description")
     for file in files:
         runs = [name for name in file.runs if name]
         shown = ", ".join(runs[:4]) + (f" … ({len(runs)})" if len(runs) > 4 else "")
         table.add_row(file.name, str(file.table.get("system", "")), shown, file.text)
-    _console().print(table)
+    open_console().print(table)
 
 
 @app.command("run")
@@ -398,7 +157,7 @@ def run_command(
             isolate=time_limit if isolate else None,
         )
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
-        _say(f"note: {note}")
+        say(f"note: {note}")
     if as_json:
         print_json(result.to_dict())
     else:
@@ -435,7 +194,7 @@ def _number(text: str) -> Any:
 def _print_result(result: Result) -> None:
     from rich.markup import escape
 
-    content, console = result.to_dict(), _console()
+    content, console = result.to_dict(), open_console()
     console.print(
         f"{content['scenario']}: {content['simulated_s']:g} s simulated in "
         f"{content['wall_s']:.2f} s, {content['fmu_steps']} FMU-steps, {content['algorithm']} with "
@@ -444,12 +203,12 @@ def _print_result(result: Result) -> None:
     )
     for quantity in result.overview if len(result.runs) > 1 else ():
         head, rows = quantity.rows()
-        table = _table(*map(escape, head))
+        table = new_table(*map(escape, head))
         for row in rows:
             table.add_row(*map(escape, row))
         console.print(table)
     if 0 < len(content["comparison"]) <= SHOWN:
-        table = _table("compared", "rms", "max", "unit", "with")
+        table = new_table("compared", "rms", "max", "unit", "with")
         for key, item in content["comparison"].items():
             table.add_row(
                 key, f"{item['rms']:.4g}", f"{item['max']:.4g}", item["unit"], item["reference"]
@@ -461,7 +220,7 @@ def _print_result(result: Result) -> None:
         met = sum(item["ok"] is True for item in content["checks"])
         console.print(f"{met} of {len(content['checks'])} checks ok")
     if shown:
-        table = _table("check", "value", "limit", "", "source")
+        table = new_table("check", "value", "limit", "", "source")
         for item in shown:
             outcome = {True: "ok", False: "FAILED", None: "not judged"}[item["ok"]]
             limit = item["limit"]
@@ -493,37 +252,16 @@ def _unjudged(checks: list[dict[str, Any]]) -> dict[str, list[str]]:
 # -- frame -----------------------------------------------------------------------------------------
 
 
-def _console() -> Console:
-    """Standard output; wide if nobody looks at it, so that names stay whole for other programs."""
-    from rich.console import Console
-
-    return Console() if sys.stdout.isatty() else Console(width=160)
-
-
-def _table(first: str, *others: str) -> Table:
-    from rich.table import Table
-
-    table = Table()
-    table.add_column(first, no_wrap=True)
-    for name in others:
-        table.add_column(name)
-    return table
-
-
-def _say(text: str) -> None:
-    typer.echo(text, err=True)
-
-
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
         with stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
             app()
     except CosimError as error:
-        _say(f"error: {error}")
+        say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):
-            _say(note)
+            say(note)
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
-        _say("interrupted")
+        say("interrupted")
         raise SystemExit(130) from None
