@@ -313,7 +313,7 @@ def _searched(
         sudden = bursts(search.fit_data - current.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
     result.after = current
-    _judge(result, winners)
+    _verdict(result, winners)
     _look_further(result)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)
@@ -351,7 +351,7 @@ def _tests(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest]:
     return whiteness_tests(search.check_data - fitted.check, search.checking)
 
 
-def _judge(result: Diagnosis, winners: list[Round]) -> None:
+def _verdict(result: Diagnosis, winners: list[Round]) -> None:
     search, before, after = result.search, result.before, result.after
     assert search is not None and before is not None and after is not None
     for which, fitted in (("before", before), ("after", after)):

@@ -119,8 +119,8 @@ class Execution:
         if plan.stepper is not None:
             if wanted == "c":
                 raise ValueRangeError(
-                    f"executor 'c': algorithm {plan.algorithm!r} repeats steps, which the one in "
-                    "Python does; take executor auto"
+                    f"executor 'c': algorithm {plan.algorithm!r} makes its steps in Python; take "
+                    "executor auto"
                 )
             return plan.stepper(self.run)
         objects = [

@@ -1,4 +1,8 @@
-"""What several algorithms share: extrapolated inputs, sub-steps, checks of their options."""
+"""Extrapolated inputs, which follow the polynomial through the last values of their source, and
+sub-steps.
+
+`mean_of_step` and `derivatives_at_begin` have the polynomial; kernel/kernel.c has the same numbers.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import need_table
-from ..errors import InputError, UnknownNameError, ValueRangeError, listing
+from ..errors import UnknownNameError, ValueRangeError, listing
 from ..system.system import System
 from .plan import PARTS, Layout, Mean, Op
 
@@ -179,37 +183,53 @@ def without_parts(layout: Layout, parts: Mapping[str, int]) -> Layout:
     )
 
 
-def positive(name: str, value: float) -> float:
-    """The value of an option that must be a positive number."""
-    if not isinstance(value, (int, float)) or not 0.0 < value < float("inf"):
-        raise ValueRangeError(f"option {name} = {value!r} must be a positive number")
-    return float(value)
+# -- the polynomial --------------------------------------------------------------------------------
 
 
-def refuse_without_states(system: System, algorithm: str, variable: bool = False) -> None:
-    """Algorithms that repeat steps need FMUs that can return to a saved state.
+def mean_of_step(order: int, ahead: bool, now: float, past: Sequence[float]) -> float:
+    """Mean over the step of the polynomial through the last values of a source.
 
-    Raises:
-        InputError: which FMUs cannot.
+    Args:
+        order: 0, 1 or 2; `ahead` asks for 1 or 2.
+        ahead: the source has stepped already: `now` is its value at the end of the step.
+        now: newest value.
+        past: values at the begins of this step and the ones before, newest first.
     """
-    unable = [
-        f"{member.name} ({member.reference})"
-        for member in system.members.values()
-        if not member.description.can("canGetAndSetFMUState")
-    ]
-    if unable:
-        raise InputError(
-            f"algorithm {algorithm!r} repeats steps, but these FMUs declare that they cannot "
-            f"return to a saved state: {', '.join(unable)}; take jacobi or gauss_seidel, with "
-            "extrapolation = 1 for second order"
-        )
-    fixed = [
-        f"{member.name} ({member.reference})"
-        for member in system.members.values()
-        if not member.description.can("canHandleVariableCommunicationStepSize")
-    ]
-    if variable and fixed:
-        raise InputError(
-            f"algorithm {algorithm!r} changes the step, but these FMUs declare that they cannot "
-            f"follow: {', '.join(fixed)}; take iterated, jacobi or gauss_seidel"
-        )
+    if ahead:
+        if order == 1:
+            return 0.5 * (now + past[0])
+        return 0.5 * (now + past[0]) - bend(now, *past[:3]) / 12.0
+    if order == 0:
+        return past[0]
+    if order == 1:
+        return 1.5 * past[0] - 0.5 * past[1]
+    return past[0] + 0.5 * (past[0] - past[1]) + 5.0 * bend(*past[:4]) / 12.0
+
+
+def derivatives_at_begin(
+    order: int, ahead: bool, now: float, past: Sequence[float], step: float
+) -> tuple[float, float]:
+    """First and second derivative of the same polynomial at the begin of the step."""
+    inverse = 1.0 / step
+    if order == 0:
+        return 0.0, 0.0
+    if order == 1:
+        return (now - past[0] if ahead else past[0] - past[1]) * inverse, 0.0
+    half, square = 0.5 * inverse, inverse * inverse
+    if ahead:
+        second = bend(now, *past[:3])
+        return (2.0 * (now - past[0]) - second) * half, second * square
+    second = bend(*past[:4])
+    return (2.0 * (past[0] - past[1]) + second) * half, second * square
+
+
+def bend(a: float, b: float, c: float, d: float) -> float:
+    """Second difference of the parabola through the last values, newest first.
+
+    Of the last two second differences the one nearer to zero, and zero if their signs differ. Where
+    a value moves smoothly they are alike; where it rings or has a kink, a parabola would feed that,
+    and the straight line takes its place.
+    """
+    last, before = a - 2.0 * b + c, b - 2.0 * c + d
+    nearer = last if abs(last) < abs(before) else before
+    return nearer if last * before > 0.0 else 0.0

@@ -75,15 +75,3 @@ class InputDerivatives:
             self._instances[call.instance].set_input_derivatives(
                 call.references, call.orders, call.values
             )
-
-
-def bend(a: float, b: float, c: float, d: float) -> float:
-    """Second difference of the parabola through the last values, newest first.
-
-    Of the last two second differences the one nearer to zero, and zero if their signs differ. Where
-    a value moves smoothly they are alike; where it rings or has a kink, a parabola would feed that,
-    and the straight line takes its place.
-    """
-    last, before = a - 2.0 * b + c, b - 2.0 * c + d
-    nearer = last if abs(last) < abs(before) else before
-    return nearer if last * before > 0.0 else 0.0

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
-from .input_derivatives import InputDerivatives, bend
+from .extrapolation import derivatives_at_begin, mean_of_step
+from .input_derivatives import InputDerivatives
 from .newton import Newton
 from .objects import ObjectPassing
 from .outline import Outline
@@ -184,48 +185,18 @@ class Interpreter:
 
     def extrapolate(self, index: int, mean: Mean) -> None:
         """Let an input follow the polynomial through the last values of its source."""
-        past = self.history[index].tolist()
+        past, now = self.history[index].tolist(), float(self.values[mean.source])
+        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)  # values there are
         if mean.bonded or not mean.moving:
-            average = self.mean(mean, past) * mean.gain + mean.offset
+            average = mean_of_step(order, mean.ahead, now, past) * mean.gain + mean.offset
             self.derivatives.average[index] = average
         if not mean.moving:
             self.values[mean.target] = average
             return
-        slope, curve = self.slopes(mean, past)
+        slope, curve = derivatives_at_begin(order, mean.ahead, now, past, self.step)
         self.values[mean.target] = past[0] * mean.gain + mean.offset
-        self.derivatives.slope[index], self.derivatives.curve[index] = (
-            slope * mean.gain,
-            curve * mean.gain,
-        )
-
-    def slopes(self, mean: Mean, past: list[float]) -> tuple[float, float]:
-        """Derivatives at the begin of the step of the polynomial through the last values."""
-        now, inverse = float(self.values[mean.source]), 1.0 / self.step
-        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
-        if order == 0:
-            return 0.0, 0.0
-        if order == 1:
-            return (now - past[0] if mean.ahead else past[0] - past[1]) * inverse, 0.0
-        half, square = 0.5 * inverse, inverse * inverse
-        if mean.ahead:
-            second = bend(now, *past[:3])
-            return (2.0 * (now - past[0]) - second) * half, second * square
-        second = bend(*past)
-        return (2.0 * (past[0] - past[1]) + second) * half, second * square
-
-    def mean(self, mean: Mean, past: list[float]) -> float:
-        """Mean over the step of the polynomial through the last values of a source."""
-        now = float(self.values[mean.source])
-        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)
-        if mean.ahead:
-            if order == 1:
-                return 0.5 * (now + past[0])
-            return 0.5 * (now + past[0]) - bend(now, *past[:3]) / 12.0
-        if order == 0:
-            return past[0]
-        if order == 1:
-            return 1.5 * past[0] - 0.5 * past[1]
-        return past[0] + 0.5 * (past[0] - past[1]) + 5.0 * bend(*past) / 12.0
+        self.derivatives.slope[index] = slope * mean.gain
+        self.derivatives.curve[index] = curve * mean.gain
 
     def record(self) -> None:
         """Keep observed values if it is their turn; note outputs for the energy of bonds."""

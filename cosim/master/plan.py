@@ -130,7 +130,13 @@ class Mean:
 
 
 class Stepper(Protocol):
-    """What makes the communication steps of a run."""
+    """What makes the communication steps of a run, given its `interpreter.Interpreter`.
+
+    A step goes through `communication_step`, which knows what an FMU's request to end means, or
+    moves `index` on itself. Slots of inputs may be overwritten between steps (SOLVE exchanges too),
+    so a stepper keeps what it needs of them; `extrapolation.smooth` says which connections carry
+    values that may be blended.
+    """
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""
@@ -159,7 +165,7 @@ class Plan:
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
         means: what EXTRAPOLATE and SET_DERIVATIVES set.
-        stepper: for algorithms that repeat steps, what makes a stepper of an
+        stepper: for algorithms whose steps are more than operations, what makes a stepper of an
             `interpreter.Interpreter`; None if the operations of `step` are all there is.
     """
 

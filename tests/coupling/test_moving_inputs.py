@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.coupling import of_scenario
 from cosim.errors import StepError
-from cosim.master.input_derivatives import bend
+from cosim.master.extrapolation import bend
 from cosim.master.master import Master
 from cosim.master.plan import Op
 from cosim.master.session import Session

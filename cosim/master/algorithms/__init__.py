@@ -12,7 +12,7 @@ import pkgutil
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...errors import UnknownNameError, listing
+from ...errors import InputError, UnknownNameError, listing
 
 if TYPE_CHECKING:  # the command line asks for names only
     from ...system.system import System
@@ -41,6 +41,11 @@ def compile_plan(
             f"there is no algorithm {algorithm!r}; {listing(names(), algorithm)}"
         )
     module = importlib.import_module(f"{__name__}.{algorithm}")
+    if not hasattr(module, "compile_plan"):
+        raise InputError(
+            f"algorithm {algorithm!r}: {module.__file__} has no function "
+            "compile_plan(system, external, observed, *, options) -> Plan"
+        )
     known = [
         name
         for name, parameter in inspect.signature(module.compile_plan).parameters.items()

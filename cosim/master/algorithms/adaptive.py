@@ -34,8 +34,9 @@ from numpy.typing import NDArray
 from ...errors import FmuCallError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
-from ..extrapolation import positive, refuse_without_states, smooth
+from ..extrapolation import smooth
 from ..interpreter import Interpreter
+from ..options import positive, refuse_without_states
 from ..plan import Op, Plan, decoded, final_operations, initial_sweep, lay_out, operations
 from ..rollback import restore, saved
 
