@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,29 +18,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.logs import DataSet, Log, read_data_set
+from ..data.logs import DataSet, Log, read_data_set, runs_of
 from ..data.logs import Run as DataRun
 from ..data.segments import pieces, relative_pose, windows
 from ..data.signals import Table
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import builder, places
+from ..spec.units import Unit
 from ..system.provider import Provider
+from ..system.system import System
 from ..system.toml import SystemFile, read_system
-from .columns import ITEM, expand, prepared
+from .columns import ITEM, apart, check_rising, expand, prepared
+from .finding import Finding, Source, check_allowed
 from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
 from .problem import Problem
+from .scales import known, per_second, scaled
+from .schema import RUN, check_mapping, keyed
 
 Vector = NDArray[np.float64]
-KEYS = {
-    "description", "rig", "system", "step", "algorithm", "period", "parameters", "sheet", "fixed",
-    "inputs", "starts", "channels", "parameter", "nuisance", "lead",
-    "only", "run", "columns", "time", "ticks", "search_step", "search",
-    "resample", "relative", "base", "further",
-}  # fmt: skip
-_CHANNEL = {"signal", "column", "gain", "offset", "sigma", "quantum", "roundings", "transform",
-            "window", "unit", "shift"}  # fmt: skip
-_INPUT = {"column", "columns", "gain", "unit", "interpolation", "quantum"}
+LONGEST = 5.0
+"""Intervals between samples longer than this many usual ones are gaps in the inputs."""
 
 
 def find_mapping(folder: Path, rig: str) -> Path:
@@ -52,11 +51,19 @@ def find_mapping(folder: Path, rig: str) -> Path:
         if (place / "dataset.toml").is_file():
             return place / "dataset.toml"
     known = []
-    for path in sorted(places.scenarios().rglob("dataset.toml")):
+    for path in sorted(places.scenarios().rglob("dataset.toml")) if rig else ():
         name = str(read_toml(path).get("rig", path.parent.name))
         if name == rig:
             return path
         known.append(name)
+    if not folder.is_dir():
+        near = sorted(item.name for item in folder.parent.glob("*") if item.is_dir())
+        raise ScenarioError(f"{folder}: there is no such folder; beside it {listing(near, folder.name)}")
+    if not rig:
+        raise ScenarioError(
+            f"{folder}: has no set.toml that names a rig, and there is no dataset.toml in it nor in "
+            "the two folders above; write one (docs/datasets.md), or name one with --mapping"
+        )
     raise ScenarioError(
         f"{folder}: no dataset.toml says how rig {rig!r} maps to a system; {listing(known, rig)}; "
         "write one beside the data"
@@ -95,7 +102,13 @@ def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
     if match is None or match["key"] not in values:
         raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
     value = values[match["key"]]
-    return float(value[int(match["index"])] if match["index"] else value)
+    try:
+        return float(value[int(match["index"])] if match["index"] else value)
+    except (TypeError, ValueError, IndexError):
+        raise ScenarioError(
+            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{match['key']}[0]"
+        ) from None
 
 
 def read_problem(
@@ -123,12 +136,13 @@ def read_problem(
     if provider is None:
         provider = builder.default_provider()
     folder = Path(folder)
-    if (folder / "set.toml").is_file():
-        data = read_data_set(folder)
-        path = Path(mapping) if mapping is not None else find_mapping(folder, data.rig)
-    else:
-        path = Path(mapping) if mapping is not None else find_mapping(folder, "")
-        data = _plain(folder, path)
+    has_set = (folder / "set.toml").is_file()
+    rig = str(read_toml(folder / "set.toml").get("rig", "")) if has_set else ""
+    path = Path(mapping) if mapping is not None else find_mapping(folder, rig)
+    table = read_mapping(path)
+    check_mapping(table, path)
+    used = _asked(table)
+    data = read_data_set(folder, used) if has_set else _plain(folder, path, used)
     problem = _Mapping(path, data, only or {}).problem(provider, system, workers)
     problem.further = tuple(
         partial(
@@ -147,7 +161,15 @@ def read_mapping(path: Path) -> dict[str, Any]:
     return {**read_mapping(path.parent / str(table["base"])), "further": [], **table}
 
 
-def _plain(folder: Path, path: Path) -> DataSet:
+def _asked(table: Mapping[str, Any]) -> set[str]:
+    """Entries of runs that a mapping asks for."""
+    wanted = [*table.get("starts", {}), *table.get("only", {})]
+    for key in ("parameter", "nuisance"):
+        wanted += [item["nominal"] for item in table.get(key, []) if isinstance(item["nominal"], str)]
+    return {name.removeprefix("begin:").partition("[")[0] for name in wanted}
+
+
+def _plain(folder: Path, path: Path, used: set[str]) -> DataSet:
     """A data set of plain logs, whose runs the mapping lists."""
     runs = read_mapping(path).get("run", [])
     if not runs:
@@ -155,15 +177,7 @@ def _plain(folder: Path, path: Path) -> DataSet:
             f"{folder}: has no set.toml, and {path} lists no runs "
             "([[run]] with name, file, purpose)"
         )
-    try:
-        found = {
-            entry["name"]: DataRun(
-                entry["name"], folder / entry["file"], entry["purpose"], dict(entry)
-            )
-            for entry in runs
-        }
-    except KeyError as error:
-        raise ScenarioError(f"{path}: a run lacks {error}") from None
+    found = runs_of(runs, folder, str(path), used)
     return DataSet(folder, folder.resolve().name, "", found, {}, {}, {})
 
 
@@ -185,50 +199,127 @@ class _Mapping:
     def __init__(self, path: Path, data: DataSet, only: Mapping[str, Any]) -> None:
         self.path, self.data = path, data
         self.table = read_mapping(path)
-        unknown = set(self.table) - KEYS
-        if unknown:
-            first = sorted(unknown)[0]
-            raise ScenarioError(f"{path}: has no key {first!r}; {listing(sorted(KEYS), first)}")
+        self.findings: list[Finding] = []
         self.noise = {
             column: sigma for name, sigma in data.noise.items() for column in expand(name)
         }
         self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
-        wanted = {**self.table.get("only", {}), **only}
         self.logs: dict[str, Log] = {}
         self.purposes: dict[str, str] = {}
         lead = float(self.table.get("lead", 0.0))
-        for run in data.runs.values():
-            if any(run.values.get(key, value) != value for key, value in wanted.items()):
-                continue
+        for run in self._chosen({**self.table.get("only", {}), **only}):
+            keyed({k: v for k, v in run.values.items() if k in RUN}, RUN, f"{path}: run {run.name}", ())
             for name, part in pieces(data.log(run.name)):
                 log = prepared(part, self.table, self.path)
+                check_rising(log, "time", log.time)
+                self.findings += [Finding("note", "reading", name, "", note) for note in log.notes]
                 self.units.update({column: unit for column, unit in log.units.items() if unit})
                 for one, window in windows(name, log, lead):
-                    self.logs[one], self.purposes[one] = window, run.purpose
+                    self.logs[one], self.purposes[one] = self._unbroken(one, window), run.purpose
+
+    def _chosen(self, wanted: Mapping[str, Any]) -> list[DataRun]:
+        """The runs with these entries."""
+        runs = list(self.data.runs.values())
+        for key in wanted:
+            if not any(key in run.values for run in runs):
+                has = sorted({name for run in runs for name in run.values})
+                raise ScenarioError(f"{self.path}: only: no run has {key!r}; {listing(has, key)}")
+        chosen = [
+            run for run in runs
+            if all(run.values.get(key, value) == value for key, value in wanted.items())
+        ]  # fmt: skip
+        if not chosen:
+            raise ScenarioError(f"{self.path}: only = {dict(wanted)} leaves no run")
+        return chosen
+
+    def _sources(self) -> list[str]:
+        """Columns that drive inputs."""
+        found: list[str] = []
+        for entry in self.table.get("inputs", {}).values():
+            entry = {"column": entry} if isinstance(entry, str) else entry
+            if "column" in entry:
+                found.append(entry["column"])
+            elif "columns" in entry:
+                names = entry["columns"]
+                found += expand(names) if isinstance(names, str) else names
+        return found
+
+    def _unbroken(self, name: str, log: Log) -> Log:
+        """The log up to the first gap in what drives the system.
+
+        What the inputs were in a gap is not known, and with it where the system was after it.
+        """
+        time = log.time
+        usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+        longest = float(self.table.get("gap", LONGEST * usual))
+        until, reason = time.size, ""
+        for column in self._sources():
+            values = log[column]
+            if values.shape != time.shape:
+                raise ScenarioError(f"{self.path}: " + apart(log, column, "time", time.size))
+            good = np.flatnonzero(np.isfinite(values))
+            if not good.size:
+                raise ScenarioError(
+                    f"{log.name}: column {column!r} has no values, but drives an input; "
+                    f"{log.gaps.get(column, 'it is empty')}"
+                )
+            breaks = np.flatnonzero(np.diff(time[good]) > longest * (1.0 + COINCIDENT))
+            end = good[breaks[0]] + 1 if breaks.size else good[-1] + 1
+            if time[good[0]] - time[0] > longest:
+                raise ScenarioError(
+                    f"{log.name}: column {column!r} drives an input, but begins at "
+                    f"{time[good[0]]:.6g} s, {good[0]} rows after the clock; begin there with "
+                    "samples, or give the other columns' clock with time"
+                )
+            last = time[-1] - time[good[-1]]
+            if end < until and (breaks.size or last > longest):
+                until = int(end)
+                gap = time[good[breaks[0] + 1]] - time[good[breaks[0]]] if breaks.size else last
+                reason = f"{column} is not known for {gap:.4g} s after {time[end - 1]:.6g} s"
+        if until == time.size:
+            return log
+        lost = 1.0 - until / time.size
+        text = (
+            f"{reason}, so the run ends there ({lost:.0%} of it is not used); give the rest a run of "
+            "its own with samples and start values, or bridge such gaps with gap"
+        )
+        self.findings.append(Finding("warning", "gap", name, "time", text))
+        columns = {
+            one: values[:until] if values.shape == time.shape else values
+            for one, values in log.columns.items()
+        }
+        return replace(log, columns=columns)
 
     def problem(self, provider: Provider, system: str | None, workers: int | None) -> Problem:
         """The problem."""
         table = self.table
         file = find_system(self.path, system or str(table.get("system", "")))
-        constants = {name: float(value) for name, value in
-                     flatten(table.get("parameters", {})).items()}  # fmt: skip
+        self.system = replace(file, parameters={}).build(provider)
+        constants: dict[str, float] = {}
+        for name, value in flatten(table.get("parameters", {})).items():
+            if isinstance(value, list):
+                constants.update({f"{name}[{i}]": float(v) for i, v in enumerate(value, 1)})
+            else:
+                constants[name] = float(value)
         fixed = self.data.sheet.get("fixed", {})
         for key, entry in table.get("fixed", {}).items():
             value = _lookup(fixed, key, f"{self.path}: [fixed]")
             constants.update({name: factor * value for name, factor in
                               _targets(entry, f"{self.path}: {key}")})  # fmt: skip
         self.columns: dict[str, str] = {}
-        channels = [
-            self.channel(one, {**entry, "signal": entry.get("signal", "").replace("{}", str(i))})
+        self.converted: dict[str, tuple[float, float]] = {}
+        present = [
+            self.channel(one, {**entry, "signal": entry["signal"].replace("{}", str(i))})
             for name, entry in table["channels"].items()
             for i, one in enumerate(expand(name), 1)
+            if self._measured_somewhere(one, entry)
         ]
-        present = [c for c in channels if any(self._column(c) in log.columns
-                                              for log in self.logs.values())]  # fmt: skip
+        if not present:
+            raise ScenarioError(f"{self.path}: no channel's column is in the logs")
         stated = [*self.declared(), *self.others()]
         check_parameters(stated)
         parameters = [p for p in stated if not p.late]
-        return Problem(
+        problem = Problem(
             self.data.name,
             file,
             provider,
@@ -245,12 +336,50 @@ class _Mapping:
             relative=[tuple(names) for names in self.table.get("relative", [])],
             late=[p for p in stated if p.late],
         )
+        allow = check_allowed(table.get("checks", {}).get("allow", []), self.path)
+        problem.source = Source(self.path, tuple(self.findings), allow, self.data.rate)
+        return problem
+
+    def _measured_somewhere(self, name: str, entry: Mapping[str, Any]) -> bool:
+        """Whether a channel's column is in a log; whether it may be absent.
+
+        Raises:
+            UnknownNameError: it is in none and nothing says that it need not be.
+            ScenarioError: it holds text.
+        """
+        column = str(entry.get("column", name))
+        without = [one for one, log in self.logs.items() if column not in log.columns]
+        for one in without:
+            if column in self.logs[one].texts:
+                self.logs[one][column]  # says so
+        if not without:
+            return True
+        unlisted = bool(self.data.listed) and column not in self.data.listed
+        if not (unlisted or entry.get("optional", False)):
+            log = self.logs[without[0]]
+            raise UnknownNameError(
+                f"{self.path}: channel {name}: {log.name} has no column {column!r}; "
+                f"{listing(log.columns, column)}; a channel that not every log has is optional = true"
+            )
+        where = "any run" if len(without) == len(self.logs) else ", ".join(without)
+        text = f"is not compared: its column {column!r} is not in {where}"
+        self.findings.append(Finding("note", "absent", "", name, text))
+        return len(without) < len(self.logs)
+
+    def _unit(self, name: str, where: str) -> Unit | None:
+        """Unit of a variable of the system.
+
+        Raises:
+            UnknownNameError: there is none such.
+        """
+        try:
+            return self.system.variables(name)[1][0].unit
+        except UnknownNameError as error:
+            raise UnknownNameError(f"{where}: {error}") from None
 
     def search(self) -> Coarse | None:
         """How the system is run in a search; None for no other way than always."""
         step, table = self.table.get("search_step"), self.table.get("search", {})
-        if set(table) - {"options", "parameters"}:
-            raise ScenarioError(f"{self.path}: [search] has options and parameters, no other keys")
         if table and (step is None or step == self.table["step"] or not self.table.get("ticks")):
             raise ScenarioError(
                 f"{self.path}: [search] needs a search_step other than step = "
@@ -265,23 +394,33 @@ class _Mapping:
     def channel(self, name: str, entry: Mapping[str, Any]) -> Channel:
         """One measured column."""
         where = f"{self.path}: channel {name}"
-        unknown = set(entry) - _CHANNEL
-        if unknown or not entry["signal"]:
-            raise ScenarioError(f"{where}: wrong keys {sorted(unknown)}, or no signal")
         column = str(entry.get("column", name))
         self.columns[name] = column
-        sigma = float(entry.get("sigma", self.noise.get(column, 0.0)))
+        own = self.units.get(column, "")
+        unit = str(entry.get("unit", own))
+        here = known(unit, where) if unit else None
+        measured = known(own, f"{where}: column {column}") if own and here else None
+        self.converted[name] = scaled(measured, here, None, f"{where}: column {column}", "scale", "")
+        signal = self._unit(str(entry["signal"]), where)
+        if signal is not None and entry.get("transform") == "difference":
+            signal = per_second(signal.symbol)
+        gain, offset = scaled(
+            signal, here, entry.get("gain"), where, "gain",
+            f"convert the column in [columns], to unit = {signal.symbol if signal else ''!r}",
+        )  # fmt: skip
+        sigma = abs(self.converted[name][0]) * self.noise.get(column, 0.0)
+        sigma = float(entry.get("sigma", sigma))
         rounding = float(entry.get("quantum", 0.0)) ** 2 / 12.0 * int(entry.get("roundings", 1))
         sigma = math.sqrt(sigma**2 + rounding)
         if not sigma > 0.0:
             raise ScenarioError(f"{where}: its noise is not known; give sigma")
         return Channel(
             name,
-            str(entry.get("unit", self.units.get(column, ""))),
+            unit,
             sigma,
             str(entry["signal"]),
-            float(entry.get("gain", 1.0)),
-            float(entry.get("offset", 0.0)),
+            gain,
+            offset + float(entry.get("offset", 0.0)),
             str(entry.get("transform", "sample")),
             float(entry.get("window", 0.0)),
             float(entry.get("shift", 0.0)),
@@ -343,7 +482,10 @@ class _Mapping:
             return known - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
             log = self.logs[run]
-            values = log[entry.removeprefix("first:")][log.time >= 0.0]
+            column = entry.removeprefix("first:")
+            values = log[column][log.time >= 0.0]
+            if not np.isfinite(values).any():
+                raise ScenarioError(f"{where}: {log.name} has no value of {column!r}")
             return float(values[np.isfinite(values)][0])
         return _lookup(self.logs[run].values, entry, where)
 
@@ -383,33 +525,57 @@ class _Mapping:
         )
 
     def _measured(self, log: Log, channel: Channel) -> Vector:
-        column = self._column(channel)
+        column = self.columns[channel.name]
         if column not in log.columns:
             return np.full(log.time.shape, np.nan)
-        return log[column]
+        values = log[column]
+        if values.shape != log.time.shape:
+            raise ScenarioError(f"{self.path}: " + apart(log, column, "time", log.time.size))
+        gain, offset = self.converted[channel.name]
+        return values if (gain, offset) == (1.0, 0.0) else values * gain + offset
 
     def _inputs(self, log: Log, target: str, entry: Any, lead: float) -> dict[str, Table]:
         """The signals of an input, or of all elements of a vector input."""
         if isinstance(entry, str):
             entry = {"column": entry}
         where = f"{self.path}: input {target}"
-        unknown = set(entry) - _INPUT
-        if unknown or not {"column", "columns"} & set(entry):
-            raise ScenarioError(f"{where}: wrong keys {sorted(unknown)}, or no column")
         if "column" in entry:
-            return {target: self._input(log, str(entry["column"]), entry, lead)}
+            return {target: self._input(log, target, str(entry["column"]), entry, lead)}
+        if "columns" not in entry:
+            raise ScenarioError(f"{where}: lacks 'column'; {listing(entry, 'column')}")
         columns = entry["columns"]
         names = expand(columns) if isinstance(columns, str) else list(columns)
-        return {f"{target}[{i}]": self._input(log, column, entry, lead)
+        return {f"{target}[{i}]": self._input(log, target, column, entry, lead)
                 for i, column in enumerate(names, 1)}  # fmt: skip
 
-    def _input(self, log: Log, column: str, entry: Mapping[str, Any], lead: float) -> Table:
+    def _conversion(
+        self, target: str, column: str, entry: Mapping[str, Any]
+    ) -> tuple[float, float, str]:
+        """Gain and offset of a column that drives an input, and the unit of what they give."""
+        where = f"{self.path}: input {target}"
+        own, wanted = self.units.get(column, ""), self._unit(target, where)
+        unit, factor = str(entry.get("unit", "")), entry.get("gain")
+        source = known(own, f"{where}: column {column}") if own else None
+        if source is not None and entry.get("interpolation") == "slope":
+            source = per_second(own)
+        way = f"convert the column {column} in [columns]"
+        if unit:
+            return *scaled(source, known(unit, where), factor, where, "gain", way), unit
+        return *scaled(source, wanted, factor, where, "gain", way), ""
+
+    def _input(
+        self, log: Log, target: str, column: str, entry: Mapping[str, Any], lead: float
+    ) -> Table:
         values = log[column]
+        good = np.isfinite(values)
+        times = log.time[good]
+        values = values[good]
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
             values = np.rint(values / quantum) * quantum
-        values = values * float(entry.get("gain", 1.0))
-        times = snapped(log.time + lead, float(self.table["step"]))
+        gain, offset, unit = self._conversion(target, column, entry)
+        values = values * gain + offset if offset else values * gain
+        times = snapped(times + lead, float(self.table["step"]))
         how = str(entry.get("interpolation", "hold"))
         if how == "slope":  # of the interval that begins
             values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
@@ -427,7 +593,7 @@ class _Mapping:
         return Table(
             times,
             values,
-            unit=str(entry.get("unit", "")),
+            unit=unit,
             interpolation=how,  # type: ignore[arg-type]
             text=f"{log.name}:{column}",
         )

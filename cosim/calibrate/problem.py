@@ -33,6 +33,7 @@ from ..system.system import System
 from ..system.toml import SystemFile
 from ..system.variants import apply
 from .differences import STEP, directional, jacobian
+from .finding import Source
 from .parts import (
     COINCIDENT,
     Channel,
@@ -75,7 +76,10 @@ class Problem:
         evaluations: simulated runs so far, without those known from before.
         costs: processor time that a run took, the last time [s].
         limits: processor time that it may take, no limit if not given [s].
+        source: where the data come from; set by who reads them.
     """
+
+    source: Source = Source()
 
     def __init__(
         self,
