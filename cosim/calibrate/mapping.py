@@ -30,7 +30,7 @@ from ..system.provider import Provider
 from ..system.system import System
 from ..system.toml import SystemFile, read_system
 from .columns import ITEM, apart, check_rising, expand, prepared
-from .finding import Finding, Source, check_allowed
+from .checks.finding import Finding, Source, check_allowed
 from .parts import COINCIDENT, Channel, Coarse, Parameter, Run, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
@@ -212,10 +212,27 @@ class _Mapping:
             for name, part in pieces(data.log(run.name)):
                 log = prepared(part, self.table, self.path)
                 check_rising(log, "time", log.time)
+                self._count_gaps(name, log)
                 self.findings += [Finding("note", "reading", name, "", note) for note in log.notes]
                 self.units.update({column: unit for column, unit in log.units.items() if unit})
                 for one, window in windows(name, log, lead):
                     self.logs[one], self.purposes[one] = self._unbroken(one, window), run.purpose
+
+    def _count_gaps(self, name: str, log: Log) -> None:
+        """Say how many cells hold no number, of the columns that are used."""
+        made = {
+            one: str(entry.get("source", one)).replace("{}", str(i))
+            for pattern, entry in self.table.get("columns", {}).items()
+            for i, one in enumerate(expand(pattern), 1)
+        }
+        channels = self.table["channels"].items()
+        used = [str(e.get("column", one)) for key, e in channels for one in expand(key)]
+        for column in dict.fromkeys([*used, *self._sources()]):
+            gaps = log.gaps.get(made.get(column, column))
+            if gaps is not None:
+                severity = "warning" if gaps.row else "note"
+                text = f"{gaps}: they are gaps"
+                self.findings.append(Finding(severity, "gaps", name, column, text))
 
     def _chosen(self, wanted: Mapping[str, Any]) -> list[DataRun]:
         """The runs with these entries."""
@@ -308,6 +325,7 @@ class _Mapping:
                               _targets(entry, f"{self.path}: {key}")})  # fmt: skip
         self.columns: dict[str, str] = {}
         self.converted: dict[str, tuple[float, float]] = {}
+        self.told: set[str] = set()  # channels whose noise the mapping states
         present = [
             self.channel(one, {**entry, "signal": entry["signal"].replace("{}", str(i))})
             for name, entry in table["channels"].items()
@@ -337,8 +355,25 @@ class _Mapping:
             late=[p for p in stated if p.late],
         )
         allow = check_allowed(table.get("checks", {}).get("allow", []), self.path)
-        problem.source = Source(self.path, tuple(self.findings), allow, self.data.rate)
+        problem.source = Source(
+            self.path, tuple(self.findings), allow, self.data.rate,
+            as_logged="resample" not in table and not any("rows" in r.values or "each" in r.values
+                                                          for r in self.data.runs.values()),
+            made=frozenset(c.name for c in present if self._made(self.columns[c.name])),
+            instruments=frozenset(
+                c.name for c in present
+                if self.columns[c.name] in self.noise and c.name not in self.told
+            ),
+        )  # fmt: skip
         return problem
+
+    def _made(self, column: str) -> bool:
+        """Whether a column is filtered, or brought to another clock."""
+        for pattern, entry in self.table.get("columns", {}).items():
+            if column in expand(pattern):
+                other = entry.get("time", self.table.get("time", "time")) != self.table.get("time", "time")
+                return other or bool({"lowpass", "derivative", "late", "hold"} & set(entry))
+        return "resample" in self.table
 
     def _measured_somewhere(self, name: str, entry: Mapping[str, Any]) -> bool:
         """Whether a channel's column is in a log; whether it may be absent.
@@ -410,6 +445,8 @@ class _Mapping:
         )  # fmt: skip
         sigma = abs(self.converted[name][0]) * self.noise.get(column, 0.0)
         sigma = float(entry.get("sigma", sigma))
+        if "sigma" in entry:
+            self.told.add(name)
         rounding = float(entry.get("quantum", 0.0)) ** 2 / 12.0 * int(entry.get("roundings", 1))
         sigma = math.sqrt(sigma**2 + rounding)
         if not sigma > 0.0:

@@ -33,7 +33,7 @@ from ..system.system import System
 from ..system.toml import SystemFile
 from ..system.variants import apply
 from .differences import STEP, directional, jacobian
-from .finding import Source
+from .checks.finding import Source
 from .parts import (
     COINCIDENT,
     Channel,

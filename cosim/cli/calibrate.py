@@ -12,12 +12,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from ..calibrate.checks.examine import examine
+from ..calibrate.checks.finding import Finding
 from ..calibrate.estimate import Estimate, channel_rms
 from ..calibrate.fit import fit
 from ..calibrate.mapping import read_problem
 from ..calibrate.nuisance import settled
 from ..calibrate.sensitivity import Correlation, correlation_index, local, tornado
-from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import InputError
 
 
@@ -44,9 +45,7 @@ def calibrate_command(
     """
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
-    findings = check_data(problem)
-    if not any(f.severity == "error" for f in findings):
-        findings += check_model(problem)
+    findings = examine(problem)
     for finding in findings:
         typer.echo(str(finding), err=True)
     if any(f.severity == "error" for f in findings):

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from ..calibrate.checks.examine import check_data, examine
+from ..calibrate.checks.finding import Finding
 from ..calibrate.problem import Problem
-from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError, ScenarioError
 from ..system.provider import locate
 from ..system.variants import apply
@@ -236,9 +237,7 @@ def diagnose(
         CosimError: the declared system cannot be simulated.
     """
     begun = time.perf_counter()
-    findings = check_data(problem)
-    if not any(f.severity == "error" for f in findings):
-        findings += check_model(problem)
+    findings = examine(problem)
     errors = [str(f) for f in findings if f.severity == "error"]
     if errors:
         result = Diagnosis(problem, "bad_data", "; ".join(errors))

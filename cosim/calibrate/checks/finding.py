@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError, listing
+from ...errors import ScenarioError, listing
 
 KINDS = {
     "absent": "a channel whose column a log does not have",
@@ -25,6 +25,7 @@ KINDS = {
     "held": "a column whose values stand for several samples each",
     "jitter": "sample times that are not even",
     "machine": "a run of another machine",
+    "noise": "a column with more noise than it is said to have",
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",
     "reading": "what was assumed in reading",
@@ -37,6 +38,7 @@ KINDS = {
     "step": "a communication step that does not divide the sample interval",
     "swapped": "columns that are exchanged",
     "unit": "a column in another unit",
+    "wrapped": "an angle that begins anew at a turn",
 }
 """Names of what may be found."""
 LASTING = {"empty", "purpose", "simulation", "short"}
@@ -84,12 +86,18 @@ class Source:
         findings: of reading the data.
         allow: kinds of errors that are let pass.
         rate: samples per second that the data set says, None if it says nothing.
+        as_logged: whether runs have the sample times of their logs.
+        made: channels that the mapping filters or brings to another clock.
+        instruments: channels whose noise is that of the sensor, from the rig's sheet.
     """
 
     path: Path = Path()
     findings: tuple[Finding, ...] = ()
     allow: frozenset[str] = frozenset()
     rate: float | None = None
+    as_logged: bool = True
+    made: frozenset[str] = frozenset()
+    instruments: frozenset[str] = frozenset()
 
 
 def check_allowed(kinds: Iterable[str], path: Path) -> frozenset[str]:
