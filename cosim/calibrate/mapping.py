@@ -22,7 +22,7 @@ from ..data.logs import DataSet, Log, read_data_set, runs_of
 from ..data.logs import Run as DataRun
 from ..data.segments import pieces, relative_pose, windows
 from ..data.signals import Table
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing
 from ..files import flatten, read_toml
 from ..installation import builder, places
 from ..spec.units import Unit
@@ -473,7 +473,8 @@ class _Mapping:
                 raise ScenarioError(
                     f"{self.path}: [sheet] says nothing about the sheet's parameter {name!r}"
                 )
-            targets = _targets(mapped[name], f"{self.path}: [sheet] {name}")
+            where = f"{self.path}: [sheet] {name}"
+            targets = self._set(mapped[name], str(entry.get("unit", "")), where)
             found.append(
                 Parameter(
                     name, entry.get("unit", ""), float(entry["nominal"]), float(entry["min"]),
@@ -488,10 +489,10 @@ class _Mapping:
         for role, key in (("declared", "parameter"), ("nuisance", "nuisance")):
             for entry in self.table.get(key, []):
                 where = f"{self.path}: {key} {entry.get('name')}"
-                targets = _targets(entry["targets"], where)
+                targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
                 for run in runs:
-                    nominal = self.value(entry["nominal"], run, where)
+                    nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
                     span = float(entry.get("span", 0.0))
                     low = float(entry["min"]) if "min" in entry else nominal - span
                     high = float(entry["max"]) if "max" in entry else nominal + span
@@ -506,7 +507,27 @@ class _Mapping:
                     )  # fmt: skip
         return found
 
-    def value(self, entry: Any, run: str, where: str) -> float:
+    def _set(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
+        """Variables that a value in this unit sets, with the factors into theirs.
+
+        Those that the system lacks may belong to variants that a diagnosis tries.
+        """
+        found = []
+        source = known(unit, where) if unit else None
+        for name, factor in _targets(entry, where):
+            try:
+                wanted = self.system.variables(name)[1][0].unit
+            except UnknownNameError:
+                wanted = None
+            given = factor if isinstance(entry, Mapping) else None
+            way = f"state it in {wanted.symbol if wanted else ''!r}"
+            gain, offset = scaled(source, wanted, given, f"{where}: {name}", "its factor", way)
+            if offset:
+                raise UnitError(f"{where}: {name}: {unit!r} has another zero; {way}")
+            found.append((name, gain))
+        return tuple(found)
+
+    def value(self, entry: Any, run: str, where: str, unit: str = "") -> float:
         """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
 
         `begin:x` is an entry that tells when the log begins, for the simulation, which begins
@@ -515,15 +536,21 @@ class _Mapping:
         if isinstance(entry, (int, float)):
             return float(entry)
         if entry.startswith("begin:"):
-            known = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
-            return known - float(self.table.get("lead", 0.0))
+            begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
+            return begun - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
             log = self.logs[run]
             column = entry.removeprefix("first:")
             values = log[column][log.time >= 0.0]
             if not np.isfinite(values).any():
                 raise ScenarioError(f"{where}: {log.name} has no value of {column!r}")
-            return float(values[np.isfinite(values)][0])
+            own = self.units.get(column, "")
+            gain, offset = 1.0, 0.0
+            if own and unit:
+                gain, offset = scaled(
+                    known(own, where), known(unit, where), None, f"{where}: column {column}", "unit", ""
+                )
+            return float(values[np.isfinite(values)][0]) * gain + offset
         return _lookup(self.logs[run].values, entry, where)
 
     def run(self, name: str, channels: list[Channel]) -> Run:
@@ -533,7 +560,9 @@ class _Mapping:
         for key, entry in self.table.get("starts", {}).items():
             where = f"{self.path}: [starts] {key}"
             value = self.value(key, name, where)
-            starts.update({n: factor * value for n, factor in _targets(entry, where)})
+            first = key.startswith("first:")
+            own = self.units.get(key.removeprefix("first:"), "") if first else ""
+            starts.update({n: factor * value for n, factor in self._set(entry, own, where)})
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..calibrate.checks.examine import examine
-from ..calibrate.checks.finding import Finding
+from ..calibrate.checks.finding import Finding, lines
 from ..calibrate.estimate import Estimate, channel_rms
 from ..calibrate.fit import fit
 from ..calibrate.mapping import read_problem
@@ -46,8 +46,8 @@ def calibrate_command(
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
     findings = examine(problem)
-    for finding in findings:
-        typer.echo(str(finding), err=True)
+    for line in lines(findings):
+        typer.echo(line, err=True)
     if any(f.severity == "error" for f in findings):
         raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
     estimate = fit(problem)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data, examine
-from ..calibrate.checks.finding import Finding
+from ..calibrate.checks.finding import Finding, lines
 from ..calibrate.problem import Problem
 from ..errors import CosimError, ScenarioError
 from ..system.provider import locate
@@ -238,10 +238,10 @@ def diagnose(
     """
     begun = time.perf_counter()
     findings = examine(problem)
-    errors = [str(f) for f in findings if f.severity == "error"]
+    errors = lines(f for f in findings if f.severity == "error")
     if errors:
         result = Diagnosis(problem, "bad_data", "; ".join(errors))
-        result.warnings = [str(f) for f in findings if f.severity != "error"]
+        result.warnings = lines(f for f in findings if f.severity != "error")
         result.wall = time.perf_counter() - begun
         return result
     search = Search(problem, say)
@@ -264,7 +264,7 @@ def _searched(
     problem = search.raw
     base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
-    result.warnings = [str(f) for f in findings]
+    result.warnings = lines(findings)
     current = base
     winners: list[Round] = []
     for number in range(ROUNDS):

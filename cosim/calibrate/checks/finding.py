@@ -121,3 +121,22 @@ def passed(findings: Iterable[Finding], allow: frozenset[str]) -> list[Finding]:
         if f.severity == "error" and f.kind in allow else f
         for f in findings
     ]  # fmt: skip
+
+
+FEW = 3
+"""Runs with the same finding that are named one by one."""
+
+
+def lines(findings: Iterable[Finding]) -> list[str]:
+    """Findings for people: the same one of many runs in one line, with the first one's figures."""
+    alike: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        alike.setdefault((finding.severity, finding.kind, finding.column), []).append(finding)
+    found = []
+    for group in alike.values():
+        if len(group) <= FEW:
+            found += [str(finding) for finding in group]
+        else:
+            rest = f" (so, too, in {len(group) - 1} other runs: {group[1].run}, …, {group[-1].run})"
+            found.append(str(replace(group[0], text=group[0].text + rest)))
+    return found

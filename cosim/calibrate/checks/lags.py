@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from ..problem import Problem
 
 Vector = NDArray[np.float64]
+ENOUGH = 0.1
+"""Share of samples that must be measured to judge a lag."""
 
 
 def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -> Iterator[Finding]:
@@ -56,9 +58,14 @@ def _best_lag(measured: Vector, simulated: Vector, reach: int, sigma: float) -> 
 
     def misfit(lag: int) -> float:
         late = measured[reach + lag : measured.size - reach + lag]
-        return float(np.nanmean((late - simulated[reach : measured.size - reach]) ** 2))
+        apart = late - simulated[reach : measured.size - reach]
+        good = np.isfinite(apart)
+        # a lag at which next to nothing is measured says nothing
+        return float(np.mean(apart[good] ** 2)) if np.mean(good) > ENOUGH else np.inf
 
     if reach < 2 or not np.isfinite(measured).any() or np.std(simulated) < 5.0 * sigma:
+        return 0, 1.0
+    if not np.isfinite(misfit(0)):
         return 0, 1.0
     coarse = min(range(-reach, reach + 1, max(reach // 40, 1)), key=misfit)
     near = range(max(coarse - reach // 40, -reach), min(coarse + reach // 40, reach) + 1)
