@@ -146,7 +146,7 @@ class _Clocks:
         return values * (self.factor if factor is None else factor)
 
     def own(self, source: str) -> str:
-        """The clock of a column: of several files, the one with the main clock's name in its own."""
+        """The clock of a column: of several files, that of its own with the main clock's name."""
         file, dot, _ = source.rpartition(".")
         mine = f"{file}{dot}{self.main.rpartition('.')[2]}"
         return mine if dot and mine in self.log.columns else self.main

@@ -32,8 +32,8 @@ from ..system.provider import Provider
 from ..system.system import System
 from ..system.toml import SystemFile
 from ..system.variants import apply
-from .differences import STEP, directional, jacobian
 from .checks.finding import Source
+from .differences import STEP, directional, jacobian
 from .parts import (
     COINCIDENT,
     Channel,

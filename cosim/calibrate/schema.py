@@ -177,7 +177,9 @@ def _list(keys: Mapping[str, Check], needed: Iterable[str]) -> Check:
 
     def check(value: Any, where: str) -> None:
         if not isinstance(value, list):
-            raise _fail(where, value, f"a list of tables; begin each with [[{where.rpartition(' ')[2]}]]")
+            raise _fail(
+                where, value, f"a list of tables; begin each with [[{where.rpartition(' ')[2]}]]"
+            )
         for entry in value:
             name = entry.get("name") if isinstance(entry, Mapping) else None
             keyed(entry, keys, f"{where} {name}" if name else where, needed)

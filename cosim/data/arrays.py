@@ -1,4 +1,4 @@
-"""Tables of numbers: Parquet, npz and MATLAB files. Sizes are checked before anything is unpacked."""
+"""Tables of numbers: Parquet, npz and MATLAB files, unpacked once their size is known."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def read_mat(path: Path, limit: int) -> Table:
             f"{path}: is not a MATLAB file of version 7 or older ({error}); save it with -v7"
         ) from error
     for name, value in content.items():
-        if not name.startswith("__") and isinstance(value, np.ndarray):
-            if value.dtype.kind in KINDS:
-                _add(table, name, value)
+        array = isinstance(value, np.ndarray) and value.dtype.kind in KINDS
+        if array and not name.startswith("__"):
+            _add(table, name, value)
     return table

@@ -1,9 +1,9 @@
 """Tables of text: their encoding, what separates their columns, and the habits of their heads.
 
-Read are UTF-8 and UTF-16 (with a byte order mark), and else Latin-1, whose bytes all mean something;
-columns separated by semicolons, tabs, commas, bars or blanks; a decimal comma where the comma does
-not separate; heads such as `speed [rad/s]` and `speed (rad/s)`, heads in a comment, and a second row
-of units. Anything else is refused in one sentence.
+Read are UTF-8 and UTF-16 (with a byte order mark), and else Latin-1, whose bytes all mean
+something; columns separated by semicolons, tabs, commas, bars or blanks; a decimal comma where the
+comma does not separate; heads such as `speed [rad/s]` and `speed (rad/s)`, heads in a comment, and
+a second row of units. Anything else is refused in one sentence.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ COMMENTS = ("#", "%")
 _SQUARE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
 _ROUND = re.compile(r".*?\((?P<unit>[^()]+)\)")
 _SIGNS = {
-    "°C": "degC", "°": "deg", "º": "deg", "Ω": "ohm", "Ω": "ohm", "µ": "u", "μ": "u", "·": ".",
-    "²": "2", "³": "3", "⁻¹": "-1", "⁻²": "-2", "Ohm": "ohm", "degree": "deg", "degrees": "deg",
-    "sec": "s", "RPM": "rpm", "Nm": "N.m", "1/min": "rpm", "rad/sec": "rad/s",
-    "N m": "N.m", "deg/sec": "deg/s",
+    "°C": "degC", "°": "deg", "º": "deg", "\u03a9": "ohm", "\u2126": "ohm", "Ohm": "ohm",
+    "µ": "u", "μ": "u", "·": ".", "²": "2", "³": "3", "⁻¹": "-1", "⁻²": "-2",
+    "degree": "deg", "degrees": "deg", "deg/sec": "deg/s", "rad/sec": "rad/s", "sec": "s",
+    "RPM": "rpm", "1/min": "rpm", "Nm": "N.m", "N m": "N.m",
 }  # fmt: skip
 """Other spellings of units: signs that are replaced wherever they stand, words as a whole."""
 
@@ -153,10 +153,8 @@ def too_large(path: Path, size: int, limit: int) -> str:
 
 def _decoded(path: Path, table: Table) -> str:
     raw = path.read_bytes()
-    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        code = "utf-16"
-    else:
-        code = "utf-8-sig"
+    wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    code = "utf-16" if wide else "utf-8-sig"
     try:
         text = raw.decode(code)
     except UnicodeDecodeError:

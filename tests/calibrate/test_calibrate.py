@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cosim.calibrate.checks.machines import check_machines
 from cosim.calibrate.estimate import channel_rms
 from cosim.calibrate.fit import fit
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
-from cosim.calibrate.checks.machines import check_machines
 from cosim.errors import FmuCallError
 
 

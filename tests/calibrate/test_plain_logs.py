@@ -9,7 +9,7 @@ import pytest
 from scipy.io import savemat
 
 from cosim.calibrate import Problem, read_problem
-from cosim.calibrate.mapping import snapped
+from cosim.calibrate.joining import snapped
 from cosim.errors import ScenarioError
 
 MAPPING = """

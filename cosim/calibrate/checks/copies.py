@@ -36,7 +36,7 @@ def check_copies(problem: Problem) -> Iterator[Finding]:
             seen[key].append((number, index))
     common: dict[tuple[int, int], Counter[int]] = defaultdict(Counter)
     for places in seen.values():
-        if 1 < len(places) and len({number for number, _ in places}) == len(places):
+        if len(places) > 1 and len({number for number, _ in places}) == len(places):
             for at, (first, i) in enumerate(places):
                 for second, j in places[at + 1 :]:
                     common[first, second][j - i] += 1

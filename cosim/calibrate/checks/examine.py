@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ..problem import Problem
 
 Vector = NDArray[np.float64]
+OF_ANOTHER = {"smoothed", "held"}
+"""Errors that another column under this name brings, which the model tells."""
 
 
 def examine(problem: Problem) -> list[Finding]:
@@ -34,8 +36,14 @@ def examine(problem: Problem) -> list[Finding]:
     """
     allow = problem.source.allow
     findings = passed(check_data(problem), allow)
-    if not any(f.severity == "error" for f in findings):
-        findings += passed(check_model(problem), allow)
+    if {f.kind for f in findings if f.severity == "error"} <= OF_ANOTHER:
+        against = passed(check_model(problem), allow)
+        other = {
+            name for f in against if f.severity == "error" and f.kind in ("swapped", "unit")
+            for name in f.column.split(" and ")
+        }  # fmt: skip
+        findings = [f for f in findings if f.kind not in OF_ANOTHER or f.column not in other]
+        findings += against
     return findings
 
 

@@ -108,7 +108,9 @@ def check_allowed(kinds: Iterable[str], path: Path) -> frozenset[str]:
     """
     for kind in kinds:
         if kind not in KINDS:
-            raise ScenarioError(f"{path}: [checks] allow: {listing(KINDS, kind)} as kind, not {kind!r}")
+            raise ScenarioError(
+                f"{path}: [checks] allow: {kind!r} is no kind of finding; {listing(KINDS, kind)}"
+            )
         if kind in LASTING:
             raise ScenarioError(f"{path}: [checks] allow: {kind!r} ({KINDS[kind]}) stops any fit")
     return frozenset(kinds)

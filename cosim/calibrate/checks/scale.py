@@ -83,6 +83,12 @@ def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: 
 
 
 def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> Iterator[Finding]:
+    """Sign and size of a column in the runs in which it follows its signal.
+
+    With a correlation beyond `FOLLOWS` over hundreds of samples, sign and slope are not of chance;
+    what else turns or scales a column is the model's lack, which `_foretold` and `STRANGE` leave
+    room for.
+    """
     channel = problem.channels[index]
     follow = _follow(problem, models, index)
     if not follow:

@@ -82,9 +82,9 @@ def check_smooth(problem: Problem) -> Iterator[Finding]:
             yield Finding("warning", "noise", "", channel.name, text)
         if size < QUIET and (instrument or float(np.median(falls)) < FALLS):
             text = (
-                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit} near "
-                "half the sample rate: it was low-passed or interpolated, or its noise is another; take "
-                "the raw column, or state its noise as sigma"
+                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit} "
+                "near half the sample rate: it was low-passed or interpolated, or its noise is "
+                "another; take the raw column, or state its noise as sigma"
             )
             quiet.append((channel.name, text, instrument))
     whole = len(quiet) == count

@@ -19,18 +19,16 @@ FIRST = 5
 """Samples at the beginning that count together."""
 OFF = 10.0
 """Deviations of their mean from which a beginning is another one."""
-PART = 0.02
-"""Share of the column's range that it must be off by, too: less is a matter of the model."""
 MOVES = 0.25
 """Share of the way to the bounds by which the parameters are changed."""
 
 
 def check_starts(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
-    """Channels whose first samples are not where the model begins, by more from run to run than noise.
+    """Channels whose first samples are not where the model begins, and not always alike.
 
     The mean of `FIRST` samples has the deviation sigma / sqrt(`FIRST`), so that `OFF` sigma are 22
-    of its deviations: noise does not do it. An offset of a sensor does, but the same in all runs, so
-    what all runs have in common does not count; and so does a channel that answers the inputs at
+    of its deviations: noise does not do it. An offset of a sensor does, but the same in all runs,
+    so what all runs have in common does not count; and so does a channel that answers the inputs at
     once, by its parameters, so what changes by a quarter of their bounds does not count either.
     """
     stated = {
@@ -49,11 +47,9 @@ def check_starts(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
     common = np.nan_to_num(_median(np.stack(list(off.values())))) if len(off) > 2 else 0.0
     for run in problem.runs:
         far = np.abs(off[run.name] - common)
-        span = np.array([_span(column) for column in run.data.T])
         wrong = [
             i for i in range(len(problem.channels))
             if np.isfinite(far[i]) and far[i] > OFF * problem.channels[i].sigma
-            and far[i] > PART * span[i]
         ]  # fmt: skip
         if run.name in stated or not wrong:
             continue
@@ -79,11 +75,6 @@ def _median(values: Vector) -> Vector:
     found = np.full(values.shape[1], np.nan)
     found[known] = np.nanmedian(values[:, known], axis=0)
     return found
-
-
-def _span(column: Vector) -> float:
-    good = column[np.isfinite(column)]
-    return float(np.ptp(good)) if good.size else 0.0
 
 
 def _by_parameters(problem: Problem, name: str, model: Vector) -> Vector:

@@ -23,7 +23,18 @@ UNLIKE = 0.01
 alike by chance only."""
 
 
-def check_channels(problem: Problem, models: Mapping[str, Vector], named: set[str]) -> Iterator[Finding]:
+def check_channels(
+    problem: Problem, models: Mapping[str, Vector], named: set[str]
+) -> Iterator[Finding]:
+    """Pairs of channels that fit each other's signal far better than their own.
+
+    Ten times better (a hundred times where the units differ) over all samples is not of chance, and
+    no law that a model lacks makes one column what the other should be.
+
+    Args:
+        problem, models: data, and what the model gives.
+        named: channels about which something was found that explains as much.
+    """
     for a, first in enumerate(problem.channels):
         for b in range(a + 1, len(problem.channels)):
             second = problem.channels[b]
@@ -70,7 +81,9 @@ def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: in
     return total
 
 
-def check_inputs(problem: Problem, models: Mapping[str, Vector], theta: Vector) -> Iterator[Finding]:
+def check_inputs(
+    problem: Problem, models: Mapping[str, Vector], theta: Vector
+) -> Iterator[Finding]:
     """Pairs of inputs that explain the data far better when exchanged."""
     run = max(problem.runs, key=lambda item: _cost(problem, item, models[item.name]))
     straight = _cost(problem, run, models[run.name])
