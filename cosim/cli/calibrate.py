@@ -13,11 +13,13 @@ from rich.console import Console
 from rich.table import Table
 
 from ..calibrate.checks.examine import examine
-from ..calibrate.checks.finding import Finding, lines
+from ..calibrate.checks.finding import Finding, lines, passed
+from ..calibrate.checks.late import check_late
 from ..calibrate.estimate import Estimate, channel_rms
 from ..calibrate.fit import fit
 from ..calibrate.mapping import read_problem
 from ..calibrate.nuisance import settled
+from ..calibrate.problem import Problem
 from ..calibrate.sensitivity import Correlation, correlation_index, local, tornado
 from ..errors import InputError
 
@@ -45,12 +47,9 @@ def calibrate_command(
     """
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system, workers=workers)
-    findings = examine(problem)
-    for line in lines(findings):
-        typer.echo(line, err=True)
-    if any(f.severity == "error" for f in findings):
-        raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
+    findings = _usable(problem, examine(problem))
     estimate = fit(problem)
+    findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
     correlation = correlation_index(problem, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
     content["wall_s"] = time.perf_counter() - started
@@ -65,6 +64,19 @@ def calibrate_command(
         typer.echo(text)
     else:
         _print(content)
+
+
+def _usable(problem: Problem, findings: list[Finding]) -> list[Finding]:
+    """Say what was found.
+
+    Raises:
+        InputError: it stops the work.
+    """
+    for line in lines(findings):
+        typer.echo(line, err=True)
+    if any(f.severity == "error" for f in findings):
+        raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
+    return findings
 
 
 def calibration_table(

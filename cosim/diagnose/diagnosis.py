@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data, examine
-from ..calibrate.checks.finding import Finding, lines
+from ..calibrate.checks.finding import Finding, lines, passed
+from ..calibrate.checks.late import check_late
 from ..calibrate.problem import Problem
 from ..errors import CosimError, ScenarioError
 from ..system.provider import locate
@@ -238,31 +239,41 @@ def diagnose(
     """
     begun = time.perf_counter()
     findings = examine(problem)
-    errors = lines(f for f in findings if f.severity == "error")
-    if errors:
-        result = Diagnosis(problem, "bad_data", "; ".join(errors))
-        result.warnings = lines(f for f in findings if f.severity != "error")
-        result.wall = time.perf_counter() - begun
-        return result
+    if any(f.severity == "error" for f in findings):
+        return _refused(problem, findings, begun)
     search = Search(problem, say)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
         with threadpool_limits(1, user_api="blas"):
-            return _searched(search, findings, out, say, begun)
+            base = search.calibrated()
+            late = passed(check_late(base.estimate), problem.source.allow)
+            findings += late
+            if any(f.severity == "error" for f in late):
+                return _refused(problem, findings, begun)
+            return _searched(search, base, findings, out, say, begun)
     finally:
         search.close()
 
 
+def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
+    """The verdict on data that cannot be used."""
+    errors = lines(f for f in findings if f.severity == "error")
+    result = Diagnosis(problem, "bad_data", "; ".join(errors))
+    result.warnings = lines(f for f in findings if f.severity != "error")
+    result.wall = time.perf_counter() - begun
+    return result
+
+
 def _searched(
     search: Search,
+    base: Fitted,
     findings: list[Finding],
     out: Path | None,
     say: Callable[[str], None],
     begun: float,
 ) -> Diagnosis:
     problem = search.raw
-    base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
     result.warnings = lines(findings)
     current = base

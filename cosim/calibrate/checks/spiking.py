@@ -26,8 +26,8 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
 
     Of white Gaussian noise a sample passes for one once in 1e9. A jolt of the machine may last one
     sample, too (the impact at the end of a play), but it shows in another column within `NEAR`
-    samples, which a fault of the log does by chance in one of 800 cases per column (7 samples beyond
-    4 deviations); so columns are named of whose spikes most are alone.
+    samples, which a fault of the log does by chance in one of 800 cases per column (7 samples
+    beyond 4 deviations); so columns are named of whose spikes most are alone.
     """
     bends = {
         (run.name, index): _bend(run.data[:, index], channel.sigma)
