@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from cosim.calibrate import Problem
-from cosim.calibrate.validate import Finding, _check_swaps, check_data, check_model
+from cosim.calibrate.checks.examine import check_data, check_model
+from cosim.calibrate.checks.finding import Finding
+from cosim.calibrate.checks.swaps import check_channels
 from cosim.data.signals import Table
 from tests.problems import simulator
 
@@ -108,7 +110,7 @@ def test_two_sides_that_carry_one_load(crossed: bool) -> None:
     ]
     problem: Any = SimpleNamespace(runs=[run], channels=channels)
     model = 0.5 * np.column_stack([left, right])
-    found = list(_check_swaps(problem, {"A": model}, set()))
+    found = list(check_channels(problem, {"A": model}, set()))
     assert [f.column for f in found] == (["left and right"] if crossed else [])
     assert not crossed or "look swapped" in found[0].text
 
