@@ -51,9 +51,9 @@ def check_late(estimate: Estimate) -> Iterator[Finding]:
 
         |r(s)|^2 - r(s)' J (J' J)^-1 J' r(s)
 
-    The best shift that leaves `LEAVES` of its excess over the noise is tried in a fit. It is named if that
-    leaves less than `LEFT` of the excess: one number that takes n residuals of variance `OFF` and
-    more to within a tenth of the noise's 1 is not of chance (the excess has a deviation of
+    A shift that leaves less than `LEAVES` of its excess over the noise is tried in a fit. It is
+    named if that leaves less than `LEFT` of it: one number that takes n residuals of variance `OFF`
+    and more to within a tenth of the noise's 1 is not of chance (the excess has a deviation of
     sqrt(2 / n)). A physical cause that shifts one column and does nothing else is the same in the
     data, and is mended or let pass in the same way. All channels together are named only if they
     come before the inputs, which no machine does: one that answers late is a machine.
