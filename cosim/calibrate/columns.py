@@ -101,7 +101,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     clock = clock[part]
     if clock.size == 0:
         raise ScenarioError(f"{log.name}: has {time.size} samples, none from {first} to {last}")
-    if entries or main != "time" or not 0.0 <= clock[0] < LATEST:
+    if entries or main != "time" or main in log.origins or not 0.0 <= clock[0] < LATEST:
         clock = clock - clock[0]
     columns["time"] = clock
     return replace(log, columns=columns, units=units)

@@ -15,7 +15,7 @@ from ..errors import ScenarioError, listing
 from .checks.finding import Finding
 from .columns import apart, check_rising, expand, prepared
 from .parts import COINCIDENT
-from .schema import RUN, keyed
+from .schema import RUN, strict
 
 LONGEST = 5.0
 """Intervals between samples longer than this many usual ones are gaps in the inputs."""
@@ -53,7 +53,7 @@ class MappedLogs:
         self.purposes: dict[str, str] = {}
         lead = float(self.table.get("lead", 0.0))
         for run in self._chosen({**self.table.get("only", {}), **only}):
-            keyed(
+            strict(
                 {k: v for k, v in run.values.items() if k in RUN},
                 RUN,
                 f"{path}: run {run.name}",

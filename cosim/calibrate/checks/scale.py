@@ -94,7 +94,7 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
     if not follow:
         return
     turned = [name for name, (slope, _) in follow.items() if slope < 0.0]
-    if len(turned) > len(follow) / 2:
+    if len(turned) > len(follow) / 2 and len(follow) >= len(problem.runs) / 2:
         text = f"follows {channel.signal} with the sign turned round"
         yield Finding("error", "sign", "", channel.name, text)
     else:
