@@ -91,13 +91,10 @@ class MappedLogs:
             if not any(key in run.values for run in runs):
                 has = sorted({name for run in runs for name in run.values})
                 raise ScenarioError(f"{self.path}: only: no run has {key!r}; {listing(has, key)}")
-        chosen = [
+        return [
             run for run in runs
             if all(run.values.get(key, value) == value for key, value in wanted.items())
         ]  # fmt: skip
-        if not chosen:
-            raise ScenarioError(f"{self.path}: only = {dict(wanted)} leaves no run")
-        return chosen
 
     def sources(self) -> list[str]:
         """Columns that drive inputs."""

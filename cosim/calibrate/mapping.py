@@ -40,7 +40,7 @@ def find_mapping(folder: Path, rig: str) -> Path:
             return path
         known.append(name)
     if not folder.is_dir():
-        near = sorted(item.name for item in folder.parent.glob("*") if item.is_dir())
+        near = sorted(item.name for item in folder.parent.glob("[!.]*") if item.is_dir())
         raise ScenarioError(
             f"{folder}: there is no such folder; beside it {listing(near, folder.name)}"
         )

@@ -70,7 +70,8 @@ def check_late(estimate: Estimate) -> Iterator[Finding]:
     groups: list[tuple[int, ...]] = [(i,) for i in range(len(problem.channels))]
     if len(groups) > 1:
         groups.append(tuple(range(len(problem.channels))))
-    found = [shift for group in groups if (shift := _best(estimate, group)) is not None]
+    sums = _Sums(estimate)
+    found = [shift for group in groups if (shift := _best(estimate, group, sums)) is not None]
     found = [s for s in found if len(s.channels) == 1 or s.samples < 0.0]
     for shift in sorted(found, key=lambda s: s.excess)[:2]:
         if shift.excess > LEAVES or abs(shift.samples) < 0.25:
@@ -131,41 +132,32 @@ def _fitted(estimate: Estimate, shift: _Shift, step: float) -> tuple[float, floa
     return late, after
 
 
-def _best(estimate: Estimate, group: Sequence[int]) -> _Shift | None:
+def _best(estimate: Estimate, group: Sequence[int], sums: _Sums | None = None) -> _Shift | None:
     """The shift that leaves least, to first order."""
-    problem = estimate.problem
-    size = len(problem.parameters)
-    matrix = np.zeros((size, size))
-    fixed, total, counted = np.zeros(size), 0.0, 0
-    runs: list[tuple[Vector, Vector, Vector, NDArray[np.intp], int]] = []
-    reach = min([REACH, *(len(r) // PART for _, r in estimate.residuals)])
+    sums = sums or _Sums(estimate)
+    reach = sums.reach
     if reach < 2:
         return None
-    others = [i for i in range(len(problem.channels)) if i not in group]
-    for item, (name, residual) in zip(estimate.jacobian, estimate.residuals, strict=True):
-        data = problem.run(name).data / problem.sigma
-        values = item.values * problem.scale[item.columns]
-        stride = max(len(residual) // ROWS, 1)
-        rest = _rows(residual[::stride, others], values[::stride, others])
-        matrix[np.ix_(item.columns, item.columns)] += rest[1].T @ rest[1]
-        fixed[item.columns] += rest[1].T @ rest[0]
-        total, counted = total + float(rest[0] @ rest[0]), counted + rest[0].size
-        inner = slice(reach, len(residual) - reach, stride)
-        model = (data - residual)[inner][:, list(group)]
-        slopes = values[inner][:, list(group)]
-        runs.append((data[:, list(group)], model, slopes, item.columns, stride))
-        own = _rows(model, slopes)[1]
-        matrix[np.ix_(item.columns, item.columns)] += own.T @ own
-    matrix += 1e-9 * max(float(np.trace(matrix)), 1.0) * np.eye(size)
+    others = [i for i in range(len(estimate.problem.channels)) if i not in group]
+    matrix = sum((sums.matrix[i] for i in others), np.zeros_like(sums.matrix[0]))
+    fixed = sum((sums.gradient[i] for i in others), np.zeros_like(sums.gradient[0]))
+    total = sum(sums.square[i] - sums.count[i] for i in others)
+    parts = [part for part in sums.parts if part.channel in group]
+    for part in parts:
+        own = part.slopes[np.isfinite(part.model)]
+        matrix[np.ix_(part.columns, part.columns)] += own.T @ own
+    matrix += 1e-9 * max(float(np.trace(matrix)), 1.0) * np.eye(len(matrix))
+    inverse = np.linalg.inv(matrix)
 
     def left(samples: int) -> float:
-        gradient, square, number = fixed.copy(), total, counted
-        for data, model, slopes, columns, stride in runs:
-            late = data[reach + samples : len(data) - reach + samples : stride]
-            residual, slope = _rows(late - model, slopes)
-            gradient[columns] += slope.T @ residual
-            square, number = square + float(residual @ residual), number + residual.size
-        return square - float(gradient @ np.linalg.solve(matrix, gradient)) - number
+        gradient, excess = fixed.copy(), total
+        for part in parts:
+            end = len(part.data) - reach + samples
+            residual = part.data[reach + samples : end : part.stride] - part.model
+            good = np.isfinite(residual)
+            gradient[part.columns] += part.slopes[good].T @ residual[good]
+            excess += float(np.sum(residual[good] ** 2)) - np.count_nonzero(good)
+        return float(excess - gradient @ inverse @ gradient)
 
     costs = {samples: left(samples) for samples in range(-reach, reach + 1)}
     best = min(costs, key=lambda samples: costs[samples])
@@ -177,7 +169,41 @@ def _best(estimate: Estimate, group: Sequence[int]) -> _Shift | None:
     return _Shift(tuple(group), shift, least / costs[0] if costs[0] > 0.0 else 1.0)
 
 
-def _rows(residual: Vector, slopes: Vector) -> tuple[Vector, Vector]:
-    """Residuals that were measured, and their derivatives."""
-    good = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)
-    return residual[good], slopes[good]
+@dataclass(frozen=True)
+class _Part:
+    """One channel of one run: all its data, and the model inside of what shifts reach."""
+
+    channel: int
+    data: Vector
+    model: Vector
+    slopes: Vector
+    columns: NDArray[np.intp]
+    stride: int
+
+
+class _Sums:
+    """What every shift needs of an estimate: normal equations by channel, and its parts."""
+
+    def __init__(self, estimate: Estimate) -> None:
+        problem = estimate.problem
+        count, size = len(problem.channels), len(problem.parameters)
+        self.reach = min([REACH, *(len(r) // PART for _, r in estimate.residuals)])
+        self.matrix = np.zeros((count, size, size))
+        self.gradient = np.zeros((count, size))
+        self.square, self.count = np.zeros(count), np.zeros(count)
+        self.parts: list[_Part] = []
+        for item, (name, residual) in zip(estimate.jacobian, estimate.residuals, strict=True):
+            stride = max(len(residual) // ROWS, 1)
+            inner = slice(self.reach, len(residual) - self.reach, stride)
+            data = problem.run(name).data / problem.sigma
+            columns = item.columns
+            for i in range(count):
+                slopes = np.nan_to_num(item.values[:, i]) * problem.scale[columns]
+                rest, slope = residual[::stride, i], slopes[::stride]
+                good = np.isfinite(rest)
+                self.matrix[i][np.ix_(columns, columns)] += slope[good].T @ slope[good]
+                self.gradient[i][columns] += slope[good].T @ rest[good]
+                self.square[i] += float(np.sum(rest[good] ** 2))
+                self.count[i] += np.count_nonzero(good)
+                model = (data[:, i] - residual[:, i])[inner]
+                self.parts.append(_Part(i, data[:, i], model, slopes[inner], columns, stride))

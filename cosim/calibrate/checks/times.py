@@ -31,12 +31,13 @@ of the time."""
 def interval(times: Vector) -> float:
     """Usual interval between samples: the mean of those that are even.
 
-    So neither rounding of the times nor missing rows count. Where most are uneven, the median.
+    So neither rounding nor missing rows count; where most are uneven, only gaps do not.
     """
     steps = np.diff(times)
     usual = float(np.median(steps))
     even = np.abs(steps - usual) < EVEN * usual
-    return float(np.mean(steps[even])) if np.mean(even) > 0.5 else usual
+    counted = even if np.mean(even) > 0.5 else steps < GAP * usual
+    return float(np.mean(steps[counted])) if counted.any() else usual
 
 
 def check_times(problem: Problem) -> Iterator[Finding]:
