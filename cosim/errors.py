@@ -151,7 +151,10 @@ def listing(names: Iterable[str], wanted: str = "", limit: int = 12) -> str:
     everything = list(names)
     if not everything:
         return "there is none"
-    near = get_close_matches(wanted, everything, n=3, cutoff=0.6) if wanted else []
+    # what differs in case only is near
+    small = {name.lower(): name for name in reversed(everything)}
+    found = get_close_matches(wanted.lower(), small, n=3, cutoff=0.6) if wanted else []
+    near = [small[name] for name in found]
     shown = [*near, *[name for name in everything if name not in near]][:limit]
     rest = len(everything) - len(shown)
     text = ", ".join(shown) + (f" and {rest} more" if rest > 0 else "")

@@ -13,14 +13,24 @@ from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
 from ..data.logs import Log
-from ..errors import ScenarioError, listing
+from ..errors import ScenarioError, UnitError
+from ..spec.units import Unit, parse
 from .parts import COINCIDENT
+from .scales import known, per_second, scaled
 
 Vector = NDArray[np.float64]
 GAP = 3.0
 """Intervals of a clock longer than this many usual ones are gaps."""
-KEYS = {"source", "time", "late", "scale", "offset", "unit", "lowpass", "derivative", "hold", "gap",
-        "limit", "ends", "unwrap", "quaternion"}  # fmt: skip
+EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+"""Times since 1970 from the first on are in the unit of the second [s]: what counts seconds reaches
+1e11 in the year 5138, and what counts milliseconds was there in 1973."""
+LONG = 20.0
+"""A clock that spans more than so many times its samples at its usual interval has jumped."""
+UNIT_LENGTH, SAME_LENGTH = 0.05, 0.01
+"""Quaternions may miss the length 1 by the first, and lengths may differ from each other by the
+second (a fixed-point format, rounded), and still turn by what they say once normalised."""
+TURNS = 1.05
+"""An angle in radians that begins anew at a turn spans no more than this many turns."""
 ITEM = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?$")
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<tail>.*)$")
 
@@ -44,67 +54,193 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
 
     Raises:
         ScenarioError, UnknownNameError: an entry is wrong or does not fit the log.
+        UnitError: units that do not fit.
     """
     entries = table.get("columns", {})
     main = str(table.get("time", "time"))
-    if not entries and main == "time" and "resample" not in table:
-        return log
-    clock = log[main]
+    clocks = _Clocks(log, main)
+    log, clock = _with_times(log, main, clocks(main))
     time = clock
     if "resample" in table:
         interval = float(table["resample"])
+        _check_span(log, main, clock)
         time = clock[0] + interval * np.arange(
             int((clock[-1] - clock[0]) / interval + COINCIDENT) + 1
         )
-    columns: dict[str, Vector] = {
-        name: values for name, values in log.columns.items() if values.shape == time.shape
-    }
+    columns: dict[str, Vector] = dict(log.columns)
     if "resample" in table:
         columns = {"time": time}
+    elif main == "time" or "time" not in columns:
+        columns["time"] = time
     units = dict(log.units)
     for pattern, entry in entries.items():
         for i, name in enumerate(expand(pattern), 1):
             where = f"{path}: column {name}"
-            unknown = set(entry) - KEYS
-            if unknown:
-                raise ScenarioError(
-                    f"{where}: has no key {sorted(unknown)[0]!r}; {listing(sorted(KEYS))}"
-                )
             item = {**entry, "source": str(entry.get("source", name)).replace("{}", str(i))}
-            values = _ends(log, item, time, where) if "ends" in entry else _column(
-                log, item, main, time, where
+            source, target = _units(log, item, units.get(name, ""), where)
+            gain, offset = scaled(
+                source, target, item.get("scale"), where, "scale",
+                f"say from = {source.symbol if source else ''!r} if it does not, or "
+                f"from = {target.symbol if target else ''!r} if it does",
+            )  # fmt: skip
+            turn = _turn(item, target, gain, where)
+            values = _ends(log, item, time, turn, where) if "ends" in entry else _column(
+                log, item, clocks, time, clock, turn, where
             )  # fmt: skip
             values = _filtered(time, values, entry, where)
-            columns[name] = values * float(entry.get("scale", 1.0)) + float(
-                entry.get("offset", 0.0)
-            )
-            units[name] = str(entry.get("unit", units.get(name, "")))
+            columns[name] = values * gain + (offset + float(entry.get("offset", 0.0)))
+            units[name] = target.symbol if target else ""
     clock = columns.get("time", time)
     first, last = log.values.get("samples", (1, clock.size))
     part = slice(int(first) - 1, int(last))
-    columns = {name: values[part] for name, values in columns.items()}
+    # those of another length are told apart from such as do not exist
+    columns = {
+        name: values[part] if values.shape == time.shape else values
+        for name, values in columns.items()
+    }
     clock = clock[part]
     if clock.size == 0:
         raise ScenarioError(f"{log.name}: has {time.size} samples, none from {first} to {last}")
-    columns["time"] = clock - clock[0]
+    if entries or main != "time" or main in log.origins or not 0.0 <= clock[0] < LATEST:
+        clock = clock - clock[0]
+    columns["time"] = clock
     return replace(log, columns=columns, units=units)
 
 
-def _ends(log: Log, entry: Mapping[str, Any], time: Vector, where: str) -> Vector:
+class _Clocks:
+    """Clocks of a log: in seconds where the main one's unit is known, else in its own.
+
+    A unit is known from the column's head, or as that of times since 1970.
+
+    Args:
+        log: with the clocks.
+        main: name of the main one.
+    """
+
+    def __init__(self, log: Log, main: str) -> None:
+        self.log, self.main = log, main
+        self.factor = self._factor(main)
+
+    def _factor(self, name: str) -> float | None:
+        """[s] of one of a clock's units, None if that is not known."""
+        unit = self.log.units.get(name, "")
+        if unit:
+            found = known(unit, f"{self.log.name}: clock {name}")
+            if found.exponents != parse("s").exponents:
+                raise UnitError(
+                    f"{self.log.name}: clock {name!r} is in {unit!r} (SI {found.dimension()}), "
+                    "which is no time; name another column with time"
+                )
+            return found.factor
+        values = self.log[name]
+        size = abs(float(np.nanmedian(values))) if np.isfinite(values).any() else 0.0
+        size += self.log.origins.get(name, 0)
+        return next((factor for least, factor in EPOCHS if size >= least), None)
+
+    def __call__(self, name: str) -> Vector:
+        """A clock."""
+        values = self.log[name]
+        if self.factor is None:
+            return values
+        factor = self._factor(name)
+        return values * (self.factor if factor is None else factor)
+
+    def own(self, source: str) -> str:
+        """The clock of a column: of several files, that of its own with the main clock's name."""
+        file, dot, _ = source.rpartition(".")
+        mine = f"{file}{dot}{self.main.rpartition('.')[2]}"
+        return mine if dot and mine in self.log.columns else self.main
+
+
+LATEST = 1e6
+"""[s] A log that begins later than this, or before 0, counts from its own beginning: a master that
+counts steps from there would lose digits, and rows before 0 would be lost."""
+
+
+def _with_times(log: Log, main: str, clock: Vector) -> tuple[Log, Vector]:
+    """The log without the rows that have no time."""
+    good = np.isfinite(clock)
+    if good.all() and clock.size:
+        return log, clock
+    if not good.any():
+        raise ScenarioError(f"{log.name}: its clock {main!r} has no values; {_rows(clock.size)}")
+    columns = {
+        name: values[good] if values.shape == good.shape else values
+        for name, values in log.columns.items()
+    }
+    lost = int(np.count_nonzero(~good))
+    note = f"{lost} rows without a time in {main!r} are left out"
+    return replace(log, columns=columns, notes=(*log.notes, note)), clock[good]
+
+
+def _rows(count: int) -> str:
+    return "the log has no rows" if not count else f"none of its {count} cells is a number"
+
+
+def _check_span(log: Log, main: str, clock: Vector) -> None:
+    """Refuse to fill a clock that has jumped with samples.
+
+    Raises:
+        ScenarioError: with where it jumped.
+    """
+    steps = np.diff(clock)
+    if not steps.size:
+        return
+    usual = float(np.median(steps))
+    if not usual > 0.0 or clock[-1] - clock[0] > LONG * usual * clock.size:
+        at = int(np.argmax(np.abs(steps)))
+        raise ScenarioError(
+            f"{log.name}: clock {main!r} jumps by {steps[at]:.6g} after row {at + 1} (usual "
+            f"interval {usual:.4g}), so it cannot be resampled; take the rows on one side with "
+            "samples"
+        )
+
+
+def _units(
+    log: Log, entry: Mapping[str, Any], own: str, where: str
+) -> tuple[Unit | None, Unit | None]:
+    """Units of what a column is made from, and of what it becomes."""
+    said = str(entry.get("from", "")) or (
+        "rad" if "quaternion" in entry else log.units.get(_first(entry), "")
+    )
+    target = str(entry.get("unit", ""))
+    if not target:
+        plain = float(entry.get("scale", 1.0)) in (1.0, -1.0) and not entry.get("derivative")
+        target = (said or own) if plain else ""
+    source = known(said, where) if said and target else None
+    if source is not None and entry.get("derivative", False):
+        source = per_second(said)
+    return source, known(target, where) if target else None
+
+
+def _first(entry: Mapping[str, Any]) -> str:
+    """The column whose unit counts."""
+    return str(entry["ends"][0]).partition("[")[0] if "ends" in entry else str(entry["source"])
+
+
+def _turn(entry: Mapping[str, Any], target: Unit | None, gain: float, where: str) -> float:
+    """What a column's source jumps by when it begins anew: a whole turn, or the number given."""
+    said = entry.get("unwrap", False)
+    if said is not True:
+        return float(said)
+    turn = 2 * np.pi
+    if target is not None:
+        if target.exponents != parse("rad").exponents:
+            raise UnitError(
+                f"{where}: unwrap = true takes an angle, and its unit is {target.symbol!r}; give "
+                "the number at which it begins anew"
+            )
+        turn = 2 * np.pi / target.factor
+    return turn / abs(gain)
+
+
+def _ends(log: Log, entry: Mapping[str, Any], time: Vector, turn: float, where: str) -> Vector:
     """Two values that are known at the first and the last sample."""
-    if len(entry["ends"]) != 2:
-        raise ScenarioError(f"{where}: ends takes two values, for the first and the last sample")
     values = np.full(time.shape, np.nan)
     values[[0, -1]] = [_element(log, str(item), where) for item in entry["ends"]]
-    if entry.get("unwrap", False):
-        period = _period(entry)
-        values[-1] -= period * np.rint((values[-1] - values[0]) / period)
+    if turn:
+        values[-1] -= turn * np.rint((values[-1] - values[0]) / turn)
     return values
-
-
-def _period(entry: Mapping[str, Any]) -> float:
-    """What a column's values jump by: a whole turn, or the number given."""
-    return 2 * np.pi if entry["unwrap"] is True else float(entry["unwrap"])
 
 
 def _element(log: Log, item: str, where: str) -> float:
@@ -118,44 +254,144 @@ def _element(log: Log, item: str, where: str) -> float:
     return float(values[index])
 
 
-def _column(log: Log, entry: Mapping[str, Any], main: str, time: Vector, where: str) -> Vector:
+def _column(
+    log: Log,
+    entry: Mapping[str, Any],
+    clocks: _Clocks,
+    time: Vector,
+    clock: Vector,
+    turn: float,
+    where: str,
+) -> Vector:
     """A column on the main clock."""
-    values = _yaw(log, entry["quaternion"]) if "quaternion" in entry else log[str(entry["source"])]
-    name = str(entry.get("time", main))
-    own = log[name] - float(entry.get("late", 0.0))
+    source = str(entry["quaternion"][0] if "quaternion" in entry else entry["source"])
+    values = _yaw(log, entry["quaternion"], where) if "quaternion" in entry else log[source]
+    name = str(entry.get("time", clocks.own(source)))
+    own = clock if name == clocks.main else clocks(name)
     if own.shape != values.shape:
-        raise ScenarioError(
-            f"{where}: {values.size} values, but its clock has {own.size} times; name its "
-            "own clock with time"
-        )
+        raise ScenarioError(f"{where}: " + apart(log, source, name, own.size))
+    if name != clocks.main:
+        check_rising(log, name, own, twice=True)
+    own = own - float(entry.get("late", 0.0))
     if "limit" in entry:
         values = np.where(np.abs(values) > float(entry["limit"]), np.nan, values)
-    if entry.get("unwrap", False):
-        values = values.copy()
+    if entry.get("despike", False):
+        values = np.where(spikes(values), np.nan, values)
+    if entry.get("fresh", False):
+        values = np.where(np.append(False, np.diff(values) == 0.0), np.nan, values)
+    if turn:
         good = np.isfinite(values)
-        values[good] = np.unwrap(values[good], period=_period(entry))
-    same = name == main and not entry.get("late", 0.0) and time is log[main]
+        spanned = float(np.ptp(values[good])) if good.any() else 0.0
+        if entry["unwrap"] is True and spanned > TURNS * turn and _wraps(values[good], turn):
+            raise ScenarioError(
+                f"{where}: unwrap = true takes a turn of {turn:.6g}, but its values span "
+                f"{spanned:.6g}; say its unit (from = 'deg'), or the number at which it begins anew"
+            )
+        values = values.copy()
+        values[good] = np.unwrap(values[good], period=turn)
+    same = name == clocks.main and not entry.get("late", 0.0) and time is clock
     if same and "gap" not in entry:
         return values
     longest = float(entry["gap"]) if "gap" in entry else None
     return _resampled(time, own, values, longest=longest, hold=bool(entry.get("hold", False)))
 
 
-def _yaw(log: Log, names: list[str]) -> Vector:
-    """Yaw of a quaternion x, y, z, w that turns body into world axes."""
-    x, y, z, w = (log[name] for name in names)
+def apart(log: Log, column: str, clock: str, count: int) -> str:
+    """The sentence for a column whose clock has another length."""
+    return (
+        f"{log.name} has {log[column].size} values of {column!r}, but {count} times of its clock "
+        f"{clock!r}; name its own clock with time in [columns], or mend the file"
+    )
+
+
+def check_rising(log: Log, name: str, clock: Vector, twice: bool = False) -> None:
+    """Refuse a clock that goes back or, unless a time may be there twice, stands still.
+
+    Raises:
+        ScenarioError: with the row, and how often.
+    """
+    steps = np.diff(clock[np.isfinite(clock)])
+    bad = np.flatnonzero(steps < 0.0 if twice else steps <= 0.0)
+    if bad.size:
+        at = int(bad[0])
+        what = "stands still" if steps[at] == 0.0 else f"goes back by {-steps[at]:.6g}"
+        raise ScenarioError(
+            f"{log.name}: clock {name!r} {what} after row {at + 1}"
+            + (f", and so in {bad.size} places" if bad.size > 1 else "")
+            + "; leave out rows that are there twice and sort the others, or take the rows on one "
+            "side with samples"
+        )
+
+
+def _wraps(values: Vector, turn: float) -> bool:
+    """Whether values jump by more than a turn: they begin anew somewhere else."""
+    steps = np.abs(np.diff(values))
+    return bool(steps.size and np.max(steps) > TURNS * turn)
+
+
+def spikes(values: Vector, noise: float = 0.0) -> NDArray[np.bool_]:
+    """Single samples that stand out from both neighbours, which agree with each other.
+
+    A sample x_k is one if it lies on the same side of both neighbours by more than `SPIKE` times
+    the usual size s of
+
+        d_k = x_k - (x_k-1 + x_k+1) / 2,    s = median |d_k| / 0.6745
+
+    (and of sqrt(3/2) times the noise), and if the neighbours differ by less than a quarter of that.
+    Of white Gaussian noise, d has the deviation s, so that one sample in 1e9 (SPIKE = 6) passes the
+    first test; steps and ramps do not, whose neighbours differ.
+    """
+    found = np.zeros(values.shape, dtype=bool)
+    good = np.flatnonzero(np.isfinite(values))
+    if good.size < 3:
+        return found
+    x = values[good]
+    before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
+    bend = 0.5 * (before + after)
+    size = max(float(np.median(np.abs(bend))) / 0.6745, noise * np.sqrt(1.5))
+    least = np.minimum(np.abs(before), np.abs(after))
+    out = (before * after > 0.0) & (least > SPIKE * size)
+    out &= np.abs(after - before) < 0.25 * least
+    found[good[1:-1][out]] = True
+    return found
+
+
+SPIKE = 6.0
+
+
+def _yaw(log: Log, names: list[str], where: str) -> Vector:
+    """Yaw of a quaternion x, y, z, w that turns body into world axes, normalised.
+
+    Raises:
+        ScenarioError: lengths that are neither 1 nor all the same.
+    """
+    parts = np.stack([log[name] for name in names])
+    length = np.sqrt(np.sum(parts**2, axis=0))
+    length = np.where(length > 0.0, length, np.nan)  # all zeros: nothing was measured
+    good = np.isfinite(length)
+    if good.any():
+        low, usual, high = (float(f(length[good])) for f in (np.min, np.median, np.max))
+        alike = high - low < SAME_LENGTH * usual
+        if not alike and max(high - 1.0, 1.0 - low) > UNIT_LENGTH:
+            raise ScenarioError(
+                f"{where}: {log.name} has quaternions of lengths {low:.4g} to {high:.4g}; they "
+                "must be 1, or all the same: name the columns in the order x, y, z, w, or mend "
+                "the log"
+            )
+    x, y, z, w = parts / length
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)))
 
 
 def _resampled(
     times: Vector, own: Vector, values: Vector, *, longest: float | None, hold: bool
 ) -> Vector:
-    """Values of another clock; NaN outside it and, unless held, where it has gaps.
+    """Values of another clock; NaN outside it and where it has gaps.
 
     Args:
         times: wanted.
         own, values: the column and its clock.
-        longest: gap that is bridged, `GAP` usual intervals if not given.
+        longest: gap that is bridged; `GAP` usual intervals if not given, and any if values are
+            held, as commands that are sent when they change.
         hold: take the last value before instead of interpolating.
     """
     good = np.isfinite(values) & np.isfinite(own)
@@ -163,8 +399,13 @@ def _resampled(
     if own.size < 2:
         return np.full(times.shape, np.nan)
     if hold:
-        place = np.searchsorted(own, times, side="right") - 1
-        return np.where(place >= 0, values[np.maximum(place, 0)], np.nan)
+        # a sample that comes after the main clock's by rounding belongs to it
+        clock = COINCIDENT * float(np.median(np.diff(own)))
+        place = np.searchsorted(own, times + clock, side="right") - 1
+        held = np.where(place >= 0, values[np.maximum(place, 0)], np.nan)
+        if longest is None:
+            return held
+        return np.where(times - own[np.maximum(place, 0)] > longest, np.nan, held)
     result = np.interp(times, own, values, left=np.nan, right=np.nan)
     place = np.clip(np.searchsorted(own, times), 1, own.size - 1)
     if longest is None:

@@ -23,6 +23,7 @@ from ..spec.hints import NO_HINTS, from_json
 from ..system.provider import Provider
 from ..system.system import System
 from ..system.toml import SystemFile
+from .checks.finding import NO_SOURCE, Source
 from .model import Model
 from .parts import Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
 
@@ -47,6 +48,7 @@ class Problem:
         late: parameters of single runs that are held until `nuisance.released` estimates them.
         far: whether all residuals count in full, since nearly all are large (see `unstable`).
         further: give runs of the data set that need another system; read when they are asked for.
+        source: where the data come from, for their checks.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Problem:
     late: Sequence[Parameter] = ()
     far: bool = False
     further: Sequence[Callable[[], Problem]] = ()
+    source: Source = NO_SOURCE
 
     def __post_init__(self) -> None:
         for name in ("parameters", "channels", "runs", "relative", "late", "further"):

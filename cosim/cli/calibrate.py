@@ -15,9 +15,10 @@ from ..files import make_folder, write_text
 from .streams import print_json
 
 if TYPE_CHECKING:
+    from ..calibrate.checks.finding import Finding
     from ..calibrate.estimate import Estimate
+    from ..calibrate.problem import Problem
     from ..calibrate.sensitivity import Correlation
-    from ..calibrate.validate import Finding
 
 
 def calibrate_command(
@@ -41,23 +42,20 @@ def calibrate_command(
 
     Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
+    from ..calibrate.checks.examine import examine
+    from ..calibrate.checks.finding import passed
+    from ..calibrate.checks.late import check_late
     from ..calibrate.fit import fit
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
-    from ..calibrate.validate import check_data, check_model
 
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system)
     simulator = Simulator(problem, workers=workers)
-    findings = check_data(problem)
-    if not any(f.severity == "error" for f in findings):
-        findings += check_model(simulator)
-    for finding in findings:
-        typer.echo(str(finding), err=True)
-    if any(f.severity == "error" for f in findings):
-        raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
+    findings = _usable(problem, examine(simulator))
     estimate = fit(simulator)
+    findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
     correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
     content["wall_s"] = time.perf_counter() - started
@@ -71,6 +69,21 @@ def calibrate_command(
         print_json(content)
     else:
         _print(content)
+
+
+def _usable(problem: Problem, findings: list[Finding]) -> list[Finding]:
+    """Say what was found.
+
+    Raises:
+        InputError: it stops the work.
+    """
+    from ..calibrate.checks.finding import lines
+
+    for line in lines(findings):
+        typer.echo(line, err=True)
+    if any(f.severity == "error" for f in findings):
+        raise InputError(f"{problem.name}: the data cannot be used; see the findings above")
+    return findings
 
 
 def calibration_table(

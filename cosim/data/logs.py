@@ -2,16 +2,14 @@
 
 A data set is a folder with `set.toml` (rig, sheet, runs with file and purpose) and, beside it or
 up to two folders above, the rig sheet that it names, which gives the columns' units and noise.
-Plain CSV, Parquet and npz files are logs too; CSV heads such as `speed [rad/s]` carry units.
+Plain tables of text, Parquet, npz and MATLAB files are logs, too.
 """
 
 from __future__ import annotations
 
-import csv
-import re
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +18,16 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import is_file, read_toml
-from ..reading.limits import DATA
-from .matlab import read_matlab
-from .npz import read_npz
-from .parquet import read_table
+from .arrays import matlab_table, npz_table, parquet_table
+from .cells import Gaps
+from .text import text_table
 
 Vector = NDArray[np.float64]
-_CELL = 8
-"""Bytes of memory per byte of a CSV file: seven digits are a text of 56 and a pointer."""
-_TRUTH = {"true": 1.0, "True": 1.0, "TRUE": 1.0, "false": 0.0, "False": 0.0, "FALSE": 0.0}
-_INTEGERS = 2.0**53
-"""From here on doubles skip integers."""
-_HEAD = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
+PURPOSES = ("identification", "validation")
+SET_KEYS = ("rig", "set", "sheet", "run", "sample_rate_hz", "columns", "description")
+RUN_KEYS = ("name", "file", "files", "purpose", "prefix", "rows", "interval", "each", "where",
+            "window", "samples")  # fmt: skip
+"""Keys of a run that mean something here; a mapping may ask for any other."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +40,11 @@ class Log:
         units: by column; "" where unknown.
         noise: standard deviation by column, where the rig sheet gives it.
         values: further entries of the run in `set.toml`, e.g. start values and purpose.
-        exact: columns that doubles do not carry: texts, which are in no other place, and integers
-            beyond 2^53.
+        gaps: cells without a number, of the columns that have such.
+        texts: the same of columns that hold text, which are no signals.
+        origins: what was taken off all values of a column so that the rest is exact.
+        notes: what was assumed in reading.
+        exact: values that doubles do not carry, as they are: texts, and integers beyond 2^53.
     """
 
     name: str
@@ -53,6 +52,10 @@ class Log:
     units: Mapping[str, str] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
+    gaps: Mapping[str, Gaps] = field(default_factory=dict)
+    texts: Mapping[str, Gaps] = field(default_factory=dict)
+    origins: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     exact: Mapping[str, list[Any]] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Vector:
@@ -60,11 +63,13 @@ class Log:
 
         Raises:
             UnknownNameError: with the nearest names.
+            ScenarioError: it holds text.
         """
-        if column not in self.columns and column in self.exact:
-            raise UnknownNameError(
-                f"{self.name}: column {column!r} holds texts such as {self.exact[column][0]!r}, "
-                "and numbers are needed"
+        if column in self.texts:
+            held = self.texts[column]
+            raise ScenarioError(
+                f"{self.name}: column {column!r} holds text: {held}; name another column, or write "
+                "numbers (and nothing, or N/A, where none was measured)"
             )
         if column not in self.columns:
             raise UnknownNameError(
@@ -78,123 +83,60 @@ class Log:
         return self["time"]
 
 
-Read = tuple[dict[str, Vector], dict[str, str], dict[str, list[Any]]]
-"""Columns, their units, and those that doubles do not carry."""
-
-
-def _csv(path: Path) -> Read:
-    if excess := DATA.excess(_CELL * path.stat().st_size):
-        raise ScenarioError(f"{path}: {excess}")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as handle:
-            rows = [row for row in csv.reader(handle) if row and not row[0].startswith("#")]
-    except (csv.Error, UnicodeError) as error:
-        raise ScenarioError(
-            f"{path}: is not a table of text ({error}); save it as CSV in UTF-8"
-        ) from error
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
-    if not rows:
-        raise ScenarioError(f"{path}: is empty")
-    units, names = {}, []
-    for head in rows[0]:
-        match = _HEAD.fullmatch(head.strip())
-        name = match["name"] if match else head.strip()
-        names.append(name)
-        units[name] = match["unit"] if match else ""
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ScenarioError(f"{path}: has two columns {twice!r}; rename one of them")
-    columns: dict[str, Vector] = {}
-    exact: dict[str, list[Any]] = {}
-    for index, name in enumerate(names):
-        texts = [row[index].strip() if index < len(row) else "" for row in rows[1:]]
-        if any(texts) and all(text in _TRUTH for text in texts):
-            columns[name] = np.array([_TRUTH[text] for text in texts])
-            continue
-        try:
-            columns[name] = np.array([float(text) if text else np.nan for text in texts])
-        except ValueError:
-            exact[name] = texts
-            continue
-        if np.any(np.abs(columns[name]) >= _INTEGERS):
-            with suppress(ValueError):  # they are no integers
-                exact[name] = [int(text) for text in texts]
-    return columns, units, exact
-
-
-def _parquet(path: Path) -> Read:
-    import pyarrow as pa
-
-    table = read_table(path)
-    columns, units = {}, {}
-    exact: dict[str, list[Any]] = {}
-    for item in table.schema:
-        number = pa.types.is_floating(item.type) or pa.types.is_integer(item.type)
-        whole = not table[item.name].null_count
-        if number or (pa.types.is_boolean(item.type) and whole):
-            columns[item.name] = table[item.name].to_numpy().astype(np.float64)
-            units[item.name] = (item.metadata or {}).get(b"unit", b"").decode(errors="replace")
-        if whole and (
-            pa.types.is_string(item.type)
-            or pa.types.is_binary(item.type)
-            or (pa.types.is_integer(item.type) and np.any(np.abs(columns[item.name]) >= _INTEGERS))
-        ):
-            exact[item.name] = table[item.name].to_pylist()
-    return columns, units, exact
-
-
-def _split(name: str, values: Vector) -> dict[str, Vector]:
-    """A column, or the columns `name_1`, `name_2` of a table with one row per sample."""
-    if values.ndim == 1:
-        return {name: values}
-    if values.ndim == 2:
-        return {f"{name}_{i}": column for i, column in enumerate(values.T, 1)}
-    return {}
-
-
-def _numbers(arrays: Mapping[str, NDArray[Any]], path: Path) -> dict[str, Vector]:
-    """Arrays of numbers as columns.
-
-    Raises:
-        ScenarioError: two of one name.
-    """
-    columns: dict[str, Vector] = {}
-    for name, array in arrays.items():
-        if array.dtype.kind not in "fiub":
-            continue
-        for one, values in _split(name, array.astype(np.float64)).items():
-            if one in columns:
-                raise ScenarioError(f"{path}: has two columns {one!r}; rename one of the arrays")
-            columns[one] = values
-    return columns
-
-
-def _npz(path: Path) -> Read:
-    return _numbers(read_npz(path), path), {}, {}
-
-
-def _mat(path: Path) -> Read:
-    return _numbers(read_matlab(path), path), {}, {}
-
-
-_READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mat": _mat}
+_READERS = {
+    ".csv": text_table, ".tsv": text_table, ".txt": text_table,
+    ".parquet": parquet_table, ".npz": npz_table, ".mat": matlab_table,
+}  # fmt: skip
 
 
 def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log:
-    """Read a CSV, Parquet, npz or MATLAB file.
+    """Read a table of text, or a Parquet, npz or MATLAB file.
 
     Raises:
-        ScenarioError: missing or unreadable.
+        ScenarioError: missing, unreadable or too large.
     """
     path = Path(path)
     if not is_file(path):
-        raise ScenarioError(f"{path}: there is no such file")
-    reader = _READERS.get(path.suffix)
+        near = _beside(path)
+        beside = f"; in its folder {listing(near, path.name)}" if near else ""
+        raise ScenarioError(f"{path}: there is no such file{beside}")
+    reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise ScenarioError(f"{path}: logs are {', '.join(_READERS)} files")
-    columns, found, exact = reader(path)
-    return Log(path.name, columns, {**found, **(units or {})}, exact=exact)
+    table = reader(path)
+    return Log(
+        path.name, table.columns, {**table.units, **(units or {})}, gaps=table.gaps,
+        texts=table.texts, origins=table.origins, notes=tuple(table.notes), exact=table.exact,
+    )  # fmt: skip
+
+
+def _beside(path: Path) -> list[str]:
+    """Names of the files of the same kind in its folder."""
+    try:
+        return sorted(item.name for item in path.parent.iterdir() if item.suffix == path.suffix)
+    except (OSError, ValueError):  # nor is there such a folder
+        return []
+
+
+def joined(name: str, logs: Mapping[str, Log]) -> Log:
+    """Several files of one run, each on its own clock, as one log with columns `FILE.COLUMN`.
+
+    What was taken off large time stamps to keep them exact is made the same in all.
+    """
+    parts: dict[str, Any] = {
+        of: {} for of in ("columns", "units", "gaps", "texts", "origins", "exact")
+    }
+    known = [origin for log in logs.values() for origin in log.origins.values()]
+    common = min(known, default=0)
+    notes: list[str] = []
+    for key, log in logs.items():
+        notes += [f"{key}: {note}" for note in log.notes]
+        for of, found in parts.items():
+            found.update({f"{key}.{column}": item for column, item in getattr(log, of).items()})
+        for column, origin in log.origins.items():
+            parts["columns"][f"{key}.{column}"] = log.columns[column] + float(origin - common)
+            parts["origins"][f"{key}.{column}"] = common
+    return Log(name, noise={}, values={}, notes=tuple(notes), **parts)
 
 
 @dataclass(frozen=True)
@@ -203,13 +145,13 @@ class LoggedRun:
 
     Attributes:
         name: of the run.
-        file: path of its log.
+        files: paths of its logs by name; a single one is named "".
         purpose: identification or validation.
         values: all entries, e.g. start values.
     """
 
     name: str
-    file: Path
+    files: Mapping[str, Path]
     purpose: str
     values: Mapping[str, Any]
 
@@ -224,6 +166,8 @@ class DataSet:
         runs: by name.
         sheet: content of the rig sheet.
         units, noise: of the columns, from the sheet.
+        rate: samples per second, where `set.toml` says so.
+        listed: columns of the set, where `set.toml` says so.
     """
 
     folder: Path
@@ -233,6 +177,8 @@ class DataSet:
     sheet: Mapping[str, Any]
     units: Mapping[str, str]
     noise: Mapping[str, float]
+    rate: float | None = None
+    listed: tuple[str, ...] = ()
 
     def log(self, run: str) -> Log:
         """Read a run.
@@ -244,9 +190,13 @@ class DataSet:
         if run not in self.runs:
             raise UnknownNameError(f"data set {self.name}: {listing(self.runs, run)} as run")
         entry = self.runs[run]
+        name = f"{self.name}/{run}"
         with within(f"{self.folder / 'set.toml'}: run {run}"):
-            log = read_log(entry.file, units=self.units)
-        return replace(log, name=f"{self.name}/{run}", noise=self.noise, values=entry.values)
+            if "" in entry.files:
+                log = read_log(entry.files[""], units=self.units)
+            else:
+                log = joined(name, {key: read_log(file) for key, file in entry.files.items()})
+        return replace(log, name=name, noise=self.noise, values=entry.values)
 
 
 def _sheet(folder: Path, name: str) -> dict[str, Any]:
@@ -258,35 +208,103 @@ def _sheet(folder: Path, name: str) -> dict[str, Any]:
     )
 
 
-def read_data_set(folder: Path | str) -> DataSet:
+def misspelt(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    """Refuse a key that stands where one of the known ones is missing and looks like it.
+
+    Raises:
+        ScenarioError: with what it was probably meant to be.
+    """
+    missing = [key for key in known if key not in table]
+    for key in table:
+        if key not in known and (near := get_close_matches(key, missing, n=1, cutoff=0.75)):
+            raise ScenarioError(f"{where}: has {key!r}; did you mean {near[0]!r}?")
+
+
+def runs_of(
+    entries: Any, folder: Path, where: str, used: Iterable[str] = ()
+) -> dict[str, LoggedRun]:
+    """The runs that a list of tables describes.
+
+    Args:
+        entries: `[[run]]` of a file.
+        folder: against which paths are taken.
+        where: the file, for texts.
+        used: further keys that a mapping asks for.
+
+    Raises:
+        ScenarioError: an entry is incomplete or wrong.
+    """
+    found: dict[str, LoggedRun] = {}
+    if not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
+        raise ScenarioError(f"{where}: run is not a list of tables; begin each with [[run]]")
+    for number, entry in enumerate(entries, 1):
+        name = entry.get("name", "")
+        place = f"{where}: run {name!r}" if name else f"{where}: the {number}. run"
+        if not isinstance(name, str):
+            raise ScenarioError(f"{place}: its name must be a text in quotes")
+        misspelt(entry, {*RUN_KEYS, *used}, place)
+        lacking = next((key for key in ("name", "purpose") if key not in entry), "")
+        if not {"file", "files"} & set(entry):
+            lacking = "file"
+        if lacking:
+            raise ScenarioError(f"{place} lacks {lacking!r}; {listing(entry, lacking)}")
+        if name in found:
+            raise ScenarioError(f"{place} is there twice; give each run a name of its own")
+        purpose = entry["purpose"]
+        if purpose not in PURPOSES:
+            raise ScenarioError(
+                f"{place}: its purpose {purpose!r} is not known; {listing(PURPOSES, str(purpose))}"
+            )
+        files = entry.get("files", {"": entry.get("file")})
+        if not isinstance(files, dict) or not all(isinstance(f, str) for f in files.values()):
+            raise ScenarioError(
+                f"{place}: its files must be names = paths, e.g. file = 'a.csv' or "
+                "files = { command = 'a.csv', pose = 'b.csv' }"
+            )
+        if "file" in entry and "files" in entry:
+            raise ScenarioError(f"{place}: file and files exclude each other; give one of them")
+        paths = {str(key): folder / file for key, file in files.items()}
+        found[name] = LoggedRun(name, paths, purpose, dict(entry))
+    return found
+
+
+def read_data_set(folder: Path | str, used: Iterable[str] = ()) -> DataSet:
     """Read a data set's description; the logs are read when asked for.
+
+    Args:
+        folder: with `set.toml`.
+        used: entries of runs that are asked for elsewhere.
 
     Raises:
         ScenarioError: `set.toml` or the sheet is missing or wrong.
     """
     folder = Path(folder)
-    table = read_toml(folder / "set.toml")
+    path = folder / "set.toml"
+    table = read_toml(path)
+    misspelt(table, SET_KEYS, str(path))
     sheet = _sheet(folder, str(table["sheet"])) if "sheet" in table else {}
+    runs = runs_of(table.get("run", []), folder, str(path), used)
     try:
-        runs = {
-            entry["name"]: LoggedRun(
-                entry["name"], folder / entry["file"], entry.get("purpose", ""), dict(entry)
-            )
-            for entry in table.get("run", [])
-        }
         signals = sheet.get("signal", [])
         units = {entry["name"]: entry.get("unit", "") for entry in signals}
         noise = {entry["name"]: float(entry.get("noise_sigma", 0.0)) for entry in signals}
-        if not all(isinstance(name, str) for name in (*runs, *units, *units.values())):
+        rate = float(table["sample_rate_hz"]) if "sample_rate_hz" in table else None
+        listed = tuple(map(str, table.get("columns", [])))
+        if not all(isinstance(name, str) for name in (*units, *units.values())):
             raise TypeError("a name or unit is no text")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ScenarioError(f"{folder / 'set.toml'}: an entry is incomplete ({error})") from error
+        raise ScenarioError(
+            f"{path}: an entry of it or of its sheet is wrong ({error!r}); a signal has a name, "
+            "a unit and a noise_sigma"
+        ) from error
     return DataSet(
         folder,
-        table.get("set", folder.name),
-        table.get("rig", ""),
+        str(table.get("set", folder.name)),
+        str(table.get("rig", "")),
         runs,
         sheet,
         units,
         noise,
+        rate,
+        listed,
     )

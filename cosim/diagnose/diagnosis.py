@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from ..calibrate.checks.examine import check_data, examine
+from ..calibrate.checks.finding import Finding, lines, passed
+from ..calibrate.checks.late import check_late
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..calibrate.validate import Finding, check_data, check_model
 from ..errors import CosimError, ScenarioError
 from ..files import atomic
 from ..system.provider import locate
@@ -244,36 +246,44 @@ def diagnose(
     """
     begun = time.perf_counter()
     simulator = Simulator(problem, workers=workers)
-    findings = check_data(problem)
-    if not any(f.severity == "error" for f in findings):
-        findings += check_model(simulator)
-    errors = [str(f) for f in findings if f.severity == "error"]
-    if errors:
-        result = Diagnosis(problem, "bad_data", "; ".join(errors))
-        result.warnings = [str(f) for f in findings if f.severity != "error"]
-        result.wall = time.perf_counter() - begun
-        return result
+    findings = examine(simulator)
+    if any(f.severity == "error" for f in findings):
+        return _refused(problem, findings, begun)
     search = Search(simulator, say)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
         with threadpool_limits(1, user_api="blas"):
-            return _searched(search, findings, out, say, begun)
+            base = search.calibrated()
+            late = passed(check_late(base.estimate), problem.source.allow)
+            findings += late
+            if any(f.severity == "error" for f in late):
+                return _refused(problem, findings, begun)
+            return _searched(search, base, findings, out, say, begun)
     finally:
         search.close()
 
 
+def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
+    """The verdict on data that cannot be used."""
+    errors = lines(f for f in findings if f.severity == "error")
+    result = Diagnosis(problem, "bad_data", "; ".join(errors))
+    result.warnings = lines(f for f in findings if f.severity != "error")
+    result.wall = time.perf_counter() - begun
+    return result
+
+
 def _searched(
     search: Search,
+    base: Fitted,
     findings: list[Finding],
     out: Path | None,
     say: Callable[[str], None],
     begun: float,
 ) -> Diagnosis:
     problem = search.raw
-    base = search.calibrated()
     result = Diagnosis(problem, "", "", search, base)
-    result.warnings = [str(f) for f in findings]
+    result.warnings = lines(findings)
     current = base
     winners: list[Round] = []
     for number in range(ROUNDS):
@@ -447,7 +457,8 @@ def _look_further(result: Diagnosis) -> None:
             if not problem.runs:
                 continue
             result.search.say(f"further runs: {', '.join(run.name for run in problem.runs)}")
-            wrong = [f for f in check_data(problem) if f.run and f.severity == "error"]
+            found = passed(check_data(problem), problem.source.allow)
+            wrong = [f for f in found if f.run and f.severity == "error"]
             if wrong:
                 raise ScenarioError("; ".join(map(str, wrong)))
             simulator = Simulator(problem, workers=result.search.simulator.workers)

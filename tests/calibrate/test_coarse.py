@@ -40,7 +40,10 @@ def test_unknown_names_in_search_parameters_are_refused(short: Problem) -> None:
 @pytest.mark.parametrize(
     ("lines", "text"),
     [
-        ("ticks = true\nsearch_step = 2e-3\n[search.option]\nextrapolation = 1", "no other keys"),
+        (
+            "ticks = true\nsearch_step = 2e-3\n[search.option]\nextrapolation = 1",
+            "has no key 'option'",
+        ),
         ("search_step = 2e-3\n[search.options]\nextrapolation = 1", "ticks = true"),
         ("ticks = true\n[search.options]\nextrapolation = 1", "search_step other than step"),
     ],
@@ -53,7 +56,7 @@ step = 1e-3
 [inputs]
 "motor.w_ref" = "command"
 [channels.current]
-signal = "motor.i_meas"
+signal = "motor.i_measured"
 sigma = 0.1
 unit = "A"
 [[parameter]]

@@ -9,7 +9,7 @@ import pytest
 from scipy.io import savemat
 
 from cosim.calibrate import Problem, read_problem
-from cosim.calibrate.mapping import snapped
+from cosim.calibrate.joining import snapped
 from cosim.errors import ScenarioError
 from tests.problems import simulator
 
@@ -86,7 +86,11 @@ def test_other_clocks_scales_and_signs(
 
 
 def test_faults_of_a_mapping_are_named(tmp_path: Path) -> None:
-    (tmp_path / "dataset.toml").write_text('system = "motor_bench"\nstep = 1e-3\n')
+    text = 'system = "motor_bench"\nstep = 1e-3\n'
+    (tmp_path / "dataset.toml").write_text(text)
+    with pytest.raises(ScenarioError, match="lacks 'channels'; there is system, step"):
+        read_problem(tmp_path)
+    (tmp_path / "dataset.toml").write_text(text + '[channels.w]\nsignal = "load.w"\n')
     with pytest.raises(ScenarioError, match="lists no runs"):
         read_problem(tmp_path)
     text = MAPPING.replace("SUFFIX", "npz").replace('source = "i_mA"', 'sorce = "i_mA"')

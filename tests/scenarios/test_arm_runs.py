@@ -36,6 +36,7 @@ def data_set(folder: Path, swing: float) -> Path:
     (folder / "mobile_manipulator.toml").write_bytes(sheet.read_bytes())
     (folder / "set.toml").write_text(
         'rig = "mobile_manipulator"\nset = "arm"\nsheet = "mobile_manipulator.toml"\n'
+        f"columns = {list(table)}\n"
         '[[run]]\nname = "A"\nfile = "run.csv"\npurpose = "identification"\n'
         f"arm_moves = {str(swing != 0.0).lower()}\n"
     )

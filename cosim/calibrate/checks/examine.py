@@ -1,0 +1,94 @@
+"""All checks in their order: what is wrong with a data set, before anything is fitted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import CosimError
+from .copies import check_copies
+from .finding import Finding, passed
+from .gaps import check_gaps
+from .lags import check_lags
+from .scale import check_scale
+from .smooth import check_smooth
+from .spiking import check_spikes
+from .starts import check_starts
+from .still import check_still
+from .swaps import check_channels, check_inputs
+from .times import check_times
+from .wraps import check_wraps
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+    from ..simulator import Simulator
+
+Vector = NDArray[np.float64]
+OF_ANOTHER = {"smoothed", "held"}
+"""Errors that another column under this name brings, which the model tells."""
+
+
+def examine(simulator: Simulator) -> list[Finding]:
+    """All problems of a data set; against the model only where the logs themselves are in order.
+
+    Errors that the mapping allows are warnings.
+    """
+    problem = simulator.problem
+    allow = problem.source.allow
+    findings = passed(check_data(problem), allow)
+    if {f.kind for f in findings if f.severity == "error"} <= OF_ANOTHER:
+        against = passed(check_model(simulator), allow)
+        other = {
+            name for f in against if f.severity == "error" and f.kind in ("swapped", "unit")
+            for name in f.column.split(" and ")
+        }  # fmt: skip
+        findings = [f for f in findings if f.kind not in OF_ANOTHER or f.column not in other]
+        findings += against
+    return findings
+
+
+def check_data(problem: Problem) -> list[Finding]:
+    """Problems of the logs alone."""
+    found = list(problem.source.findings)
+    if not problem.chosen("identification"):
+        found.append(Finding("error", "purpose", "", "", "no run is for identification"))
+    for check in (check_times, check_still, check_gaps, check_copies, check_smooth):
+        found += check(problem)
+    return found
+
+
+def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Finding]:
+    """Problems that show against the model (at nominal values if `theta` is not given).
+
+    Wrong parameters look like a shifted clock, too, so at nominal values that must be more evident.
+    """
+    problem = simulator.problem
+    evident = 100.0 if theta is None else 4.0
+    theta = problem.nominal if theta is None else theta
+    found: list[Finding] = []
+    try:
+        problem.system()
+        models = dict(
+            zip(
+                [run.name for run in problem.runs],
+                simulator.spread(lambda run: simulator.simulate(theta, run), problem.runs),
+                strict=True,
+            )
+        )
+    except CosimError as error:
+        return [Finding("error", "simulation", "", "", f"the model does not run: {error}")]
+    found += check_spikes(problem, models)
+    found += check_wraps(problem, models)
+    for index in range(len(problem.channels)):
+        found += check_scale(problem, models, index)
+    swaps = list(check_channels(problem, models, {f.column for f in found if not f.run}))
+    # exchanged columns of two sides have the other sign where the sides move against each other
+    pairs = {name for f in swaps for name in f.column.split(" and ")}
+    found = [f for f in found if f.run or f.column not in pairs] + swaps
+    found += check_lags(problem, models, evident)
+    found += check_inputs(simulator, models, theta)
+    if not any(f.severity == "error" for f in found):
+        found += check_starts(simulator, models)
+    return found

@@ -1,0 +1,112 @@
+"""Columns in another unit, or with the sign turned round, against the model at nominal values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parts import MeasuredRun
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+Vector = NDArray[np.float64]
+FOLLOWS = 0.9
+"""Correlation from which a column counts as following a signal."""
+STRANGE = 8.0
+"""A column that is so many times too large is no measurement of the signal. By less, it may be
+what the model lacks, unless the factor is one of those below: cold grease triples a current."""
+FORETOLD = 0.2
+"""Share of a column's power by which the model may miss it and still foretell its sign."""
+FACTORS = {
+    "degrees instead of radians": 180.0 / np.pi,
+    "radians instead of degrees": np.pi / 180.0,
+    "rpm instead of rad/s": 30.0 / np.pi,
+    "rad/s instead of rpm": np.pi / 30.0,
+    "thousandths of the unit": 1e3,
+    "a thousand times the unit": 1e-3,
+    "hundredths of the unit": 1e2,
+    "a hundred times the unit": 1e-2,
+    "turns instead of radians": 0.5 / np.pi,
+    "radians instead of turns": 2.0 * np.pi,
+}
+
+
+def _centred(problem: Problem, models: Mapping[str, Vector], data: int, model: int,
+             run: MeasuredRun) -> tuple[Vector, Vector]:  # fmt: skip
+    measured, simulated = run.data[:, data], models[run.name][:, model]
+    good = np.isfinite(measured) & np.isfinite(simulated)
+    measured, simulated = measured[good], simulated[good]
+    if not measured.size:
+        return measured, simulated
+    return measured - measured.mean(), simulated - simulated.mean()
+
+
+def _follow(
+    problem: Problem, models: Mapping[str, Vector], index: int
+) -> dict[str, tuple[float, float]]:
+    """Slope and correlation of a column against its signal, for the runs in which it follows."""
+    sigma, found = problem.channels[index].sigma, {}
+    for run in problem.runs:
+        measured, simulated = _centred(problem, models, index, index, run)
+        power, noise = float(simulated @ simulated), float(measured @ measured)
+        if not measured.size or noise == 0.0 or np.std(simulated) < 5.0 * sigma:
+            continue
+        cross = float(measured @ simulated)
+        correlation = cross / float(np.sqrt(power * noise))
+        if abs(correlation) > FOLLOWS:
+            found[run.name] = (cross / power, correlation)
+    return found
+
+
+def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: str) -> bool:
+    """Whether the model foretells this column elsewhere, and this run's other columns.
+
+    A model that lacks something may turn the other way in one run: a base that pivots about another
+    wheel comes back on another side, and a pose in world axes follows the model mirrored. Only what
+    the model gets right everywhere else (to `FORETOLD` of its power, in the median) can be said to
+    be turned round here by the log and not by the machine.
+    """
+
+    def off(run: MeasuredRun, column: int) -> float:
+        measured, simulated = _centred(problem, models, column, column, run)
+        power = float(measured @ measured)
+        return float(np.sum((measured - simulated) ** 2)) / power if power > 0.0 else 0.0
+
+    here = [off(run, index) for run in problem.runs if run.name != name]
+    others = [off(problem.run(name), i) for i in range(len(problem.channels)) if i != index]
+    return all(not found or float(np.median(found)) < FORETOLD for found in (here, others))
+
+
+def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> Iterator[Finding]:
+    """Sign and size of a column in the runs in which it follows its signal.
+
+    With a correlation beyond `FOLLOWS` over hundreds of samples, sign and slope are not of chance;
+    what else turns or scales a column is the model's lack, which `_foretold` and `STRANGE` leave
+    room for.
+    """
+    channel = problem.channels[index]
+    follow = _follow(problem, models, index)
+    if not follow:
+        return
+    turned = [name for name, (slope, _) in follow.items() if slope < 0.0]
+    if len(turned) > len(follow) / 2 and len(follow) >= len(problem.runs) / 2:
+        text = f"follows {channel.signal} with the sign turned round"
+        yield Finding("error", "sign", "", channel.name, text)
+    else:
+        for name in turned:
+            if _foretold(problem, models, index, name):
+                text = f"follows {channel.signal} with the sign turned round in this run alone"
+                yield Finding("error", "sign", name, channel.name, text)
+    size = float(np.median([abs(slope) for slope, _ in follow.values()]))
+    if not 0.5 < size < 2.0:
+        near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
+        known = abs(np.log(size / FACTORS[near])) < 0.2
+        reason = f"the unit looks wrong: {near}" if known else "unit or scale look wrong"
+        text = f"is {size:.4g} times what the model has [{channel.unit}]; {reason}"
+        sure = known or not 1.0 / STRANGE < size < STRANGE
+        yield Finding("error" if sure else "warning", "unit", "", channel.name, text)

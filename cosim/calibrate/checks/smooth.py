@@ -1,0 +1,93 @@
+"""Columns without the noise that they are said to carry: low-passed, interpolated, or simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import comb
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .finding import Finding
+from .still import held
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+Vector = NDArray[np.float64]
+ORDER = 8
+"""Of the differences: they weigh the noise near half the sample rate, and no smooth motion."""
+ENOUGH = 200
+"""Samples that a run needs: the deviation of what is estimated is then below a tenth."""
+QUIET = 0.5
+"""Share of the stated noise below which a column is smoother than it can be."""
+FALLS = 0.6
+"""Ratio of the noise by differences of twice the order to that by `ORDER` below which it falls
+towards half the sample rate; of white noise, however small, it is 1."""
+LOUD = 2.0
+"""Times the stated noise from which a column carries more than it is said to."""
+
+
+def roughness(values: Vector, order: int) -> float:
+    """Deviation of white noise as differences of some order show it.
+
+        s = median |D^n x| / (0.6745 sqrt(C(2 n, n)))
+
+    Motion that a polynomial of degree n - 1 follows over n + 1 samples does not count, and by the
+    median, nor do steps and jolts: what is not noise can only add.
+    """
+    steps = np.diff(values, order)
+    return float(np.median(np.abs(steps))) / (0.6745 * float(np.sqrt(comb(2 * order, order))))
+
+
+def check_smooth(problem: Problem) -> Iterator[Finding]:
+    """Channels whose noise near half the sample rate is below what they are said to carry.
+
+    Noise of a sensor that is independent from sample to sample adds to whatever moves, so that
+    `roughness` over the stated deviation is 1 or more (0.87 to 1.2 over all runs of the rigs'
+    sheets, with and without undeclared effects; its own deviation is 1.2 / sqrt(n / ORDER)). Below
+    `QUIET`, in the median of the runs, the column was low-passed or interpolated after it was
+    measured, and what a fit does with it is wrong twice: its lag is taken for physics, and its
+    samples are not independent. A deviation that the mapping states may be a guess: then the noise
+    must fall towards half the sample rate as well, which white noise of any size does not.
+    Columns that the mapping itself filters or brings to another clock are not tested.
+    """
+    quiet: list[tuple[str, str, bool]] = []
+    count = 0
+    for index, channel in enumerate(problem.channels):
+        if channel.name in problem.source.made:
+            continue
+        sizes, falls = [], []
+        for run in problem.runs:
+            values = run.data[:, index]
+            values = values[np.isfinite(values)]
+            moving = values.size > ENOUGH and np.mean(np.diff(values) != 0.0) > 0.5
+            if not moving or held(values, channel.sigma):
+                continue
+            own, twice = roughness(values, ORDER), roughness(values, 2 * ORDER)
+            sizes.append(own / channel.sigma)
+            falls.append(twice / own if own > 0.0 else 0.0)
+        if not sizes:
+            continue
+        count += 1
+        size = float(np.median(sizes))
+        instrument = channel.name in problem.source.instruments
+        if size > LOUD and float(np.median(falls)) > 0.8:
+            text = (
+                f"carries {size:.3g} times its stated noise of {channel.sigma:.4g} {channel.unit}: "
+                "intervals come out too narrow, and noise may be taken for physics; state "
+                f"sigma = {size * channel.sigma:.3g}"
+            )
+            yield Finding("warning", "noise", "", channel.name, text)
+        if size < QUIET and (instrument or float(np.median(falls)) < FALLS):
+            text = (
+                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit} "
+                "near half the sample rate: it was low-passed or interpolated, or its noise is "
+                "another; take the raw column, or state its noise as sigma"
+            )
+            quiet.append((channel.name, text, instrument))
+    whole = len(quiet) == count
+    for name, text, instrument in quiet:
+        severity = "error" if instrument or whole else "warning"
+        yield Finding(severity, "smoothed", "", name, text)

@@ -1,0 +1,72 @@
+"""Single samples that stand out: lost bits, not motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..columns import spikes
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+Vector = NDArray[np.float64]
+NEAR = 3
+"""Samples before and after within which a jolt shows in another column."""
+SHOWS = 4.0
+"""Deviations by which it bends there."""
+
+
+def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
+    """Samples that stand out in the data (`columns.spikes`) and in what the model leaves of them.
+
+    Of white Gaussian noise a sample passes for one once in 1e9. A jolt of the machine may last one
+    sample, too (the impact at the end of a play), but it shows in another column within `NEAR`
+    samples, which a fault of the log does by chance in one of 800 cases per column (7 samples
+    beyond 4 deviations); so columns are named of whose spikes most are alone.
+    """
+    bends = {
+        (run.name, index): _bend(run.data[:, index], channel.sigma)
+        for run in problem.runs for index, channel in enumerate(problem.channels)
+    }  # fmt: skip
+    for index, channel in enumerate(problem.channels):
+        for run in problem.runs:
+            values = run.data[:, index]
+            found = spikes(values, channel.sigma)
+            if run.name in models:
+                found &= spikes(values - models[run.name][:, index], channel.sigma)
+            at = np.flatnonzero(found)
+            alone = [k for k in at if not _shows(bends, run.name, index, int(k))]
+            if not len(alone) > 0.5 * at.size:
+                continue
+            worst = at[int(np.argmax(np.abs(values[at] - values[at - 1])))]
+            text = (
+                f"has {at.size} single samples that stand out, the first at "
+                f"{run.times[at[0]]:.6g} s, the largest {values[worst]:.6g} {channel.unit} at "
+                f"{run.times[worst]:.6g} s between {values[worst - 1]:.6g} and "
+                f"{values[worst + 1]:.6g}: faults of the log; make gaps of them with "
+                "despike = true (or limit) in [columns]"
+            )
+            yield Finding("error", "spikes", run.name, channel.name, text)
+
+
+def _bend(values: Vector, sigma: float) -> Vector:
+    """How far samples are from the middle of their neighbours, over the deviation of that."""
+    bend = np.zeros(values.shape)
+    bend[1:-1] = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
+    bend[~np.isfinite(bend)] = 0.0
+    return bend / max(float(np.median(bend)) / 0.6745, sigma * float(np.sqrt(1.5)))
+
+
+def _shows(bends: Mapping[tuple[str, int], Vector], run: str, index: int, at: int) -> bool:
+    """Whether another column of the run bends at about this sample."""
+    span = slice(max(at - NEAR, 0), at + NEAR + 1)
+    return any(
+        float(np.max(bend[span])) > SHOWS
+        for (name, other), bend in bends.items()
+        if name == run and other != index
+    )

@@ -1,0 +1,92 @@
+"""Runs that begin where the model does not: in motion, or from a value that nobody stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import CosimError
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..simulator import Simulator
+
+Vector = NDArray[np.float64]
+FIRST = 5
+"""Samples at the beginning that count together."""
+OFF = 10.0
+"""Deviations of their mean from which a beginning is another one."""
+MOVES = 0.25
+"""Share of the way to the bounds by which the parameters are changed."""
+
+
+def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator[Finding]:
+    """Channels whose first samples are not where the model begins, and not always alike.
+
+    The mean of `FIRST` samples has the deviation sigma / sqrt(`FIRST`), so that `OFF` sigma are 22
+    of its deviations: noise does not do it. An offset of a sensor does, but the same in all runs,
+    so what all runs have in common does not count; and so does a channel that answers the inputs at
+    once, by its parameters, so what changes by a quarter of their bounds does not count either.
+    """
+    problem = simulator.problem
+    stated = {
+        run.name for run in problem.runs
+        if any(p.run == run.name for p in (*problem.parameters, *problem.late))
+    }  # fmt: skip
+    off: dict[str, Vector] = {}
+    for run in problem.runs:
+        size = min(FIRST, run.times.size)
+        with np.errstate(invalid="ignore"):
+            apart = run.data[:size] - models[run.name][:size]
+        counted = np.isfinite(apart).any(axis=0)
+        mean = np.full(apart.shape[1], np.nan)
+        mean[counted] = np.nanmean(apart[:, counted], axis=0)
+        off[run.name] = mean
+    common = np.nan_to_num(_median(np.stack(list(off.values())))) if len(off) > 2 else 0.0
+    for run in problem.runs:
+        far = np.abs(off[run.name] - common)
+        wrong = [
+            i for i in range(len(problem.channels))
+            if np.isfinite(far[i]) and far[i] > OFF * problem.channels[i].sigma
+        ]  # fmt: skip
+        if run.name in stated or not wrong:
+            continue
+        moved = _by_parameters(simulator, run.name, models[run.name])
+        wrong = [i for i in wrong if far[i] > OFF * (problem.channels[i].sigma + moved[i])]
+        if not wrong:
+            continue
+        names = ", ".join(
+            f"{problem.channels[i].name} {run.data[0, i]:.4g} instead of "
+            f"{models[run.name][0, i]:.4g} {problem.channels[i].unit}".rstrip()
+            for i in wrong
+        )
+        text = (
+            f"begins where the model does not ({names}): give what the system begins with in "
+            '[starts] ("first:COLUMN" = "VARIABLE"), or estimate it as a [[nuisance]] with '
+            "per_run = true, or begin with a sample at rest"
+        )
+        yield Finding("error", "start", run.name, "", text)
+
+
+def _median(values: Vector) -> Vector:
+    known = np.isfinite(values).any(axis=0)
+    found = np.full(values.shape[1], np.nan)
+    found[known] = np.nanmedian(values[:, known], axis=0)
+    return found
+
+
+def _by_parameters(simulator: Simulator, name: str, model: Vector) -> Vector:
+    """How far the parameters move the first samples."""
+    problem = simulator.problem
+    moved = np.zeros(model.shape[1])
+    for bound in (problem.lower, problem.upper):
+        theta = problem.nominal + MOVES * (bound - problem.nominal)
+        try:
+            other = simulator.simulate(theta, name)
+        except CosimError:  # what cannot be simulated there says nothing
+            continue
+        moved = np.maximum(moved, np.max(np.abs(other[:FIRST] - model[:FIRST]), axis=0))
+    return moved

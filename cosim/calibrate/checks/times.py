@@ -1,0 +1,101 @@
+"""Sample times: too few, going back, uneven, missing, or not at the stated rate and step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parts import COINCIDENT, MeasuredRun
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+Vector = NDArray[np.float64]
+SHORT = 50
+"""Fewer samples than this are no run."""
+GAP = 5.0
+"""Intervals longer than this many usual ones are worth a word."""
+UNEVEN = 0.2
+"""Deviation over the interval from which a clock jitters."""
+EVEN = 0.02
+"""Deviation over the interval below which it is even, but for rounding."""
+RATE = 1e-3
+"""Share by which a clock may differ from the stated rate: quartz keeps 1e-4, float32 rounds to 1e-7
+of the time."""
+
+
+def interval(times: Vector) -> float:
+    """Usual interval between samples: the mean of those that are even.
+
+    So neither rounding nor missing rows count; where most are uneven, only gaps do not.
+    """
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    even = np.abs(steps - usual) < EVEN * usual
+    counted = even if np.mean(even) > 0.5 else steps < GAP * usual
+    return float(np.mean(steps[counted])) if counted.any() else usual
+
+
+def check_times(problem: Problem) -> Iterator[Finding]:
+    """Faults of the clocks, run by run; none of these tests is of chance."""
+    for run in problem.runs:
+        yield from _run(problem, run)
+
+
+def _run(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:
+    steps = np.diff(run.times)
+    if run.times.size < SHORT:
+        text = f"has {run.times.size} samples; a run needs {SHORT} or more"
+        yield Finding("error", "short", run.name, "time", text)
+        return
+    if np.any(steps <= 0.0):
+        at = run.times[int(np.flatnonzero(steps <= 0.0)[0])]
+        text = f"does not increase after {at:.6g} s"
+        yield Finding("error", "clock", run.name, "time", text)
+        return
+    usual = float(np.median(steps))
+    if np.max(steps) > GAP * usual:
+        at = run.times[int(np.argmax(steps))]
+        text = f"has a gap of {np.max(steps):.4g} s after {at:.6g} s (interval {usual:.4g} s)"
+        yield Finding("warning", "gap", run.name, "time", text)
+    even = np.abs(steps - usual) < EVEN * usual
+    lost = np.rint(steps[~even] / usual) - 1.0
+    if np.mean(even) > 0.5 and np.any(lost > 0.0):
+        text = (
+            f"lacks {np.sum(lost[lost > 0.0]):.0f} rows in {np.count_nonzero(lost > 0.0)} places; "
+            "set values are held over up to five intervals"
+        )
+        yield Finding("warning", "gap", run.name, "time", text)
+    if np.std(steps) > UNEVEN * usual:
+        text = f"jitters: intervals {usual:.4g} s with a deviation of {np.std(steps):.2g} s"
+        yield Finding("warning", "jitter", run.name, "time", text)
+    yield from _stated(problem, run)
+
+
+def _stated(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:
+    """A clock against the rate of the data set, and against the communication step."""
+    mean = interval(run.times)
+    rate = problem.source.rate
+    if rate is not None and abs(mean * rate - 1.0) > RATE and problem.source.as_logged:
+        text = (
+            f"runs at {1.0 / mean:.6g} samples per second, but set.toml says "
+            f"{rate:.6g}: the clock is {abs(mean * rate - 1.0):.2%} "
+            f"{'fast' if mean * rate > 1.0 else 'slow'}, or the rate is another; mend the times "
+            "(scale in [columns]) or sample_rate_hz"
+        )
+        yield Finding("error", "rate", run.name, "time", text)
+        return
+    steps = np.diff(run.times)
+    count = mean / problem.step
+    near = max(round(count), 1)
+    even = float(np.std(steps)) < EVEN * mean
+    if problem.period is None and even and abs(count - near) > COINCIDENT * near:
+        text = (
+            f"has samples every {mean:.6g} s, which the communication step of {problem.step:g} s "
+            f"does not divide ({count:.4g} steps); take step = {mean / near:.6g}, or give period"
+        )
+        yield Finding("error", "step", run.name, "time", text)

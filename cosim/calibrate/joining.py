@@ -1,0 +1,441 @@
+"""Joins a mapping and a data set: channels, parameters and runs of a calibration problem."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.logs import Log
+from ..data.segments import relative_pose
+from ..data.signals import Table
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing
+from ..files import flatten
+from ..spec.units import Unit
+from ..system.provider import Provider
+from ..system.toml import SystemFile
+from .checks.finding import Finding, Source, check_allowed
+from .columns import ITEM, apart, expand
+from .mapped_logs import MappedLogs
+from .model import Model
+from .parts import COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .problem import Problem
+from .scales import known, per_second, scaled
+
+Vector = NDArray[np.float64]
+
+
+def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
+    """`"a.b"`, a list of such, or a table variable -> factor."""
+    if isinstance(entry, str):
+        return ((entry, 1.0),)
+    if isinstance(entry, list):
+        return tuple((str(item), 1.0) for item in entry)
+    if isinstance(entry, dict):
+        return tuple((name, float(factor)) for name, factor in flatten(entry).items())
+    raise ScenarioError(f"{where}: {entry!r} names no variables")
+
+
+def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+    match = ITEM.fullmatch(key)
+    if match is None or match["key"] not in values:
+        raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
+    value = values[match["key"]]
+    try:
+        return float(value[int(match["index"])] if match["index"] else value)
+    except (TypeError, ValueError, IndexError):
+        raise ScenarioError(
+            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{match['key']}[0]"
+        ) from None
+
+
+def snapped(times: Vector, step: float) -> Vector:
+    """Times on the grid of communication steps where they miss it by no more than rounding.
+
+    A set value whose time is a rounding error late would otherwise act one step late.
+    """
+    if times.size < 2:
+        return times
+    nearest = np.rint(times / step) * step
+    near = np.abs(times - nearest) <= COINCIDENT * float(np.median(np.diff(times)))
+    return np.asarray(np.where(near, nearest, times), dtype=np.float64)
+
+
+class Joined(MappedLogs):
+    """Makes a problem of a mapping and a data set (arguments as of `MappedLogs`)."""
+
+    def problem(self, file: SystemFile, provider: Provider) -> Problem:
+        """The problem, on a system."""
+        table = self.table
+        model = Model.of(file, provider)
+        self.system = model.plain({})
+        constants: dict[str, float] = {}
+        for name, value in flatten(table.get("parameters", {})).items():
+            if isinstance(value, list):
+                constants.update({f"{name}[{i}]": float(v) for i, v in enumerate(value, 1)})
+            else:
+                constants[name] = float(value)
+        fixed = self.data.sheet.get("fixed", {})
+        for key, entry in table.get("fixed", {}).items():
+            value = _lookup(fixed, key, f"{self.path}: [fixed]")
+            constants.update({name: factor * value for name, factor in
+                              _targets(entry, f"{self.path}: {key}")})  # fmt: skip
+        self.columns: dict[str, str] = {}
+        self.converted: dict[str, tuple[float, float]] = {}
+        self.told: set[str] = set()  # channels whose noise the mapping states
+        present = [
+            self.channel(one, {**entry, "signal": entry["signal"].replace("{}", str(i))})
+            for name, entry in table["channels"].items()
+            for i, one in enumerate(expand(name), 1)
+            if self._measured_somewhere(one, entry)
+        ]
+        if not present:
+            raise ScenarioError(f"{self.path}: no channel's column is in the logs")
+        stated = [*self.declared(), *self.others()]
+        check_parameters(stated)
+        parameters = [p for p in stated if not p.late]
+        return Problem(
+            self.data.name,
+            model,
+            parameters,
+            present,
+            [self.run(name, present) for name in self.logs],
+            float(table["step"]),
+            self.search(),
+            constants=constants,
+            algorithm=str(table.get("algorithm", "jacobi")),
+            period=float(table["period"]) if "period" in table else None,
+            ticks=bool(table.get("ticks", False)),
+            relative=[tuple(names) for names in self.table.get("relative", [])],
+            late=[p for p in stated if p.late],
+            source=self._source(present),
+        )
+
+    def _source(self, present: list[Channel]) -> Source:
+        """Where the data come from, for their checks."""
+        cut = any({"rows", "each"} & set(run.values) for run in self.data.runs.values())
+        return Source(
+            self.path,
+            tuple(self.findings),
+            check_allowed(self.table.get("checks", {}).get("allow", []), self.path),
+            self.data.rate,
+            as_logged="resample" not in self.table and not cut,
+            made=frozenset(c.name for c in present if self._made(self.columns[c.name])),
+            instruments=frozenset(
+                c.name for c in present
+                if self.columns[c.name] in self.noise and c.name not in self.told
+            ),
+        )  # fmt: skip
+
+    def _made(self, column: str) -> bool:
+        """Whether a column is filtered, or brought to another clock."""
+        for pattern, entry in self.table.get("columns", {}).items():
+            if column in expand(pattern):
+                other = entry.get("time", self.table.get("time", "time")) != self.table.get(
+                    "time", "time"
+                )
+                return other or bool({"lowpass", "derivative", "late", "hold"} & set(entry))
+        return "resample" in self.table
+
+    def _measured_somewhere(self, name: str, entry: Mapping[str, Any]) -> bool:
+        """Whether a channel's column is in a log; whether it may be absent.
+
+        Raises:
+            UnknownNameError: it is in none and nothing says that it need not be.
+            ScenarioError: it holds text.
+        """
+        column = str(entry.get("column", name))
+        without = [one for one, log in self.logs.items() if column not in log.columns]
+        for one in without:
+            if column in self.logs[one].texts:
+                self.logs[one][column]  # says so
+        if not without:
+            return True
+        unlisted = bool(self.data.listed) and column not in self.data.listed
+        if not (unlisted or entry.get("optional", False)):
+            log = self.logs[without[0]]
+            raise UnknownNameError(
+                f"{self.path}: channel {name}: {log.name} has no column {column!r}; "
+                f"{listing(log.columns, column)}; a channel that not every log has is "
+                "optional = true"
+            )
+        where = "any run" if len(without) == len(self.logs) else ", ".join(without)
+        text = f"is not compared: its column {column!r} is not in {where}"
+        self.findings.append(Finding("note", "absent", "", name, text))
+        return len(without) < len(self.logs)
+
+    def _unit(self, name: str, where: str) -> Unit | None:
+        """Unit of a variable of the system.
+
+        Raises:
+            UnknownNameError: there is none such.
+        """
+        try:
+            return self.system.variables(name)[1][0].unit
+        except UnknownNameError as error:
+            raise UnknownNameError(f"{where}: {error}") from None
+
+    def search(self) -> Coarse:
+        """How the system is run in a search."""
+        step, table = self.table.get("search_step"), self.table.get("search", {})
+        if table and (step is None or step == self.table["step"] or not self.table.get("ticks")):
+            raise ScenarioError(
+                f"{self.path}: [search] needs a search_step other than step = "
+                f"{self.table['step']} and ticks = true: its error is measured against these ticks"
+            )
+        parameters = {name: float(v) for name, v in flatten(table.get("parameters", {})).items()}
+        if step is None:
+            return Coarse(float(self.table["step"]))
+        return Coarse(float(step), table.get("options", {}), parameters)
+
+    def _column(self, channel: Channel) -> str:
+        return self.columns[channel.name]
+
+    def channel(self, name: str, entry: Mapping[str, Any]) -> Channel:
+        """One measured column."""
+        where = f"{self.path}: channel {name}"
+        column = str(entry.get("column", name))
+        self.columns[name] = column
+        own = self.units.get(column, "")
+        unit = str(entry.get("unit", own))
+        here = known(unit, where) if unit else None
+        measured = known(own, f"{where}: column {column}") if own and here else None
+        self.converted[name] = scaled(
+            measured, here, None, f"{where}: column {column}", "scale", ""
+        )
+        signal = self._unit(str(entry["signal"]), where)
+        if signal is not None and entry.get("transform") == "difference":
+            signal = per_second(signal.symbol)
+        gain, offset = scaled(
+            signal, here, entry.get("gain"), where, "gain",
+            f"convert the column in [columns], to unit = {signal.symbol if signal else ''!r}",
+        )  # fmt: skip
+        sigma = abs(self.converted[name][0]) * self.noise.get(column, 0.0)
+        sigma = float(entry.get("sigma", sigma))
+        if "sigma" in entry:
+            self.told.add(name)
+        rounding = float(entry.get("quantum", 0.0)) ** 2 / 12.0 * int(entry.get("roundings", 1))
+        sigma = math.sqrt(sigma**2 + rounding)
+        if not sigma > 0.0:
+            raise ScenarioError(f"{where}: its noise is not known; give sigma")
+        return Channel(
+            name,
+            unit,
+            sigma,
+            str(entry["signal"]),
+            gain,
+            offset + float(entry.get("offset", 0.0)),
+            str(entry.get("transform", "sample")),
+            float(entry.get("window", 0.0)),
+            float(entry.get("shift", 0.0)),
+        )
+
+    def declared(self) -> list[Parameter]:
+        """The sheet's parameters."""
+        sheet = self.data.sheet.get("parameter", {})
+        mapped = self.table.get("sheet", {})
+        found = []
+        for name, entry in sheet.items():
+            if name not in mapped:
+                raise ScenarioError(
+                    f"{self.path}: [sheet] says nothing about the sheet's parameter {name!r}"
+                )
+            where = f"{self.path}: [sheet] {name}"
+            targets = self._set(mapped[name], str(entry.get("unit", "")), where)
+            found.append(
+                Parameter(
+                    name, entry.get("unit", ""), float(entry["nominal"]), float(entry["min"]),
+                    float(entry["max"]), targets, text=entry.get("description", ""),
+                )
+            )  # fmt: skip
+        return found
+
+    def others(self) -> list[Parameter]:
+        """Parameters beyond the sheet's, and nuisance values, per run if they are."""
+        found = []
+        for role, key in (("declared", "parameter"), ("nuisance", "nuisance")):
+            for entry in self.table.get(key, []):
+                where = f"{self.path}: {key} {entry.get('name')}"
+                targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
+                runs = list(self.logs) if entry.get("per_run") else [""]
+                for run in runs:
+                    nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
+                    span = float(entry.get("span", 0.0))
+                    low = float(entry["min"]) if "min" in entry else nominal - span
+                    high = float(entry["max"]) if "max" in entry else nominal + span
+                    prior = float(entry["prior"]) if "prior" in entry else None
+                    name = f"{entry['name']}@{run}" if run else str(entry["name"])
+                    found.append(
+                        Parameter(
+                            name, entry.get("unit", ""), nominal, low, high, targets,
+                            role, run, prior, text=entry.get("description", ""),  # type: ignore[arg-type]
+                            late=bool(entry.get("late", False)),
+                        )
+                    )  # fmt: skip
+        return found
+
+    def _set(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
+        """Variables that a value in this unit sets, with the factors into theirs.
+
+        Those that the system lacks may belong to variants that a diagnosis tries.
+        """
+        found = []
+        source = known(unit, where) if unit else None
+        for name, factor in _targets(entry, where):
+            try:
+                wanted = self.system.variables(name)[1][0].unit
+            except UnknownNameError:
+                wanted = None
+            given = factor if isinstance(entry, Mapping) else None
+            way = f"state it in {wanted.symbol if wanted else ''!r}"
+            gain, offset = scaled(source, wanted, given, f"{where}: {name}", "its factor", way)
+            if offset:
+                raise UnitError(f"{where}: {name}: {unit!r} has another zero; {way}")
+            found.append((name, gain))
+        return tuple(found)
+
+    def value(self, entry: Any, run: str, where: str, unit: str = "") -> float:
+        """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
+
+        `begin:x` is an entry that tells when the log begins, for the simulation, which begins
+        before it by `lead`.
+        """
+        if isinstance(entry, (int, float)):
+            return float(entry)
+        if entry.startswith("begin:"):
+            begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
+            return begun - float(self.table.get("lead", 0.0))
+        if entry.startswith("first:"):
+            log = self.logs[run]
+            column = entry.removeprefix("first:")
+            values = log[column][log.time >= 0.0]
+            if not np.isfinite(values).any():
+                raise ScenarioError(f"{where}: {log.name} has no value of {column!r}")
+            own = self.units.get(column, "")
+            gain, offset = 1.0, 0.0
+            if own and unit:
+                gain, offset = scaled(
+                    known(own, where),
+                    known(unit, where),
+                    None,
+                    f"{where}: column {column}",
+                    "unit",
+                    "",
+                )
+            return float(values[np.isfinite(values)][0]) * gain + offset
+        return _lookup(self.logs[run].values, entry, where)
+
+    def run(self, name: str, channels: list[Channel]) -> MeasuredRun:
+        """One run."""
+        log = self.logs[name]
+        starts: dict[str, float] = {}
+        for key, entry in self.table.get("starts", {}).items():
+            where = f"{self.path}: [starts] {key}"
+            value = self.value(key, name, where)
+            first = key.startswith("first:")
+            own = self.units.get(key.removeprefix("first:"), "") if first else ""
+            starts.update({n: factor * value for n, factor in self._set(entry, own, where)})
+        lead = float(self.table.get("lead", 0.0))
+        during = log.time >= 0.0
+        data = np.column_stack([self._measured(log, c)[during] for c in channels])
+        anchor = 0
+        for triple in self.table.get("relative", []):
+            place = [[c.name for c in channels].index(one) for one in triple]
+            known = np.flatnonzero(np.isfinite(data[:, place]).all(axis=1))
+            if not known.size:
+                raise ScenarioError(f"{log.name}: {', '.join(triple)} are never measured together")
+            anchor = int(known[0])
+            data[:, place] = relative_pose(data[:, place], anchor)
+        return MeasuredRun(
+            name,
+            self.purposes[name],
+            log.time[during] + lead,
+            data,
+            {
+                one: signal
+                for target, entry in self.table.get("inputs", {}).items()
+                for one, signal in self._inputs(log, target, entry, lead).items()
+            },
+            starts,
+            log.values,
+            lead,
+            anchor,
+        )
+
+    def _measured(self, log: Log, channel: Channel) -> Vector:
+        column = self.columns[channel.name]
+        if column not in log.columns:
+            return np.full(log.time.shape, np.nan)
+        values = log[column]
+        if values.shape != log.time.shape:
+            raise ScenarioError(f"{self.path}: " + apart(log, column, "time", log.time.size))
+        gain, offset = self.converted[channel.name]
+        return values if (gain, offset) == (1.0, 0.0) else values * gain + offset
+
+    def _inputs(self, log: Log, target: str, entry: Any, lead: float) -> dict[str, Table]:
+        """The signals of an input, or of all elements of a vector input."""
+        if isinstance(entry, str):
+            entry = {"column": entry}
+        where = f"{self.path}: input {target}"
+        if "column" in entry:
+            return {target: self._input(log, target, str(entry["column"]), entry, lead)}
+        if "columns" not in entry:
+            raise ScenarioError(f"{where}: lacks 'column'; {listing(entry, 'column')}")
+        columns = entry["columns"]
+        names = expand(columns) if isinstance(columns, str) else list(columns)
+        return {f"{target}[{i}]": self._input(log, target, column, entry, lead)
+                for i, column in enumerate(names, 1)}  # fmt: skip
+
+    def _conversion(
+        self, target: str, column: str, entry: Mapping[str, Any]
+    ) -> tuple[float, float, str]:
+        """Gain and offset of a column that drives an input, and the unit of what they give."""
+        where = f"{self.path}: input {target}"
+        own, wanted = self.units.get(column, ""), self._unit(target, where)
+        unit, factor = str(entry.get("unit", "")), entry.get("gain")
+        source = known(own, f"{where}: column {column}") if own else None
+        if source is not None and entry.get("interpolation") == "slope":
+            source = per_second(own)
+        way = f"convert the column {column} in [columns]"
+        if unit:
+            return *scaled(source, known(unit, where), factor, where, "gain", way), unit
+        return *scaled(source, wanted, factor, where, "gain", way), ""
+
+    def _input(
+        self, log: Log, target: str, column: str, entry: Mapping[str, Any], lead: float
+    ) -> Table:
+        values = log[column]
+        good = np.isfinite(values)
+        times = log.time[good]
+        values = values[good]
+        if "quantum" in entry:  # a count with a little noise on top: the count is exact
+            quantum = float(entry["quantum"])
+            values = np.rint(values / quantum) * quantum
+        gain, offset, unit = self._conversion(target, column, entry)
+        values = values * gain + offset if offset else values * gain
+        times = snapped(times + lead, float(self.table["step"]))
+        how = str(entry.get("interpolation", "hold"))
+        if how == "slope":  # of the interval that begins
+            values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
+            before = 0.0
+        elif how == "window":  # mean over the interval that ends
+            values, how = np.append(values[1:], values[-1]), "hold"
+            before = float(values[0])
+        else:
+            before = float(values[0])
+        if times[0] > 0.0:
+            times, values = np.append(0.0, times), np.append(before, values)
+        if "period" in self.table:  # recorded points may pass the last sample
+            times = np.append(times, times[-1] + float(self.table["period"]))
+            values = np.append(values, values[-1])
+        return Table(
+            times,
+            values,
+            unit=unit,
+            interpolation=how,  # type: ignore[arg-type]
+            text=f"{log.name}:{column}",
+        )

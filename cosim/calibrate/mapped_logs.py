@@ -1,0 +1,155 @@
+"""The logs of a data set as a mapping takes them: chosen, taken apart, unbroken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data.logs import DataSet, Log, LoggedRun
+from ..data.segments import pieces, windows
+from ..errors import ScenarioError, listing
+from .checks.finding import Finding
+from .columns import apart, check_rising, expand, prepared
+from .parts import COINCIDENT
+from .schema import RUN, strict
+
+LONGEST = 5.0
+"""Intervals between samples longer than this many usual ones are gaps in the inputs."""
+
+
+class MappedLogs:
+    """Logs of a data set under a mapping.
+
+    Args:
+        path: of the mapping.
+        table: the mapping, its base included.
+        data: the data set.
+        only: entries that runs must have besides those of the mapping.
+
+    Attributes:
+        logs, purposes: by the names of runs, pieces and windows.
+        units: of the columns; "" or none where unknown.
+        noise: of the columns, from the rig's sheet.
+        findings: what was assumed, left out, or is lacking.
+
+    Raises:
+        ScenarioError, UnknownNameError, UnitError: mapping and logs do not fit.
+    """
+
+    def __init__(
+        self, path: Path, table: Mapping[str, Any], data: DataSet, only: Mapping[str, Any]
+    ) -> None:
+        self.path, self.data, self.table = path, data, table
+        self.findings: list[Finding] = []
+        self.noise = {
+            column: sigma for name, sigma in data.noise.items() for column in expand(name)
+        }
+        self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
+        self.logs: dict[str, Log] = {}
+        self.purposes: dict[str, str] = {}
+        lead = float(self.table.get("lead", 0.0))
+        for run in self._chosen({**self.table.get("only", {}), **only}):
+            strict(
+                {k: v for k, v in run.values.items() if k in RUN},
+                RUN,
+                f"{path}: run {run.name}",
+                (),
+            )
+            for name, part in pieces(data.log(run.name)):
+                log = prepared(part, self.table, self.path)
+                check_rising(log, "time", log.time)
+                self._count_gaps(name, log)
+                self.findings += [Finding("note", "reading", name, "", note) for note in log.notes]
+                self.units.update({column: unit for column, unit in log.units.items() if unit})
+                for one, window in windows(name, log, lead):
+                    self.logs[one], self.purposes[one] = self._unbroken(one, window), run.purpose
+
+    def _count_gaps(self, name: str, log: Log) -> None:
+        """Say how many cells hold no number, of the columns that are used."""
+        made = {
+            one: str(entry.get("source", one)).replace("{}", str(i))
+            for pattern, entry in self.table.get("columns", {}).items()
+            for i, one in enumerate(expand(pattern), 1)
+        }
+        channels = self.table["channels"].items()
+        used = [str(e.get("column", one)) for key, e in channels for one in expand(key)]
+        for column in dict.fromkeys([*used, *self.sources()]):
+            gaps = log.gaps.get(made.get(column, column))
+            if gaps is not None:
+                severity = "warning" if gaps.row else "note"
+                text = f"{gaps}: they are gaps"
+                self.findings.append(Finding(severity, "gaps", name, column, text))
+
+    def _chosen(self, wanted: Mapping[str, Any]) -> list[LoggedRun]:
+        """The runs with these entries."""
+        runs = list(self.data.runs.values())
+        for key in wanted:
+            if not any(key in run.values for run in runs):
+                has = sorted({name for run in runs for name in run.values})
+                raise ScenarioError(f"{self.path}: only: no run has {key!r}; {listing(has, key)}")
+        return [
+            run for run in runs
+            if all(run.values.get(key, value) == value for key, value in wanted.items())
+        ]  # fmt: skip
+
+    def sources(self) -> list[str]:
+        """Columns that drive inputs."""
+        found: list[str] = []
+        for entry in self.table.get("inputs", {}).values():
+            entry = {"column": entry} if isinstance(entry, str) else entry
+            if "column" in entry:
+                found.append(entry["column"])
+            elif "columns" in entry:
+                names = entry["columns"]
+                found += expand(names) if isinstance(names, str) else names
+        return found
+
+    def _unbroken(self, name: str, log: Log) -> Log:
+        """The log up to the first gap in what drives the system.
+
+        What the inputs were in a gap is not known, and with it where the system was after it.
+        """
+        time = log.time
+        usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+        longest = float(self.table.get("gap", LONGEST * usual))
+        until, reason = time.size, ""
+        for column in self.sources():
+            values = log[column]
+            if values.shape != time.shape:
+                raise ScenarioError(f"{self.path}: " + apart(log, column, "time", time.size))
+            good = np.flatnonzero(np.isfinite(values))
+            if not good.size:
+                raise ScenarioError(
+                    f"{log.name}: column {column!r} has no values, but drives an input; "
+                    f"{log.gaps.get(column, 'it is empty')}"
+                )
+            breaks = np.flatnonzero(np.diff(time[good]) > longest * (1.0 + COINCIDENT))
+            end = good[breaks[0]] + 1 if breaks.size else good[-1] + 1
+            if time[good[0]] - time[0] > longest:
+                raise ScenarioError(
+                    f"{log.name}: column {column!r} drives an input, but begins at "
+                    f"{time[good[0]]:.6g} s, {good[0]} rows after the clock; begin there with "
+                    "samples, or give the other columns' clock with time"
+                )
+            last = time[-1] - time[good[-1]]
+            if end < until and (breaks.size or last > longest):
+                until = int(end)
+                gap = time[good[breaks[0] + 1]] - time[good[breaks[0]]] if breaks.size else last
+                reason = f"{column} is not known for {gap:.4g} s after {time[end - 1]:.6g} s"
+        if until == time.size:
+            return log
+        lost = 1.0 - until / time.size
+        text = (
+            f"{reason}, so the run ends there ({lost:.0%} of it is not used); give the rest a run "
+            "of its own with samples and start values, or bridge such gaps with gap"
+        )
+        self.findings.append(Finding("warning", "gap", name, "time", text))
+        columns = {
+            one: values[:until] if values.shape == time.shape else values
+            for one, values in log.columns.items()
+        }
+        return replace(log, columns=columns)

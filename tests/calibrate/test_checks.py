@@ -1,0 +1,338 @@
+"""Each misleading data set gives a finding that names the column and the reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from cosim.calibrate import Problem
+from cosim.calibrate.checks.examine import check_data, check_model, examine
+from cosim.calibrate.checks.finding import NO_SOURCE, Finding, Source, lines
+from cosim.calibrate.checks.late import check_late
+from cosim.calibrate.checks.swaps import check_channels
+from cosim.calibrate.fit import Effort, fit
+from cosim.data.signals import Table
+from tests.problems import simulator
+
+
+def findings(problem: Problem) -> list[Finding]:
+    return check_data(problem) + check_model(simulator(problem))
+
+
+def changed(problem: Problem, column: str, function) -> Problem:
+    index = [c.name for c in problem.channels].index(column)
+    data = {}
+    for run in problem.runs:
+        values = run.data.copy()
+        values[:, index] = function(values[:, index])
+        data[run.name] = values
+    return problem.with_data(data)
+
+
+def freeze(values: np.ndarray) -> np.ndarray:
+    result = values.copy()
+    result[900:] = result[900]
+    return result
+
+
+def late(values: np.ndarray) -> np.ndarray:
+    return np.concatenate([np.full(40, values[0]), values[:-40]])
+
+
+def test_good_data_give_none(noisy, measured) -> None:
+    assert findings(noisy(0)) == []
+    assert findings(measured) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "function", "kind", "reason"),
+    [
+        ("speed", lambda x: x * 30 / np.pi, "unit", "rpm"),
+        ("voltage", lambda x: x * 1e3, "unit", "thousandths"),
+        ("angle", lambda x: np.degrees(x), "unit", "degrees"),
+        ("current", lambda x: -x, "sign", "sign turned round"),
+        ("voltage", freeze, "frozen", "frozen"),
+        ("current", lambda x: np.full_like(x, 1.5), "constant", "constant"),
+        ("angle", lambda x: np.full_like(x, np.nan), "empty", "no values"),
+    ],
+)
+def test_one_column(noisy, column, function, kind, reason) -> None:
+    found = findings(changed(noisy(0), column, function))
+    mine = [f for f in found if f.column == column and f.kind == kind]
+    assert mine, [str(f) for f in found]
+    assert any(reason in f.text for f in mine), [str(f) for f in mine]
+
+
+@pytest.mark.parametrize(
+    ("factor", "severity"), [(3.0, "warning"), (np.pi / 30, "error"), (20.0, "error")]
+)
+def test_a_factor_that_no_unit_explains_may_be_what_the_model_lacks(
+    noisy, factor: float, severity: str
+) -> None:
+    """Cold grease triples a current; neither rpm nor a factor of twenty is physics."""
+    found = findings(changed(noisy(0), "current", lambda x: factor * x))
+    assert [f.severity for f in found if (f.column, f.kind) == ("current", "unit")] == [severity]
+
+
+def test_late_column(noisy) -> None:
+    found = [f for f in findings(changed(noisy(0), "speed", late)) if f.kind == "clock"]
+    assert [f.column for f in found] == ["speed"]
+    seconds = float(found[0].text.partition("late by ")[2].split()[0])
+    # shifted by 40 ms; the nominal parameters make the speed up to some ms early or late
+    assert abs(seconds - 0.04) < 0.01
+
+
+def test_swapped_columns(noisy) -> None:
+    problem = noisy(0)
+    # two columns of one unit: the bench has them only if the voltage counts as a current
+    channels = [replace(c, unit="A") if c.name == "voltage" else c for c in problem.channels]
+    order = [0, 2, 1, 3]
+    data = {run.name: run.data[:, order] for run in problem.runs}
+    found = findings(problem.changed(channels=channels).with_data(data))
+    columns = {"current", "voltage"}
+    assert any(
+        f.kind in ("swapped", "unit") and set(f.column.split(" and ")) & columns for f in found
+    )
+
+
+@pytest.mark.parametrize("crossed", [True, False])
+def test_two_sides_that_carry_one_load(crossed: bool) -> None:
+    """What is common to both sides, and wrong in the model, hides an exchange from the misfit."""
+    times = np.linspace(0.0, 10.0, 500)
+    common, apart = 3.0 * np.sin(times), 0.5 * np.sin(3.0 * times)
+    left, right = common + apart, common - apart
+    data = np.column_stack([right, left] if crossed else [left, right])
+    run: Any = SimpleNamespace(name="A", data=data)
+    channels = [
+        SimpleNamespace(name=n, unit="A", sigma=0.05, signal=f"{n}.i") for n in ("left", "right")
+    ]
+    problem: Any = SimpleNamespace(runs=[run], channels=channels)
+    model = 0.5 * np.column_stack([left, right])
+    found = list(check_channels(problem, {"A": model}, set()))
+    assert [f.column for f in found] == (["left and right"] if crossed else [])
+    assert not crossed or "look swapped" in found[0].text
+
+
+def test_short_run_and_clock_that_goes_back(noisy) -> None:
+    problem = noisy(0)
+    first, second, third = problem.runs
+    times = second.times.copy()
+    times[500] = times[498]
+    runs = [
+        replace(first, times=first.times[:30], data=first.data[:30]),
+        replace(second, times=times),
+        third,
+    ]
+    found = check_data(problem.changed(runs=runs))
+    assert {(f.kind, f.run) for f in found} >= {("short", "sines"), ("clock", "stairs")}
+    assert all(f.column == "time" for f in found)
+
+
+def test_a_column_coarser_than_its_noise_may_rest(noisy) -> None:
+    """Rounding hides the noise of a machine at rest: no reason to call its sensor frozen."""
+    quantum = 1.0  # V, against a noise of some 0.1 V
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        result = quantum * np.round(values / quantum)
+        result[900:] = result[900]
+        return result
+
+    found = findings(changed(noisy(0), "voltage", rest))
+    mine = [f for f in found if f.column == "voltage" and f.kind == "frozen"]
+    assert mine
+    assert all(f.severity == "warning" and "resolution of 1" in f.text for f in mine)
+
+
+def test_a_machine_comes_back_to_rest(noisy) -> None:
+    """Noise that is absent at rest, twice at the same value: no frozen sensor."""
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        result = values.copy()
+        result[:200] = result[900:] = 0.0
+        return result
+
+    found = findings(changed(noisy(0), "speed", rest))
+    mine = [f for f in found if f.column == "speed" and f.kind == "frozen"]
+    assert mine
+    assert all(f.severity == "warning" and "as it does elsewhere" in f.text for f in mine)
+
+
+def test_all_problems_are_listed_at_once(noisy) -> None:
+    problem = changed(changed(noisy(0), "voltage", freeze), "current", lambda x: -x)
+    runs = [
+        replace(run, inputs={"motor.w_ref": Table(run.times, 0 * run.times, text="log:speed_set")})
+        if run.name == "check" else run
+        for run in problem.runs
+    ]  # fmt: skip
+    found = findings(problem.changed(runs=runs))
+    assert {"frozen", "sign", "constant"} <= {f.kind for f in found}
+    assert any(f.column == "speed_set" and f.run == "check" for f in found)
+
+
+def of_kind(problem: Problem, kind: str) -> list[Finding]:
+    return [f for f in examine(simulator(problem)) if f.kind == kind]
+
+
+def from_a_sheet(problem: Problem) -> Problem:
+    """The noise is that of the sensors, and not a guess."""
+    instruments = frozenset(channel.name for channel in problem.channels)
+    return problem.changed(source=Source(instruments=instruments, rate=1000.0))
+
+
+def in_all(problem: Problem, function) -> Problem:
+    """A change of all columns of all runs."""
+    columns = np.apply_along_axis
+    return problem.with_data({r.name: columns(function, 0, r.data) for r in problem.runs})
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_good_data_of_any_seed_give_none(noisy, seed: int) -> None:
+    """The tests' own chances are below 1e-5 for all of these samples (2e4 of four channels)."""
+    assert examine(simulator(from_a_sheet(noisy(seed)))) == []
+
+
+def lowpass(x: np.ndarray) -> np.ndarray:
+    return sosfiltfilt(butter(2, 100.0, fs=1e3, output="sos"), x)
+
+
+def mean_of_three(x: np.ndarray) -> np.ndarray:
+    return np.convolve(np.pad(x, 1, "edge"), np.ones(3) / 3.0, "valid")
+
+
+def interpolated(x: np.ndarray) -> np.ndarray:
+    places = np.arange(x.size)
+    return np.interp(places, places[::4], x[::4])
+
+
+@pytest.mark.parametrize("function", [lowpass, mean_of_three, interpolated])
+def test_columns_without_their_noise(noisy, function) -> None:
+    problem = noisy(0)
+    smooth = in_all(problem, function)
+    found = of_kind(from_a_sheet(smooth), "smoothed")
+    assert {f.column for f in found} == {c.name for c in problem.channels}
+    assert all(f.severity == "error" and "near half the sample rate" in f.text for f in found)
+    one = changed(noisy(0), "current", function)
+    assert [f.column for f in of_kind(from_a_sheet(one), "smoothed")] == ["current"]
+
+
+def test_a_noise_that_was_guessed_too_large_is_no_fault(noisy) -> None:
+    problem = noisy(0).changed(source=NO_SOURCE)
+    channels = [replace(c, sigma=5.0 * c.sigma) for c in problem.channels]
+    assert not of_kind(problem.changed(channels=channels), "smoothed")
+    channels = [replace(c, sigma=0.2 * c.sigma) for c in problem.channels]
+    found = of_kind(problem.changed(channels=channels), "noise")
+    assert len(found) == len(channels) and {f.severity for f in found} == {"warning"}
+
+
+def test_columns_whose_values_stand_for_several_samples(noisy) -> None:
+    found = of_kind(changed(noisy(0), "voltage", lambda x: np.repeat(x[::4], 4)[: x.size]), "held")
+    assert {f.column for f in found} == {"voltage"}
+    assert "changes every 4 samples only" in found[0].text and "fresh = true" in found[0].text
+
+
+def struck(x: np.ndarray) -> np.ndarray:
+    result = x.copy()
+    result[[300, 700, 1500]] += [9.0, -7.0, 1e9]
+    return result
+
+
+def test_spikes_of_one_column_are_faults_of_the_log(noisy) -> None:
+    found = of_kind(changed(noisy(0), "current", struck), "spikes")
+    assert [f.run for f in found] == ["sines", "stairs", "check"]
+    assert "has 3 single samples that stand out, the first at 0.3 s" in found[0].text
+    assert "the largest 1e+09 A at 1.5 s" in found[0].text
+
+
+def test_a_jolt_shows_in_other_columns(noisy) -> None:
+    """The end of a play is felt for a sample, by the speed and by the current that follows it."""
+    jolted = changed(noisy(0), "current", struck)
+    assert not of_kind(changed(jolted, "speed", lambda x: struck(np.roll(x, 1))), "spikes")
+
+
+@pytest.mark.parametrize("apart", [0, 37])
+def test_runs_that_are_copies(noisy, apart: int) -> None:
+    problem = noisy(0)
+    first = problem.run("sines").data
+    copy = np.vstack([first[apart:], first[:apart]])
+    found = of_kind(problem.with_data({"check": copy}), "copy")
+    assert [(f.run, f.severity) for f in found] == [("check", "error")]
+    assert "copy of run sines" in found[0].text and "confirms anything" in found[0].text
+    assert (f"{apart} samples apart" in found[0].text) == bool(apart)
+
+
+def test_the_same_motion_measured_twice_is_no_copy(noisy, exact) -> None:
+    problem, random = noisy(0), np.random.default_rng(9)
+    again = exact["sines"] + random.normal(size=exact["sines"].shape) * problem.sigma
+    assert not of_kind(problem.with_data({"check": again}), "copy")
+
+
+def test_an_angle_that_begins_anew(noisy) -> None:
+    found = of_kind(changed(noisy(0), "angle", lambda x: np.mod(x, 2 * np.pi)), "wrapped")
+    assert found and {f.column for f in found} == {"angle"} and "unwrap = true" in found[0].text
+
+
+def test_a_clock_at_another_rate(noisy) -> None:
+    problem = noisy(0).changed(source=Source(rate=1010.0))
+    found = of_kind(problem, "rate")
+    assert len(found) == 3
+    assert "runs at 1000 samples per second, but set.toml says 1010" in found[0].text
+    assert "the clock is 1.00% fast" in found[0].text
+    problem = problem.changed(source=Source(rate=1010.0, allow=frozenset({"rate"})))
+    assert {f.severity for f in of_kind(problem, "rate")} == {"warning"}
+
+
+def test_a_sign_turned_in_one_run_is_named_only_where_the_model_foretells_the_others(noisy) -> None:
+    problem = noisy(0)
+    data = {run.name: run.data.copy() for run in problem.runs}
+    index = [c.name for c in problem.channels].index("current")
+    data["stairs"][:, index] *= -1.0
+    found = of_kind(problem.with_data(data), "sign")
+    assert [(f.run, f.column) for f in found] == [("stairs", "current")]
+    # where the model is wrong in the others, it cannot say which way round this one is
+    random = np.random.default_rng(3)
+    for name in ("sines", "check"):
+        data[name][:, index] = np.cumsum(random.normal(size=data[name].shape[0]))
+    assert not of_kind(problem.with_data(data), "sign")
+
+
+def late_columns(problem: Problem) -> list[Finding]:
+    return list(check_late(fit(simulator(problem), effort=Effort(end="intervals"))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("column", "samples"), [("current", 12), ("speed", 5)])
+def test_a_column_on_a_late_clock_is_told_by_a_fit(noisy, column: str, samples: int) -> None:
+    def delayed(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.full(samples, x[0]), x[:-samples]])
+
+    problem = changed(noisy(0), column, delayed)
+    found = late_columns(problem)
+    assert [(f.kind, f.column, f.severity) for f in found] == [("clock", column, "error")]
+    late = float(found[0].text.partition("late = ")[2].split()[0])
+    assert late == pytest.approx(1e-3 * samples, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_inputs_that_come_after_what_they_cause(noisy) -> None:
+    problem = noisy(0)
+    runs = []
+    for run in problem.runs:
+        values = np.asarray(run.inputs["motor.w_ref"].at(run.times))
+        late = np.concatenate([np.full(10, values[0]), values[:-10]])
+        table = Table(run.times, late, text=f"{run.name}:speed_set")
+        runs.append(replace(run, inputs={"motor.w_ref": table}))
+    found = late_columns(problem.changed(runs=runs))
+    assert [(f.kind, f.column) for f in found] == [("clock", "speed_set")]
+    assert "after what it causes" in found[0].text
+    assert late_columns(problem) == []
+
+
+def test_many_runs_with_one_finding_are_one_line() -> None:
+    found = [Finding("warning", "gaps", f"r{k}", "x", f"lacks {k} %") for k in range(9)]
+    assert lines(found) == ["warning: run r0 x: lacks 0 % (so, too, in 8 other runs: r1, …, r8)"]
+    assert len(lines(found[:3])) == 3
