@@ -12,7 +12,6 @@ from __future__ import annotations
 import itertools
 import json
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -20,12 +19,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import CheckError, CosimError, FmuFileError, InputError, VariantError, listing
+from ..errors import CheckError, CosimError, InputError, VariantError, listing
 from ..installation import places
 from ..installation.builder import default_provider, naming_errors, sources
 from ..master import algorithms
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
+from .check import check_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .linearize import linearize_command
@@ -48,6 +48,7 @@ fmus_app = typer.Typer(
     help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
 )
 app.add_typer(fmus_app, name="fmus")
+fmus_app.command("check")(check_command)
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)
@@ -250,46 +251,6 @@ def _asked(variants: Sequence[str]) -> list[str]:
             else [asked]
         )
     ]
-
-
-@fmus_app.command("check")
-def fmus_check(
-    files: Annotated[
-        list[Path] | None, typer.Argument(help=".fmu files; those of the library if none is given.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check FMUs, ours or anybody's, without running anything of them.
-
-    Errors break the standard of FMI, or keep masters from running the FMU; warnings are allowed,
-    but others may stumble over them.
-
-    Example: `cosim fmus check gearbox.fmu`
-    """
-    from ..fmu.check import check
-
-    paths = list(files or sorted(places.fmus().rglob("*.fmu")))
-    for path in paths:
-        if not path.is_file():
-            raise FmuFileError(f"{path}: there is no such file")
-    if not paths:
-        raise InputError(f"{places.fmus()}: has no .fmu; build some with 'cosim fmus build'")
-    results = {}
-    bad = 0
-    for path in paths:
-        findings = check(path)
-        results[str(path)] = [finding.to_dict() for finding in findings]
-        bad += any(finding.severity == "error" for finding in findings)
-        if not as_json:
-            counts = Counter(finding.severity for finding in findings)
-            shown = ", ".join(f"{number} {kind}(s)" for kind, number in counts.items())
-            typer.echo(f"{path}: {shown or 'ok'}")
-            for finding in findings:
-                typer.echo(f"  {finding}")
-    if as_json:
-        _print_json({"checked": len(results), "with_problems": bad, "problems": results})
-    if bad:
-        raise CheckError(f"{bad} of {len(results)} FMUs have problems")
 
 
 # -- scenarios -------------------------------------------------------------------------------------
