@@ -115,11 +115,12 @@ class EndRequest(FmuCallError):
 
     Attributes:
         time: up to which the FMU has gone [s].
+        complete: whether all FMUs of the run have gone so far.
     """
 
     def __init__(self, text: str, messages: Iterable[str] = (), *, time: float) -> None:
         super().__init__(text, messages)
-        self.time = time
+        self.time, self.complete = time, False
 
 
 class AlgebraicLoopError(CosimError):

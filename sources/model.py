@@ -114,9 +114,10 @@ class Model:
                     f"{root.component.name}/{root.fidelity}: {full!r} has {len(names)} elements "
                     f"but its expression has {symbol.numel()}"
                 )
-        for index, (name, start) in enumerate(zip(names, quantity.starts(), strict=True)):
+        elements = zip(names, quantity.elements(), quantity.starts(), strict=True)
+        for index, (name, element, start) in enumerate(elements):
             root.variables[name] = Declared(
-                name, quantity, role, start, symbol[index], self._of_effect
+                name, element, role, start, symbol[index], self._of_effect
             )
         root._vectors[full] = symbol
         return symbol

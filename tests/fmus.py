@@ -67,6 +67,7 @@ class Slave:
         start: float = 0.0,
         initialize: bool = True,
         token: str | None = None,
+        event_mode: bool = False,
     ) -> None:
         self.description, folder = _unpacked(path)
         self.version = 3 if self.description.fmiVersion.startswith("3") else 2
@@ -105,9 +106,10 @@ class Slave:
         else:
             self.fmu = FMU3Slave(**arguments)
             self.fmu.instantiate(
+                eventModeUsed=event_mode,
                 logMessage=lambda _env, _status, _category, text: self.messages.append(
                     text.decode()
-                )
+                ),
             )
         if initialize:
             self.initialize(values)

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
-    "errors", "reading", "files", "spec", "data", "fmu", "drawing", "system", "master",
+    "errors", "reading", "arguments", "files", "spec", "data", "fmu", "drawing", "system", "master",
     "installation", "scenario", "ssp", "running", "control", "study", "calibrate", "diagnose",
     "report", "cli", "__main__",
 )  # fmt: skip

@@ -13,6 +13,7 @@ import itertools
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,6 +30,7 @@ from .check import check_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .linearize import linearize_command
+from .streams import print_json, stdout_for_json
 from .study import study_command
 
 if TYPE_CHECKING:
@@ -133,7 +135,7 @@ def fmus_list(
             f"{listing((entry['component'] for entry in _components()), component)}"
         )
     if as_json:
-        _print_json(entries)
+        print_json(entries)
         return
     table = _table("variant", "inputs", "outputs", "parameters", "description")
     for entry in entries:
@@ -230,7 +232,7 @@ def fmus_build(
         )
     paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
     if as_json:
-        _print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
+        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
     else:
         for item in paths:
             typer.echo(item["file"])
@@ -266,7 +268,7 @@ def list_scenarios(as_json: AsJson = False) -> None:
 
     files = scenario.scenario_files()
     if as_json:
-        _print_json(
+        print_json(
             [
                 {
                     "scenario": file.name,
@@ -359,10 +361,10 @@ def run_command(
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         _say(f"note: {note}")
     if as_json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
     else:
         _print_result(result)
-    failed = [label for label, check in result.checks.items() if not check.ok]
+    failed = [label for label, check in result.checks.items() if check.failed]
     if failed:
         shown = "; ".join(failed[:5]) + ("; ..." if len(failed) > 5 else "")
         raise CheckError(f"{len(failed)} of {len(result.checks)} checks failed: {shown}")
@@ -416,18 +418,20 @@ def _print_result(result: Result) -> None:
         console.print(table)
     shown = content["checks"]
     if len(shown) > SHOWN:
-        shown = [item for item in shown if not item["ok"]]
-        console.print(
-            f"{len(content['checks']) - len(shown)} of {len(content['checks'])} checks ok"
-        )
+        shown = [item for item in shown if item["ok"] is False]
+        met = sum(item["ok"] is True for item in content["checks"])
+        console.print(f"{met} of {len(content['checks'])} checks ok")
     if shown:
         table = _table("check", "value", "limit", "", "source")
         for item in shown:
-            outcome = "ok" if item["ok"] else "FAILED"
+            outcome = {True: "ok", False: "FAILED", None: "not judged"}[item["ok"]]
             limit = item["limit"]
             bound = f"{limit:.4g}" if isinstance(limit, float) else str(limit)
-            table.add_row(item["name"], f"{item['value']:.4g}", bound, outcome, item["source"])
+            value = "-" if item["value"] is None else f"{item['value']:.4g}"
+            table.add_row(item["name"], value, bound, outcome, item["source"])
         console.print(table)
+    for reason, names in _unjudged(content["checks"]).items():
+        console.print(f"not judged: {', '.join(names)}: {reason}", soft_wrap=True)
     folders = list(dict.fromkeys(str(path.parent) for path in result.files))
     if len(folders) > SHOWN_FOLDERS:
         console.print(f"in {len(folders) - 1} folders below {folders[-1]}", soft_wrap=True)
@@ -436,6 +440,15 @@ def _print_result(result: Result) -> None:
     pictures = [path for path in result.files if path.suffix == ".png"]
     for path in pictures[-1:] if pictures and pictures[-1].name == "overview.png" else pictures:
         console.print(f"picture: {path}", soft_wrap=True)
+
+
+def _unjudged(checks: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Why checks are not judged -> their names."""
+    found: dict[str, list[str]] = {}
+    for item in checks:
+        if "not_judged" in item:
+            found.setdefault(item["not_judged"], []).append(item["name"])
+    return found
 
 
 # -- frame -----------------------------------------------------------------------------------------
@@ -462,14 +475,11 @@ def _say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _print_json(content: Any) -> None:
-    typer.echo(json.dumps(content, indent=2))
-
-
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        app()
+        with stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+            app()
     except CosimError as error:
         _say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):

@@ -12,6 +12,7 @@ import typer
 
 from ..errors import InputError
 from ..files import make_folder, write_text
+from .streams import print_json
 
 if TYPE_CHECKING:
     from ..calibrate.estimate import Estimate
@@ -67,7 +68,7 @@ def calibrate_command(
     text = json.dumps(content, indent=2)
     write_text(folder / "calibration.json", text + "\n")
     if as_json:
-        typer.echo(text)
+        print_json(content)
     else:
         _print(content)
 

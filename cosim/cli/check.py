@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ import typer
 
 from ..errors import CheckError, FmuFileError, InputError
 from ..installation import places
+from .streams import print_json
 
 
 def check_command(
@@ -50,6 +50,6 @@ def check_command(
                 typer.echo(f"  {finding}")
     if as_json:
         content = {"checked": len(results), "with_problems": bad, "problems": results}
-        typer.echo(json.dumps(content, indent=2))
+        print_json(content)
     if bad:
         raise CheckError(f"{bad} of {len(results)} FMUs have problems")

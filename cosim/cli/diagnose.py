@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..files import make_folder, write_text
+from .streams import print_json
 
 if TYPE_CHECKING:
     from ..diagnose import Diagnosis
@@ -53,7 +54,7 @@ def diagnose_command(
     content = result.to_dict()
     write_text(table, json.dumps(content, indent=2) + "\n")
     if as_json:
-        typer.echo(json.dumps(content, indent=2))
+        print_json(content)
     else:
         _print(result)
 

@@ -11,6 +11,7 @@ import typer
 
 from ..files import write_text
 from ..installation import builder
+from .streams import print_json
 
 if TYPE_CHECKING:
     from ..control.linearize import Linear, Margins
@@ -53,7 +54,7 @@ def linearize_command(
         text = json.dumps({**content, **matrices}, indent=1)
         write_text(out / "linear.json", text + "\n")
     if as_json:
-        typer.echo(json.dumps(content, indent=2))
+        print_json(content)
     else:
         _print(content, out)
 

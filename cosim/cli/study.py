@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from ..errors import InputError, StudyError
 from ..system.provider import FolderProvider, Provider
+from .streams import print_json
 
 if TYPE_CHECKING:
     from ..study import StudyResult
@@ -96,7 +96,7 @@ def study_command(
     for note in result.notes:
         typer.echo(f"note: {note}", err=True)
     if as_json:
-        typer.echo(json.dumps(result.to_dict(), indent=2))
+        print_json(result.to_dict())
     else:
         _print(result)
     failures = result.failures

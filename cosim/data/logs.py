@@ -10,7 +10,8 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,9 @@ from .parquet import read_table
 Vector = NDArray[np.float64]
 _CELL = 8
 """Bytes of memory per byte of a CSV file: seven digits are a text of 56 and a pointer."""
+_TRUTH = {"true": 1.0, "True": 1.0, "TRUE": 1.0, "false": 0.0, "False": 0.0, "FALSE": 0.0}
+_INTEGERS = 2.0**53
+"""From here on doubles skip integers."""
 _HEAD = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
 
 
@@ -40,6 +44,8 @@ class Log:
         units: by column; "" where unknown.
         noise: standard deviation by column, where the rig sheet gives it.
         values: further entries of the run in `set.toml`, e.g. start values and purpose.
+        exact: columns that doubles do not carry: texts, which are in no other place, and integers
+            beyond 2^53.
     """
 
     name: str
@@ -47,6 +53,7 @@ class Log:
     units: Mapping[str, str] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
+    exact: Mapping[str, list[Any]] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Vector:
         """A column.
@@ -54,6 +61,11 @@ class Log:
         Raises:
             UnknownNameError: with the nearest names.
         """
+        if column not in self.columns and column in self.exact:
+            raise UnknownNameError(
+                f"{self.name}: column {column!r} holds texts such as {self.exact[column][0]!r}, "
+                "and numbers are needed"
+            )
         if column not in self.columns:
             raise UnknownNameError(
                 f"{self.name}: has no column {column!r}; {listing(self.columns, column)}"
@@ -66,7 +78,11 @@ class Log:
         return self["time"]
 
 
-def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+Read = tuple[dict[str, Vector], dict[str, str], dict[str, list[Any]]]
+"""Columns, their units, and those that doubles do not carry."""
+
+
+def _csv(path: Path) -> Read:
     if excess := DATA.excess(_CELL * path.stat().st_size):
         raise ScenarioError(f"{path}: {excess}")
     try:
@@ -90,25 +106,42 @@ def _csv(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
         twice = next(name for name in names if names.count(name) > 1)
         raise ScenarioError(f"{path}: has two columns {twice!r}; rename one of them")
     columns: dict[str, Vector] = {}
+    exact: dict[str, list[Any]] = {}
     for index, name in enumerate(names):
         texts = [row[index].strip() if index < len(row) else "" for row in rows[1:]]
+        if any(texts) and all(text in _TRUTH for text in texts):
+            columns[name] = np.array([_TRUTH[text] for text in texts])
+            continue
         try:
             columns[name] = np.array([float(text) if text else np.nan for text in texts])
         except ValueError:
-            continue  # a column of text is no signal
-    return columns, units
+            exact[name] = texts
+            continue
+        if np.any(np.abs(columns[name]) >= _INTEGERS):
+            with suppress(ValueError):  # they are no integers
+                exact[name] = [int(text) for text in texts]
+    return columns, units, exact
 
 
-def _parquet(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
+def _parquet(path: Path) -> Read:
     import pyarrow as pa
 
     table = read_table(path)
     columns, units = {}, {}
+    exact: dict[str, list[Any]] = {}
     for item in table.schema:
-        if pa.types.is_floating(item.type) or pa.types.is_integer(item.type):
+        number = pa.types.is_floating(item.type) or pa.types.is_integer(item.type)
+        whole = not table[item.name].null_count
+        if number or (pa.types.is_boolean(item.type) and whole):
             columns[item.name] = table[item.name].to_numpy().astype(np.float64)
             units[item.name] = (item.metadata or {}).get(b"unit", b"").decode(errors="replace")
-    return columns, units
+        if whole and (
+            pa.types.is_string(item.type)
+            or pa.types.is_binary(item.type)
+            or (pa.types.is_integer(item.type) and np.any(np.abs(columns[item.name]) >= _INTEGERS))
+        ):
+            exact[item.name] = table[item.name].to_pylist()
+    return columns, units, exact
 
 
 def _split(name: str, values: Vector) -> dict[str, Vector]:
@@ -137,12 +170,12 @@ def _numbers(arrays: Mapping[str, NDArray[Any]], path: Path) -> dict[str, Vector
     return columns
 
 
-def _npz(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
-    return _numbers(read_npz(path), path), {}
+def _npz(path: Path) -> Read:
+    return _numbers(read_npz(path), path), {}, {}
 
 
-def _mat(path: Path) -> tuple[dict[str, Vector], dict[str, str]]:
-    return _numbers(read_matlab(path), path), {}
+def _mat(path: Path) -> Read:
+    return _numbers(read_matlab(path), path), {}, {}
 
 
 _READERS = {".csv": _csv, ".parquet": _parquet, ".npz": _npz, ".mat": _mat}
@@ -160,8 +193,8 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
     reader = _READERS.get(path.suffix)
     if reader is None:
         raise ScenarioError(f"{path}: logs are {', '.join(_READERS)} files")
-    columns, found = reader(path)
-    return Log(path.name, columns, {**found, **(units or {})})
+    columns, found, exact = reader(path)
+    return Log(path.name, columns, {**found, **(units or {})}, exact=exact)
 
 
 @dataclass(frozen=True)
@@ -213,7 +246,7 @@ class DataSet:
         entry = self.runs[run]
         with within(f"{self.folder / 'set.toml'}: run {run}"):
             log = read_log(entry.file, units=self.units)
-        return Log(f"{self.name}/{run}", log.columns, log.units, self.noise, entry.values)
+        return replace(log, name=f"{self.name}/{run}", noise=self.noise, values=entry.values)
 
 
 def _sheet(folder: Path, name: str) -> dict[str, Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import wrong
 from ..errors import ValueRangeError
 
 Vector = NDArray[np.float64]
@@ -66,8 +67,9 @@ class Constant:
         return np.full(times.shape, float(self.value))
 
     def objects(self, times: Vector) -> list[Any]:
-        """The value as it is, once per time."""
-        return [self.value] * len(times)
+        """The value as it is, once per time; none if a double carries it."""
+        exact = not isinstance(self.value, (str, bytes)) and float(self.value) == self.value
+        return [] if exact else [self.value] * len(times)
 
 
 @dataclass(frozen=True)
@@ -155,10 +157,9 @@ class Table:
         return found
 
     def objects(self, times: Vector) -> list[Any]:
-        """Values at these times, exact integers and texts as they are."""
+        """Values at these times, exact integers and texts as they are; none if doubles do."""
         if not self._objects:
-            found: list[Any] = self.at(times).tolist()
-            return found
+            return []
         return [self._objects[i] for i in self._held(times, self._check(times)).tolist()]
 
     def _held(self, times: Vector, clock: float) -> NDArray[np.intp]:
@@ -182,11 +183,14 @@ class Table:
 
 def _exact(values: ArrayLike) -> list[Any]:
     """Values that doubles do not carry, as they are; none if doubles do."""
-    array = np.asarray(values)
-    if array.dtype.kind in "iu" and array.size and np.max(np.abs(array.astype(object))) > 2**53:
-        return [int(item) for item in array.tolist()]
-    if array.dtype.kind in "USO" and all(isinstance(v, (str, bytes)) for v in array.tolist()):
-        return list(array.tolist())
+    items = values.tolist() if isinstance(values, np.ndarray) else values
+    if not isinstance(items, Sequence):
+        return []
+    integers = [item for item in items if isinstance(item, (int, np.integer))]
+    if len(integers) == len(items) and any(float(item) != item for item in integers):
+        return [int(item) for item in integers]
+    if items and all(isinstance(item, (str, bytes)) for item in items):
+        return list(items)
     return []
 
 
@@ -198,9 +202,9 @@ class SignalVector:
 
 
 def objects(signal: Signal, times: Vector) -> list[Any]:
-    """Values at these times for an input that takes objects: exact where the signal has them."""
+    """Values at these times as they are, if doubles do not carry them; else none."""
     exact = getattr(signal, "objects", None)
-    return list(exact(times) if exact is not None else signal.at(times).tolist())
+    return list(exact(times)) if exact is not None else []
 
 
 def as_signal(value: Signal | float | str | bytes | Callable[[Vector], ArrayLike]) -> Signal:
@@ -209,4 +213,6 @@ def as_signal(value: Signal | float | str | bytes | Callable[[Vector], ArrayLike
         return Constant(value)
     if hasattr(value, "at"):
         return value  # type: ignore[return-value]
+    if not callable(value):
+        raise wrong("what drives an input", value, "a signal, a number, a text or a function")
     return Function(value)

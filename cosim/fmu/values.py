@@ -149,6 +149,11 @@ def _checked(where: str, variable: Variable, value: Any) -> Any:
     if not is_finite(value):
         raise ValueRangeError(f"{where}: {name} = {shown(value)} is not finite")
     number: Any = float(value)
+    if not (type_ in INTEGERS or boolean(type_)) and number != value:
+        raise ValueRangeError(
+            f"{where}: {name} = {value} is not exact as a floating-point number of type {type_}; "
+            "take a number that is, or write it with a decimal point"
+        )
     if type_ in INTEGERS:
         number = whole_number(value)
     elif boolean(type_):

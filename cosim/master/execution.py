@@ -94,7 +94,9 @@ class Execution:
                         progress(self.run.index / count)
             except EndRequest as request:
                 self.ended = str(request)
-            self.finish()
+                self.finish(request)
+            else:
+                self.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self.stopped(error, keep=True) from error
         if progress is not None:
@@ -140,12 +142,23 @@ class Execution:
                 f"executor 'c': this machine has no {error}; 'cosim fmus build' compiles it"
             ) from None
 
-    def finish(self) -> None:
-        """Operations at the end of the run, unless its present values are recorded already."""
-        if self.run.row > self.run.index // self.outline.every:
+    def finish(self, request: EndRequest | None = None) -> None:
+        """Operations at the end of the run, unless its present values are recorded already.
+
+        Args:
+            request: of an FMU that ended it. Where all FMUs stand at one time then, their values
+                are recorded in any case.
+        """
+        run = self.run
+        last = request is not None and request.complete
+        if run.row > run.index // self.outline.every and not (
+            last and run.index % self.outline.every
+        ):
             return
         for op, a, b in decoded(self.outline.plan.final):
-            self.run.do(op, a, b)
+            run.do(op, a, b)
+        if last:
+            run.keep_last()
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""
@@ -179,5 +192,6 @@ class Execution:
             },
             error,
             objects=run.passing.kept,
+            beside=run.beside,
             notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],
         )

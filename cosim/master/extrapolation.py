@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import need_table
 from ..errors import InputError, UnknownNameError, ValueRangeError, listing
 from ..system.system import System
 from .plan import PARTS, Layout, Mean, Op
@@ -100,6 +101,7 @@ def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int
         UnknownNameError, ValueRangeError: what was asked for makes no sense.
     """
     found = dict.fromkeys(system.members, 1)
+    need_table("substeps", substeps or {}, "substeps = { motor = 4 }")
     for name, factor in (substeps or {}).items():
         if name not in found:
             raise UnknownNameError(

@@ -20,6 +20,8 @@ from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
 
 Vector = NDArray[np.float64]
+ROUNDING = 1e-9
+"""Part of a step by which its end may miss the end of the run: sums of steps round by far less."""
 
 
 class Interpreter:
@@ -34,6 +36,7 @@ class Interpreter:
         instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
         index: communication point at which the run stands.
         rows, row: recorded values, and how many rows there are.
+        beside: communication point of the last row if it is none of every n-th, else None.
         bond_energy: energy that went over each bond [J].
         newtons: one per algebraic loop.
         history, past: of extrapolated inputs, and how many values it has before the first step.
@@ -68,8 +71,9 @@ class Interpreter:
         for block, owner in zip(self.inputs, self.system.members, strict=True):
             block.origins = [origins.get(f"{owner}.{name}", "") for name in block.names]
         self.passing = ObjectPassing(self.layout, outline.observed, outline.objects)
-        self.rows = np.empty((outline.count // self.every + 1, len(outline.observed)))
+        self.rows = np.empty((outline.capacity, len(outline.observed)))
         self.row = self.index = 0
+        self.beside: int | None = None
         self.bond_energy = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
@@ -103,6 +107,7 @@ class Interpreter:
                 end = end or request
         self.index += 1
         if end is not None:
+            end.complete = True
             raise end
 
     def restart(self) -> None:
@@ -111,6 +116,7 @@ class Interpreter:
         self.bond_energy[:] = 0.0
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
+        self.beside = None
         self.passing.restart()
         self.past[0] = 0
         self.started = False
@@ -121,8 +127,8 @@ class Interpreter:
             instance.set(member.parameters)
 
     def size(self, time: float, step: float) -> float:
-        """A step that does not end beyond the end of the run by rounding."""
-        if time + step > self.instants[-1]:
+        """A step that does not miss the end of the run by rounding, and never goes beyond."""
+        if time + step > self.instants[-1] - ROUNDING * step:
             step = self.instants[-1] - time
             while time + step > self.instants[-1]:
                 step = math.nextafter(step, 0.0)
@@ -225,11 +231,19 @@ class Interpreter:
         """Keep observed values if it is their turn; note outputs for the energy of bonds."""
         layout, values = self.layout, self.values
         self.previous = values[layout.bond_output].tolist()
+        if self.index % self.every == 0:
+            self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+
+    def keep_last(self) -> None:
+        """Keep the present values although it is not their turn."""
+        layout = self.layout
         if self.index % self.every:
-            return
-        self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
-        if self.passing:
-            self.passing.keep(self.objects)
+            self.keep(self.values[layout.record_source] * layout.record_gain + layout.record_offset)
+            self.beside = self.index
+
+    def recorded_times(self) -> Vector:
+        """Times of the rows [s]."""
+        return self.outline.recorded_times(self.row, self.beside)
 
     def keep(self, row: Vector) -> None:
         """Add a row to the recording."""
@@ -239,6 +253,8 @@ class Interpreter:
             raise FmuCallError(f"{name} became {value} without an error of its FMU")
         self.rows[self.row] = row
         self.row += 1
+        if self.passing:
+            self.passing.keep(self.objects)
 
     def account(self, held: Vector) -> None:
         """Trapezoid of output times held input, in a fixed order of summation."""

@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +31,16 @@ from .outline import Outline
 from .plan import Op
 
 Vector = NDArray[np.float64]
-INDEX, ROW, INSTANCE, OPERATION, CALLS = range(5)
+INDEX, ROW, INSTANCE, OPERATION, CALLS, BESIDE = range(6)
 WHAT = {Op.SET: "taking inputs", Op.GET: "giving outputs", Op.STEP: "a step", Op.SUBSTEP: "a step"}
 STARTING = 30.0
 """Longer than the limit, for Python to start and load the FMUs [s]."""
 LOADING = -1
 """Operation while FMUs are loaded and initialized."""
+NOTHING = -1
+"""In place of a communication point that there is not."""
+OBJECTS = "objects"
+"""File of recorded objects: one pickle per row, a value by name."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +53,30 @@ class Order:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What it says at the end; `kind` is ok, call, or loop."""
+    """What it says at the end.
+
+    Attributes:
+        kind: ok, step (stopped), call (an FMU refused before the first step), or loop.
+        text, messages: of the error.
+        bond_energy, notes: of the recording.
+        how: what its provenance says of how it was run.
+    """
 
     kind: str
     text: str = ""
     messages: tuple[str, ...] = ()
-    bond_energy: Mapping[str, float] | None = None
-    steps: int = 0
+    bond_energy: Mapping[str, float] = field(default_factory=dict)
+    how: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def shared(folder: Path, rows: int, columns: int) -> tuple[NDArray[np.int64], Vector]:
     """State and rows in files of the folder, made by whoever comes first."""
     found: list[Any] = []
-    for name, dtype, shape in (("state", np.int64, (5,)), ("rows", np.float64, (rows, columns))):
+    for name, dtype, shape in (
+        ("state", np.int64, (BESIDE + 1,)),
+        ("rows", np.float64, (rows, columns)),
+    ):
         path = folder / name
         size = int(np.prod(shape)) * 8
         if not size:
@@ -71,6 +86,22 @@ def shared(folder: Path, rows: int, columns: int) -> tuple[NDArray[np.int64], Ve
             path.write_bytes(bytes(size))
         found.append(np.memmap(path, dtype=dtype, mode="r+", shape=shape))
     return found[0], found[1]
+
+
+def read_objects(folder: Path) -> dict[str, list[Any]]:
+    """Recorded objects by name; a row that was not written to its end does not count."""
+    found: dict[str, list[Any]] = {}
+    path = folder / OBJECTS
+    if path.exists():
+        with path.open("rb") as file:
+            while True:
+                try:
+                    row: dict[str, Any] = pickle.load(file)
+                except (EOFError, pickle.UnpicklingError):
+                    break
+                for name, item in row.items():
+                    found.setdefault(name, []).append(item)
+    return found
 
 
 def run_isolated(
@@ -90,8 +121,8 @@ def run_isolated(
     count, system = outline.count, outline.system
     with tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        state, rows = shared(folder, count // outline.every + 1, len(outline.observed))
-        state[OPERATION] = LOADING
+        state, rows = shared(folder, outline.capacity, len(outline.observed))
+        state[OPERATION], state[BESIDE] = LOADING, NOTHING
         plain = replace(
             outline,
             system=replace(system, provider=None),
@@ -114,12 +145,21 @@ def run_isolated(
         last = min(int(state[INDEX]), count)
 
         def recording(error: str, outcome: Outcome | None = None) -> Recording:
-            steps = (outcome.steps if outcome else last) * len(system.members)
+            kept = read_objects(folder)
+            count = min(int(state[ROW]), rows.shape[0], *map(len, kept.values()))
+            beside = int(state[BESIDE])
             return outline.recording(
-                np.array(rows[: min(int(state[ROW]), rows.shape[0])]),
-                outcome.bond_energy or {} if outcome else {},
-                {"isolated": True, "fmu_steps": steps},
+                np.array(rows[:count]),
+                outcome.bond_energy if outcome else {},
+                {
+                    "isolated": True,
+                    "fmu_steps": last * len(system.members),
+                    **(outcome.how if outcome else {}),
+                },
                 error,
+                objects=kept,
+                notes=outcome.notes if outcome else (),
+                beside=None if beside == NOTHING else beside,
             )
 
         path = folder / "outcome"
@@ -132,16 +172,16 @@ def run_isolated(
         if outcome is not None and outcome.kind == "call":
             raise FmuCallError(outcome.text, outcome.messages)
         if outcome is not None:
-            text, messages = outcome.text, outcome.messages
-        else:
-            said = (folder / "errors").read_bytes()[-2000:].decode(errors="replace").strip()
-            messages = tuple(said.splitlines()[-5:])
-            text = f"run stopped at t = {when:.9g} s: {_blame(system, state)} "
-            text += (
-                f"did not return within {limit:g} s and was ended"
-                if hung
-                else f"crashed ({_reason(process.returncode)})"
-            )
+            text = outcome.text
+            raise StepError(text, outcome.messages, time=when, recording=recording(text, outcome))
+        said = (folder / "errors").read_bytes()[-2000:].decode(errors="replace").strip()
+        messages = tuple(said.splitlines()[-5:])
+        text = f"run stopped at t = {when:.9g} s: {_blame(system, state)} "
+        text += (
+            f"did not return within {limit:g} s and was ended"
+            if hung
+            else f"crashed ({_reason(process.returncode)})"
+        )
         raise StepError(text, messages, time=when, recording=recording(text))
 
 

@@ -10,13 +10,28 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, FmuCallError, StepError
 from .execution import Execution
-from .interpreter import Interpreter
-from .isolation import CALLS, INDEX, INSTANCE, OPERATION, ROW, Order, Outcome, shared
+from .interpreter import Interpreter, Vector
+from .isolation import (
+    BESIDE,
+    CALLS,
+    INDEX,
+    INSTANCE,
+    NOTHING,
+    OBJECTS,
+    OPERATION,
+    ROW,
+    Order,
+    Outcome,
+    shared,
+)
 from .outline import Outline
 from .plan import Op
 
+HOW = ("fmu_steps", "step_control")
+"""Entries of a provenance that only the executing process knows."""
 WATCH = 0.2
 """Time between two looks whether the ordering process is still there [s]."""
 
@@ -27,6 +42,7 @@ class _Told(Interpreter):
     def __init__(self, outline: Outline, stack: ExitStack, folder: Path) -> None:
         super().__init__(outline, stack)
         self.state, self.rows = shared(folder, *self.rows.shape)
+        self._written = stack.enter_context((folder / OBJECTS).open("wb"))
 
     def do(self, op: Op, a: int, b: int) -> None:
         self.tell()
@@ -35,9 +51,16 @@ class _Told(Interpreter):
         self.state[CALLS] += 1
         super().do(op, a, b)
 
+    def keep(self, row: Vector) -> None:
+        super().keep(row)
+        if self.passing.kept:
+            pickle.dump({n: items[-1] for n, items in self.passing.kept.items()}, self._written)
+            self._written.flush()
+
     def tell(self) -> None:
         """Say where the run stands."""
         self.state[INDEX], self.state[ROW] = self.index, self.row
+        self.state[BESIDE] = NOTHING if self.beside is None else self.beside
 
 
 def execute(order: Order) -> Outcome:
@@ -51,12 +74,22 @@ def execute(order: Order) -> Outcome:
             finally:
                 told.tell()
         except StepError as error:
-            return Outcome("step", str(error), error.messages)
+            return _outcome("step", error.recording, str(error), error.messages)
         except FmuCallError as error:
             return Outcome("call", str(error), error.messages)
         except AlgebraicLoopError as error:
             return Outcome("loop", str(error))
-    return Outcome("ok", bond_energy=recording.bond_energy, steps=execution.steps())
+    return _outcome("ok", recording)
+
+
+def _outcome(
+    kind: str, recording: Recording | None, text: str = "", messages: tuple[str, ...] = ()
+) -> Outcome:
+    """What is said of a recording; its values are in the shared files."""
+    if recording is None:
+        return Outcome(kind, text, messages)
+    how = {key: item for key, item in recording.provenance.items() if key in HOW}
+    return Outcome(kind, text, messages, recording.bond_energy, how, recording.notes)
 
 
 def orphaned() -> None:

@@ -15,6 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import (
+    is_number,
+    need_function,
+    need_number,
+    need_table,
+    need_text,
+    need_texts,
+    need_whole,
+    wrong,
+)
 from ..data.recording import Recording
 from ..data.signals import Signal, objects
 from ..errors import GraphError, UnitError, ValueRangeError
@@ -22,7 +32,7 @@ from ..fmu.values import OBJECTS, TYPES, check_values
 from ..spec.units import conversion, parse
 from ..system.inputs import Driver, spread
 from ..system.system import System
-from .algorithms import compile_plan
+from .algorithms import compile_plan, names
 from .execution import Execution
 from .isolation import run_isolated
 from .outline import Outline
@@ -57,6 +67,26 @@ class Master:
     options: Mapping[str, Any] = field(default_factory=dict)
     isolate: float | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.system, System):
+            raise wrong(
+                "the system of a Master", self.system, "a System",
+                "build one with System, or run a scenario by its name with cosim.run",
+            )  # fmt: skip
+        way = (
+            f"write Master(system, step={self.algorithm})"
+            if is_number(self.algorithm)
+            else f"take one of {', '.join(names())}"
+        )
+        need_text("the algorithm of a Master", self.algorithm, way)
+        need_number("the communication step of a Master", self.step, "give it in seconds")
+        for what, value in (("tolerance", self.tolerance), ("time limit isolate", self.isolate)):
+            if value is not None:
+                need_number(f"the {what} of a Master", value)
+        need_text("the scenario of a Master", self.scenario, "give the name recordings carry")
+        need_text("the executor of a Master", self.executor, "take auto, c or python")
+        need_table("options of a Master", self.options, 'options={"extrapolation": 1}')
+
     def run(
         self,
         duration: float,
@@ -82,6 +112,7 @@ class Master:
             AlgebraicLoopError: initial values do not settle.
             StepError: an FMU failed; carries the recording up to then.
         """
+        need_function("progress of a run", progress)
         outline = self.outline(duration, inputs=inputs, record=record, every=every, start=start)
         if self.isolate is not None:
             if not self.isolate > 0.0:
@@ -104,12 +135,19 @@ class Master:
         Raises:
             InputError: wrong names, values or units (see the subclasses).
         """
-        count = self._count(duration, every)
+        need_number("the duration of a run", duration, "give it in seconds")
+        need_number("the start of a run", start, "give it in seconds")
+        need_whole("every of a run", every)
+        need_table("inputs of a run", inputs or {}, 'inputs={"motor.w_ref": 50.0}')
+        if record is not None:
+            need_texts("record of a run", record, 'record=["load.w"]')
+        count = self._count(duration, every, start)
         wanted = self.system.signals() if record is None else record
         observed = tuple(dict.fromkeys(n for name in wanted for n in self._observable(name)))
         signals = spread(self.system, inputs or {})
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         times[-1] = start + duration
+        carried = self._objects(signals, times)
         return Outline(
             system=self.system,
             scenario=self.scenario,
@@ -122,8 +160,8 @@ class Master:
             observed=observed,
             every=every,
             signals=signals,
-            external=self._external(signals, times),
-            objects=self._objects(signals, times),
+            external=self._external(signals, times, carried),
+            objects=carried,
         )
 
     def compile(self, external: Sequence[str], observed: Sequence[str]) -> Plan:
@@ -132,9 +170,11 @@ class Master:
 
     # -- checks ----------------------------------------------------------------------------------
 
-    def _count(self, duration: float, every: int) -> int:
+    def _count(self, duration: float, every: int, start: float) -> int:
         if not self.step > 0.0 or not np.isfinite(self.step):
             raise ValueRangeError(f"communication step {self.step} s is not positive")
+        if not np.isfinite(start):
+            raise ValueRangeError(f"start {start} s is not finite")
         if not duration > 0.0 or not np.isfinite(duration):
             raise ValueRangeError(f"duration {duration} s is not positive")
         if every < 1:
@@ -154,13 +194,17 @@ class Master:
             raise GraphError(f"{name} is of type {variables[0].type} and cannot be recorded")
         return self.system.elements(name)
 
-    def _external(self, signals: Mapping[str, Signal], times: Vector) -> Vector:
+    def _external(
+        self, signals: Mapping[str, Signal], times: Vector, carried: Mapping[int, Sequence[Any]]
+    ) -> Vector:
+        """Values of the driven inputs; in place of `carried` objects a number for each."""
         table = np.empty((times.size, len(signals)))
         for column, (name, signal) in enumerate(signals.items()):
-            if self.system.declaration(name).type in OBJECTS:
-                table[:, column] = 0.0
+            if column in carried:
+                codes = {item: code for code, item in enumerate(dict.fromkeys(carried[column]))}
+                table[:, column] = [codes[item] for item in carried[column]]
                 continue
-            values = np.asarray(signal.at(times), dtype=np.float64)
+            values = self._numbers(name, signal, times)
             unit = self.system.unit(name)
             if signal.unit and unit:
                 try:
@@ -179,13 +223,24 @@ class Master:
             table[:, column] = values
         return table
 
+    def _numbers(self, name: str, signal: Signal, times: Vector) -> Vector:
+        """Values of a driven input that travels as a number; names of an enumeration count."""
+        declared = self.system.declaration(name)
+        exact = objects(signal, times)
+        if not exact and not declared.items:
+            return np.asarray(signal.at(times), dtype=np.float64)
+        given = exact or signal.at(times).tolist()
+        scalar, where = replace(declared, dimensions=()), f"input {name} from {signal.text}"
+        checked = {item: check_values(where, [scalar], item)[0] for item in dict.fromkeys(given)}
+        return np.array([float(checked[item]) for item in given])
+
     def _objects(self, signals: Mapping[str, Signal], times: Vector) -> dict[int, list[Any]]:
         """Values of the driven inputs that travel as objects, by their column."""
         found = {}
         for column, (name, signal) in enumerate(signals.items()):
             declared = self.system.declaration(name)
             if declared.type in OBJECTS:
-                given = objects(signal, times)
+                given = objects(signal, times) or signal.at(times).tolist()
                 where = f"input {name} from {signal.text}"
                 scalar = replace(declared, dimensions=())
                 found[column] = [check_values(where, [scalar], item)[0] for item in given]

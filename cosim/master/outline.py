@@ -59,6 +59,22 @@ class Outline:
         """Communication steps."""
         return self.times.size - 1
 
+    @property
+    def capacity(self) -> int:
+        """Rows of a recording: every n-th communication point, and an end between them."""
+        return self.count // self.every + 2
+
+    def recorded_times(self, rows: int, beside: int | None = None) -> Vector:
+        """Times of the rows of a recording [s].
+
+        Args:
+            rows: how many there are.
+            beside: communication point of the last one, if it is none of every n-th.
+        """
+        if beside is None:
+            return self.times[:: self.every][:rows].copy()
+        return np.append(self.times[:: self.every][: rows - 1], self.times[beside])
+
     def recording(
         self,
         rows: Vector,
@@ -68,6 +84,7 @@ class Outline:
         *,
         objects: Mapping[str, Sequence[Any]] | None = None,
         notes: Sequence[str] = (),
+        beside: int | None = None,
     ) -> Recording:
         """A recording of this run.
 
@@ -78,10 +95,19 @@ class Outline:
             error: what ended it early.
             objects: recorded values that travel as objects.
             notes: what else is to be known.
+            beside: as of `recorded_times`.
         """
+        carried = {
+            name: _column(self.system.declaration(name).type, items[: len(rows)])
+            for name, items in (objects or {}).items()
+        }
+        values = rows.copy()
+        for name, column in carried.items():
+            text = column.dtype == object
+            values[:, self.observed.index(name)] = np.nan if text else column.astype(np.float64)
         return Recording(
-            time=self.times[:: self.every][: len(rows)].copy(),
-            values=rows.copy(),
+            time=self.recorded_times(len(rows), beside),
+            values=values,
             names=self.observed,
             units={name: self.system.unit(name) for name in self.observed},
             provenance={
@@ -91,10 +117,7 @@ class Outline:
             },
             bond_energy=dict(bond_energy),
             error=error,
-            objects={
-                name: _column(self.system.declaration(name).type, items[: len(rows)])
-                for name, items in (objects or {}).items()
-            },
+            objects=carried,
             notes=tuple(notes),
         )
 

@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
 from ..fmu.exchange import Block
@@ -64,6 +65,11 @@ class Session:
         start: float = 0.0,
         targets: Sequence[str] = (),
     ) -> None:
+        if not isinstance(master, Master):
+            raise wrong(
+                "the master of a Session", master, "a Master", "write Session(Master(system), 10.0)"
+            )
+        need_texts("targets of a Session", targets, 'targets=["load.J"]')
         outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
         self.master, self.names, self.count = master, outline.observed, outline.count
         self.times = outline.times[::every].copy()
@@ -110,10 +116,16 @@ class Session:
         """
         if values is None:
             values = {}
+        need_number("the limit of a run", limit)
         if not isinstance(values, Mapping):
+            if isinstance(values, (str, bytes)) or not hasattr(values, "__len__"):
+                raise wrong(
+                    "values of a run", values, "a table or a list", 'write {"load.J": 0.09}'
+                )
             if len(values) != len(self.targets):
                 raise ValueRangeError(f"{len(values)} values for {len(self.targets)} targets")
             values = dict(zip(self.targets, np.asarray(values).tolist(), strict=True))
+        need_table("values of a run", values, '{"load.J": 0.09}')
         run = self._run
         self._execution.restart()
         arrays: dict[str, tuple[Block, list[Any]]] = {}
@@ -134,12 +146,15 @@ class Session:
         initialize(run)
         try:
             self._execution.begin()
-            with suppress(EndRequest):  # an end that an FMU asks for is one
+            try:
                 self._advance_within(limit)
-            self._execution.finish()
+            except EndRequest as request:  # an end that an FMU asks for is one
+                self._execution.finish(request)
+            else:
+                self._execution.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self._execution.stopped(error, keep=False) from error
-        return self.times[: run.row], run.rows[: run.row].copy()
+        return run.recorded_times(), run.rows[: run.row].copy()
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):

@@ -102,6 +102,10 @@ def _quantity(name: str, items: list[tuple[str, Check, CheckResult]]) -> Compare
         runs=tuple(dict.fromkeys(run for run, _, _ in items)),
         cases=tuple(dict.fromkeys(check.case for _, check, _ in items)),
         marks=marks,
-        values={(check.case, run): result.measured for run, check, result in items},
+        values={
+            (check.case, run): result.measured
+            for run, check, result in items
+            if not math.isnan(result.measured)
+        },
         deviation=("relative" if relative else "absolute") if known else "",
     )

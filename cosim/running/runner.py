@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import need_function, need_number, need_table, need_text
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
 from ..errors import StepError, UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
+from ..master.algorithms import names
 from ..master.master import Master
 from ..master.outline import Outline
 from ..master.session import Session
@@ -194,21 +196,25 @@ def _recorded(
 ) -> tuple[tuple[str, ...], list[str]]:
     """Signals to record, and notes on what a changed variant does not have."""
     needed = [name for item in scenario.references.values() for name in item.signals]
-    needed += [name for check in scenario.checks for name in check.needs]
     shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
     everything = system.signals() if scenario.record is None else scenario.record
-    kept, notes = [], []
-    for name in (*everything, *shown):
+    notes = []
+
+    def has(name: str) -> bool:
         instance = name.partition(".")[0]
         try:
             system.variables(name)
-            kept.append(name)
         except UnknownNameError:
             if instance not in changed:
                 raise
             reference = system.members[instance].reference
             notes.append(f"{name} is not recorded: {reference} has none")
-    return tuple(dict.fromkeys([*kept, *needed])), notes
+            return False
+        return True
+
+    kept = list(filter(has, (*everything, *shown)))
+    checked = filter(has, (name for check in scenario.checks for name in check.needs))
+    return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
 
 
 @dataclass(frozen=True)
@@ -217,6 +223,7 @@ class Prepared:
 
     Attributes:
         scenario: what is run.
+        declared: instance -> variant that the scenario declares.
         variants: instance -> variant that is used.
         master: system, algorithm and step.
         record: signals to record.
@@ -225,6 +232,7 @@ class Prepared:
     """
 
     scenario: Scenario
+    declared: Mapping[str, str]
     variants: Mapping[str, str]
     master: Master
     record: tuple[str, ...]
@@ -263,7 +271,10 @@ class Prepared:
             variants=self.variants,
             recording=recording,
             comparisons=comparisons,
-            checks=tuple(evaluate(check, recording, comparisons) for check in self.scenario.checks),
+            checks=tuple(
+                evaluate(check, recording, comparisons, check.unfit(self.declared, self.variants))
+                for check in self.scenario.checks
+            ),
             wall_s=wall_s,
             fmu_steps=int(recording.provenance["fmu_steps"]),
             notes=(*self.notes, *recording.notes),
@@ -293,7 +304,7 @@ def prepare(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
         isolate=isolate, options=scenario.options,
     )  # fmt: skip
-    return Prepared(scenario, instances, master, record, _every(scenario), (*notes, *others))
+    return Prepared(scenario, usual, instances, master, record, _every(scenario), (*notes, *others))
 
 
 def run_scenario(
@@ -342,7 +353,7 @@ def find_runs(
 
 
 def run(
-    name: str,
+    name: Path | str,
     *,
     variants: Mapping[str, str] | None = None,
     parameters: Mapping[str, Any] | None = None,
@@ -376,6 +387,22 @@ def run(
     Raises:
         CosimError: see `errors`.
     """
+    name = str(name) if isinstance(name, Path) else name
+    need_text("the scenario to run", name, 'give its name or path, as in run("motor_bench")')
+    for what, table, example in (
+        ("variants", variants, 'variants={"gearbox": "lossy"}'),
+        ("parameters", parameters, 'parameters={"load.J": 0.09}'),
+        ("options", options, 'options={"extrapolation": 1}'),
+    ):
+        need_table(f"{what} of a run", table or {}, example)
+    for key, wanted in (variants or {}).items():
+        need_text(f"the variant of {key}", wanted, 'write variants={"gearbox": "lossy"}')
+    for what, value in (("step", step), ("duration", duration), ("time limit isolate", isolate)):
+        if value is not None:
+            need_number(f"{what} of a run", value, "give it in seconds")
+    if algorithm is not None:
+        need_text("the algorithm of a run", algorithm, f"take one of {', '.join(names())}")
+    need_function("progress of a run", progress)
     if provider is None:
         provider = builder.default_provider()
     whole, text, wanted, items = find_runs(name, folder, duration, step)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,11 +13,12 @@ from numpy.typing import NDArray
 from ..data.comparison import Comparison, Reference
 from ..data.recording import Recording
 from ..errors import ValueRangeError
+from ..system.variants import change
 
 Vector = NDArray[np.float64]
 CHECK_KEYS = {
     "name", "source", "of", "signal", "signals", "comparison", "after", "before", "expected",
-    "relative", "limit", "minus", "per", "quantity", "case", "reference",
+    "relative", "limit", "minus", "per", "quantity", "case", "reference", "holds_for",
 }  # fmt: skip
 
 _SIGNAL: dict[str, Callable[[Vector], float]] = {
@@ -52,6 +54,8 @@ class Check:
             column per case; "" if it does not appear there.
         reference: what the expected value is called there, or the upper limit if nothing is
             expected; "" leaves the limit out.
+        holds_for: instance -> short forms of the variants for which it holds, whatever the others
+            are; None for the variants that the scenario declares, all of them.
     """
 
     name: str
@@ -70,11 +74,27 @@ class Check:
     quantity: str = ""
     case: str = ""
     reference: str = ""
+    holds_for: Mapping[str, tuple[str, ...]] | None = None
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Signals that have to be recorded for it."""
         return (*self.signals, self.minus) if self.minus else self.signals
+
+    def unfit(self, declared: Mapping[str, str], used: Mapping[str, str]) -> str:
+        """Why it says nothing of a run with other variants than declared; "" if it does."""
+        if self.holds_for is None:
+            allowed = {name: {variant} for name, variant in declared.items()}
+        else:
+            allowed = {
+                name: {change(declared[name], short) for short in shorts}
+                for name, shorts in self.holds_for.items()
+            }
+        return ", ".join(
+            f"{name} is {used[name]}, it holds for {' or '.join(sorted(variants))}"
+            for name, variants in allowed.items()
+            if used[name] not in variants
+        )
 
 
 @dataclass(frozen=True)
@@ -82,6 +102,7 @@ class CheckResult:
     """A check's outcome; `value` must lie within `limit` (an upper bound, or [low, high]).
 
     `unit` is that of `value`; `measured` is the measure before the expected value was subtracted.
+    `unfit` says why it is not judged, "" if it is; `ok` says then whether it would be met.
     """
 
     name: str
@@ -92,17 +113,24 @@ class CheckResult:
     measured: float
     unit: str
     measured_unit: str = ""
+    unfit: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Judged, and not met."""
+        return not self.ok and not self.unfit
 
     def to_dict(self) -> dict[str, Any]:
         """As in `cosim run --json`."""
         return {
             "name": self.name,
-            "value": self.value,
+            "value": None if math.isnan(self.value) else self.value,
             "limit": self.limit,
-            "ok": self.ok,
+            "ok": None if self.unfit else self.ok,
             "source": self.source,
-            "measured": self.measured,
+            "measured": None if math.isnan(self.measured) else self.measured,
             "unit": self.unit,
+            **({"not_judged": self.unfit} if self.unfit else {}),
         }
 
 
@@ -163,7 +191,12 @@ def read_check(entry: Mapping[str, Any], references: Mapping[str, Reference]) ->
         quantity=str(entry.get("quantity", "")),
         case=str(entry.get("case", "")),
         reference=str(entry.get("reference", "")),
+        holds_for=None if "holds_for" not in entry else _shorts(entry["holds_for"]),
     )
+
+
+def _shorts(entry: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    return {name: (one,) if isinstance(one, str) else tuple(one) for name, one in entry.items()}
 
 
 def circle_radius(x: Vector, y: Vector) -> float:
@@ -210,14 +243,22 @@ def _measure(
 
 
 def evaluate(
-    check: Check, recording: Recording, comparisons: Mapping[str, Comparison]
+    check: Check, recording: Recording, comparisons: Mapping[str, Comparison], unfit: str = ""
 ) -> CheckResult:
     """Evaluate a check.
+
+    Args:
+        check: what to evaluate.
+        recording, comparisons: of the run.
+        unfit: why it is not judged; what was not recorded is then not a number.
 
     Raises:
         UnknownNameError: a signal was not recorded.
     """
-    measured, unit = _measure(check, recording, comparisons)
+    if unfit and not set(check.needs) <= set(recording.names):
+        measured, unit = math.nan, ""
+    else:
+        measured, unit = _measure(check, recording, comparisons)
     if check.per is not None:
         measured, unit = measured / check.per, "1"
     value, measured_unit = measured, unit
@@ -235,4 +276,5 @@ def evaluate(
         measured=measured,
         unit=unit,
         measured_unit=measured_unit,
+        unfit=unfit,
     )

@@ -241,6 +241,14 @@ class _Reader:
                 checks.append(read_check(entry, references))
             except ValueError as error:
                 raise self.fail(str(error)) from error
+        system = self.system()
+        for check in checks:
+            for name in check.holds_for or ():
+                if name not in system.instances:
+                    raise self.fail(
+                        f"check {check.name!r}: holds_for names no instance {name!r}; "
+                        f"{listing(system.instances, name)}"
+                    )
         period = self.optional(record, "period")
         signals = record.get("signals")
         return Scenario(
@@ -250,7 +258,7 @@ class _Reader:
             question=table.get("question", ""),
             expected=table.get("expected", ""),
             source=table.get("source", ""),
-            system=self.system(),
+            system=system,
             duration=self.number("duration"),
             start=self.number("start", 0.0),
             step=self.number("step"),
@@ -312,8 +320,17 @@ class _Reader:
                 self.file.logs[key] = read_log(self.folder / entry["file"])
         return self.file.logs[key]
 
-    def samples(self, what: str, entry: Any, column: str) -> tuple[Any, Any, str, str]:
-        """Times, values, unit and text of a column of a log, or of an inline table."""
+    def samples(
+        self, what: str, entry: Any, column: str, *, exact: bool = False
+    ) -> tuple[Any, Any, str, str]:
+        """Times, values, unit and text of a column of a log, or of an inline table.
+
+        Args:
+            what: needs them, for error texts.
+            entry: says where they are.
+            column: of the log.
+            exact: as they are, where doubles do not carry them.
+        """
         if "times" in entry:
             if "values" not in entry:
                 raise self.fail(f"{what}: times without values")
@@ -329,7 +346,10 @@ class _Reader:
         log = self.log(entry)
         unit = entry.get("unit", log.units.get(column, ""))
         text = f"{log.name}:{column}"
-        return log[str(entry.get("time", "time"))], log[column], unit, text
+        times = log[str(entry.get("time", "time"))]
+        if exact and column in log.exact:
+            return times, log.exact[column], unit, text
+        return times, log[column], unit, text
 
     def signal(self, name: str, entry: Any) -> Signal | SignalVector:
         """The signal of an input, or those of all elements of a vector input."""
@@ -356,7 +376,7 @@ class _Reader:
         )
 
     def table_signal(self, what: str, entry: Any, column: str, hold: Any) -> Table:
-        times, values, unit, text = self.samples(what, entry, column)
+        times, values, unit, text = self.samples(what, entry, column, exact=hold == "hold")
         return Table(
             times, values, unit=unit, interpolation=hold, text=text, extend="times" in entry
         )

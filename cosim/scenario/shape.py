@@ -49,6 +49,7 @@ _CHECK: dict[str, Check] = {
     "comparison": text, "minus": text, "quantity": said, "case": said, "reference": said,
     "after": floating, "before": floating, "expected": number, "per": number, "relative": flag,
     "limit": either("a number, or two", floating, list_of(floating, 2)),
+    "holds_for": table_of(either("a variant or a list of variants", text, texts)),
 }  # fmt: skip
 _AXES: dict[str, Check] = {
     "label": said, "signals": texts, "paths": list_of(list_of(text, 2)), "comparisons": texts,

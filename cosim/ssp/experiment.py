@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.signals import Signal, SignalVector, as_signal
+from ..data.signals import Signal, SignalVector, as_signal, objects
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..scenario.scenario import Scenario
 from ..system.provider import Provider
@@ -38,6 +39,10 @@ class _Scaled:
         """Values at these times."""
         values = np.asarray(self.signal.at(times), dtype=np.float64)
         return self.factor * values + self.offset
+
+    def objects(self, times: Vector) -> list[Any]:
+        """What doubles do not carry, where nothing is to be calculated with it."""
+        return objects(self.signal, times) if (self.factor, self.offset) == (1.0, 0.0) else []
 
 
 def read_scenario(

@@ -55,7 +55,14 @@ def spread(system: System, inputs: Mapping[str, Driver]) -> dict[str, Signal]:
             raise ConnectError(
                 f"input {name} has {len(elements)} elements, but {len(drivers)} signals are given"
             )
-        for element, single in zip(elements, drivers, strict=True):
+        for alias, single in zip(elements, drivers, strict=True):
+            element = system.first_name(alias)
+            if element in signals:
+                raise GraphError(
+                    f"input {element} is given twice"
+                    + (f", as {alias}, too" if alias != element else "")
+                    + "; drop one of the two"
+                )
             source = system.driver(element)
             if source is not None:
                 raise GraphError(

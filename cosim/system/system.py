@@ -145,6 +145,9 @@ class System:
             ValueRangeError: outside the declared bounds, or not finite.
         """
         member, variables = self.variables(name)
+        if variables[0].alias:
+            name = self.first_name(name)
+            member, variables = self.variables(name)
         first = variables[0]
         calculated = first.causality in ("output", "independent", "calculatedParameter")
         if calculated and first.initial not in ("exact", "approx"):
@@ -213,7 +216,7 @@ class System:
             self._wire(
                 what,
                 (out, f"{giver.name}.{out_name}"),
-                (into, f"{taker.name}.{into_name}"),
+                (into, self.first_name(f"{taker.name}.{into_name}")),
                 (factor, offset),
                 convert,
             )
@@ -296,6 +299,12 @@ class System:
             if variable.type in TYPES
             for element in variable.elements()
         ]
+
+    def first_name(self, name: str) -> str:
+        """The first name of a variable that a full name, perhaps an alias, means."""
+        instance, _, variable = name.partition(".")
+        whole = self.declaration(name)
+        return f"{instance}.{whole.alias}{variable[len(whole.name) :]}" if whole.alias else name
 
     def unit(self, name: str) -> str:
         """Unit of a variable, "" where the FMU declares none."""

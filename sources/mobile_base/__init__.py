@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..component import Component, Port
-from ..quantity import Quantity
+from ..quantity import INERTIA_UNITS, WRENCH_UNITS, Quantity
 
 TAU_L = Quantity("tau_l", "N.m", "torque on the left drive wheel, positive drives forward")
 TAU_R = Quantity("tau_r", "N.m", "torque on the right drive wheel, positive drives forward")
@@ -12,14 +12,16 @@ J_R = Quantity("J_r", "kg.m2", "inertia that the right drive wheel carries for i
 ARM_INERTIA = Quantity(
     "arm_inertia",
     "1",
-    "6x6 inertia of the arm at the mount (linear before angular, SI), upper triangle row by row",
+    "6x6 inertia of the arm at the mount (linear before angular), upper triangle row by row",
     size=21,
+    units=INERTIA_UNITS,
 )
 ARM_BIAS = Quantity(
     "arm_bias",
     "1",
-    "wrench [N, N.m] that the mount applies to the arm at zero acceleration, body axes",
+    "wrench that the mount applies to the arm at zero acceleration, body axes",
     size=6,
+    units=WRENCH_UNITS,
 )
 
 X = Quantity("x", "m", "world position of the drive-axle centre O")

@@ -25,7 +25,7 @@ from cosim.spec.variant import Name
 from ..function import Functions, build_functions
 from ..model import Model, ModelError
 from ..variant import build_model, fidelities, parse_name
-from . import description, native, python
+from . import description, native, python, rights
 from .archive import pack
 from .cache import cache_folder, write_atomically
 from .layout import Entry, layout
@@ -190,7 +190,7 @@ def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
         "resources/slavemodule.txt": module.encode(),
         f"resources/{module}.py": source.encode(),
     }
-    return files | python.binaries(identifier), source
+    return files | python.binaries(identifier) | rights.pythonfmu(), source
 
 
 @lru_cache(maxsize=1)
@@ -204,6 +204,7 @@ def sources_key() -> str:
                 digest.update(name + b"\0" + path.read_bytes())
     for package in ("casadi", "pythonfmu", "ziglang"):
         digest.update(importlib.metadata.version(package).encode())
+    digest.update(f"{rights.attributes()}".encode() + rights.LICENSE.read_bytes())
     return digest.hexdigest()
 
 
@@ -269,6 +270,7 @@ def build(
         files, source = _native_files(variant, fmi) if kind == "native" else _python_files(variant)
         files["documentation/index.html"] = _documentation(variant)
         files["extra/cosim/component.json"] = component_json(variant)
+        files |= rights.files()
     if kind == "native":
         files |= _libraries(source, parsed.identifier, fmi, _platforms(platform))
     content = pack(files)

@@ -9,10 +9,10 @@ from xml.etree import ElementTree as ET
 from ..function import Functions
 from ..model import Model
 from ..units import base_exponents, coherent
+from . import rights
 from .layout import METHODS, Entry
 
 Kind = Literal["native", "python"]
-TOOL = "cosim"
 SOURCE_FILES = ("all.c",)
 LOG_CATEGORIES = ("logStatusDiscard", "logStatusError")
 
@@ -135,7 +135,7 @@ def describe_fmi2(
             modelName=name,
             guid=token,
             description=model.component.text,
-            generationTool=TOOL,
+            **rights.attributes(),
             variableNamingConvention="structured",
             numberOfEventIndicators=0,
         ),
@@ -253,7 +253,7 @@ def describe_fmi3(
             modelName=name,
             instantiationToken=token,
             description=model.component.text,
-            generationTool=TOOL,
+            **rights.attributes(),
             variableNamingConvention="structured",
         ),
     )
@@ -264,18 +264,20 @@ def describe_fmi3(
         providesDirectionalDerivatives=True,
     )
     ET.SubElement(root, "ModelExchange", common)
-    ET.SubElement(
-        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
-    )
-    shown = shown_entries(entries)
-    _units(root, [entries[0], *(entry for _, entry in shown)])
-    if any(entry.part == "solver" for _, entry in shown):
+    simulation = _attributes(canHandleVariableCommunicationStepSize=True, hasEventMode=True)
+    ET.SubElement(root, "CoSimulation", common | simulation)
+    listed = [entries[0], *(entry for _, entry in shown_entries(entries))]
+    _units(root, listed)
+    if any(entry.part == "solver" for entry in listed):
         types = ET.SubElement(root, "TypeDefinitions")
         _method_items(ET.SubElement(types, "EnumerationType", name="SolverMethod"))
     _logs_and_experiment(root)
     variables = ET.SubElement(root, "ModelVariables")
-    reference_of = {entry.name: reference for reference, entry in enumerate(entries)}
-    for reference, entry in [(0, entries[0]), *shown]:
+    # FMI 3 names variables by value reference; these count from 1 along the list, because
+    # OMSimulator takes those in ModelStructure for positions there
+    reference_of = {entry.name: place for place, entry in enumerate(listed, 1)}
+    for entry in listed:
+        reference = reference_of[entry.name]
         attributes = _attributes(
             name=entry.name,
             valueReference=reference,
@@ -295,21 +297,23 @@ def describe_fmi3(
             attributes["derivative"] = str(reference_of[entry.name[4:-1]])
         ET.SubElement(variables, "Float64", attributes)
     structure = ET.SubElement(root, "ModelStructure")
-    known = {e.name: reference_of[e.name] for _, e in shown if e.part in ("state", "input")}
-    known["time"] = 0  # the independent variable, which FMI 2 does not list here
+    # the time is a known like any other in FMI 3: a list without it says that nothing depends on it
+    known = {e.name: reference_of[e.name] for e in listed if e.part in ("time", "state", "input")}
     for part, tag in (("output", "Output"), ("derivative", "ContinuousStateDerivative")):
-        for reference, entry in shown:
+        for entry in listed:
             if entry.part == part:
                 dependencies = _dependencies(entry, functions, known)
                 ET.SubElement(
                     structure,
                     tag,
                     _attributes(
-                        valueReference=reference, dependencies=" ".join(map(str, dependencies))
+                        valueReference=reference_of[entry.name],
+                        dependencies=" ".join(map(str, dependencies)),
                     ),
                 )
-    for reference, entry in shown:
+    for entry in listed:
         if entry.part in ("output", "derivative"):
+            reference = reference_of[entry.name]
             ET.SubElement(structure, "InitialUnknown", _attributes(valueReference=reference))
     return _serialize(root)
 

@@ -34,10 +34,16 @@ f_solve: Any = None
 
 # -- run time ---------------------------------------------------------------------------------
 SLACK = 1e-7  # part of its period by which a tick may be early
+EPSILON = 2.0**-52  # of doubles
 KEEP = 20  # steps with one Jacobian
 GAMMA = 0.435866521508459  # of ROS34PW2
 GROW, SHRINK, SAFETY = 5.0, 0.1, 0.9  # of error-controlled steps
 TRIALS, TRIALS_PER_STEP = 2e5, 1e3  # over one stretch, and for each solver.step of it
+
+
+def _slack(period: float, time: float) -> float:
+    """What a tick at a time may be early by."""
+    return SLACK * period + 4.0 * EPSILON * abs(time)
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
@@ -82,7 +88,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 raise ValueError(
                     f"{MODEL}: sample clock {k} has period {period:g} s; it must be positive"
                 )
-            self.tick[k] = float(_math.ceil(self.v[0] / period - SLACK))
+            self.tick[k] = float(_math.ceil((self.v[0] - _slack(period, self.v[0])) / period))
             self.next[k] = self.tick[k] * period
         self._refresh()
         self._check(self.IXD, NX)
@@ -211,7 +217,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _run_ticks(self) -> None:
         v = self.v
         for k, period in enumerate(self.period):
-            if self.next[k] <= v[0] + SLACK * period:
+            if self.next[k] <= v[0] + _slack(period, v[0]):
                 z, u, p = self._slices()
                 result = [0.0] * NZ
                 UPDATES[k]([v[0]], v[self.IX : self.IXD], z, u, p, result)
@@ -223,7 +229,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _next_tick(self, end: float) -> float:
         first = end
         for following, period in zip(self.next, self.period, strict=True):
-            if following < end - SLACK * period and following < first:
+            if following + _slack(period, following) < end and following < first:
                 first = following
         return first
 

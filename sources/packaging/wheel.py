@@ -1,4 +1,4 @@
-"""Build hook of the wheel: put sources, scenarios and FMUs below `cosim_library`.
+"""Build hook of the wheel: put sources, scenarios, FMUs and the licence below `cosim_library`.
 
 An editable installation takes them from the checkout.
 """
@@ -19,5 +19,5 @@ class LibraryHook(BuildHookInterface):  # type: ignore[misc]
         if version == "editable":
             return
         root = Path(self.root)
-        for folder in ("sources", "scenarios", "fmus"):
-            build_data["force_include"][str(root / folder)] = f"cosim_library/{folder}"
+        for name in ("sources", "scenarios", "fmus", "LICENSE"):
+            build_data["force_include"][str(root / name)] = f"cosim_library/{name}"

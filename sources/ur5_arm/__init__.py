@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..component import Component, Port
-from ..quantity import Quantity
+from ..quantity import INERTIA_UNITS, WRENCH_UNITS, Quantity
 
 TAU = Quantity("tau", "N.m", "torques of the gears on the joints", size=6, nominal=50.0)
 J_ADDED = Quantity(
@@ -40,8 +40,9 @@ TOOL_ROTATION = Quantity(
 WRENCH = Quantity(
     "wrench",
     "1",
-    "force [N] and moment [N.m] of the mount on the arm at the mount, mount axes",
+    "force and moment of the mount on the arm at the mount, mount axes",
     size=6,
+    units=WRENCH_UNITS,
 )
 MOUNT_FORCE = Quantity(
     "mount_force",
@@ -55,14 +56,16 @@ MOUNT_MOMENT = Quantity(
 ARM_INERTIA = Quantity(
     "arm_inertia",
     "1",
-    "wrench per acceleration of the mount, 6x6 in kg, kg.m and kg.m2, upper triangle row by row",
+    "wrench per acceleration of the mount, 6x6, upper triangle row by row",
     size=21,
+    units=INERTIA_UNITS,
 )
 ARM_BIAS = Quantity(
     "arm_bias",
     "1",
-    "wrench for a mount that is not accelerated, force [N] and moment [N.m], mount axes",
+    "wrench for a mount that is not accelerated, force and moment, mount axes",
     size=6,
+    units=WRENCH_UNITS,
 )
 
 ANGLE = Quantity(

@@ -27,6 +27,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "cosim", folder / "cosim", ignore=ignored)
     for name in ("sources", "scenarios"):
         shutil.copytree(ROOT / name, folder / "cosim_library" / name, ignore=ignored)
+    shutil.copy(ROOT / "LICENSE", folder / "cosim_library")
     (folder / "cosim_library" / "fmus" / "fmi2").mkdir(parents=True)
     return folder
 

@@ -235,6 +235,57 @@ def test_a_shorter_run_keeps_only_the_checks_that_it_reaches(folder: Path, provi
     assert set(short.checks) == {"early"}
 
 
+def _with_checks(folder: Path, *holds: str) -> None:
+    path = folder / "disc" / "scenario.toml"
+    path.write_text(
+        path.read_text()
+        + "".join(
+            f'[[checks]]\nname = "{i}"\nsignal = "load.w"\nof = "peak"\nlimit = -1\n{line}\n'
+            for i, line in enumerate(holds)
+        )
+    )
+
+
+def test_checks_of_declared_variants_do_not_judge_others(folder: Path, provider) -> None:
+    _with_checks(
+        folder, "", "holds_for = {}", 'holds_for = { load = "pendulum" }',
+        'holds_for = { load = ["disc", "pendulum"] }', 'holds_for = { load = "disc" }',
+    )  # fmt: skip
+
+    def failed(**changes) -> set[str]:
+        found = run("disc", provider=provider, folder=folder, **changes).checks
+        assert {name for name, check in found.items() if check.to_dict()["ok"] is None} == {
+            name for name, check in found.items() if check.unfit
+        }
+        return {name for name, check in found.items() if check.failed}
+
+    assert failed() == {"0", "1", "3", "4"}
+    assert failed(parameters={"load.J": 0.2}) == {"0", "1", "3", "4"}  # values change no variant
+    assert failed(variants={"load": "pendulum"}) == {"1", "2", "3"}
+    assert failed(variants={"load": "disc"}) == {"0", "1", "3", "4"}  # the declared one again
+
+
+def test_why_a_check_is_not_judged(folder: Path, provider) -> None:
+    _with_checks(folder, "")
+    result = run("disc", provider=provider, folder=folder, variants={"load": "+coulomb@flange"})
+    why = "load is inertia.lab_bench/disc+coulomb@flange, it holds for inertia.lab_bench/disc"
+    assert [check.to_dict()["not_judged"] for check in result.checks.values()] == [why, why]
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ('holds_for = { lod = "disc" }', "check '0': holds_for names no instance 'lod'; did you"),
+        ('holds_for = "disc"', "holds_for must be a table"),
+        ("holds_for = { load = 1 }", "holds_for load must be a variant or a list of variants"),
+    ],
+)
+def test_wrong_holds_for(folder: Path, provider, line, text) -> None:
+    _with_checks(folder, line)
+    with pytest.raises(ScenarioError, match=text):
+        run("disc", provider=provider, folder=folder)
+
+
 def test_what_a_changed_variant_does_not_have_is_left_out_and_noted(folder: Path, provider) -> None:
     path = folder / "systems" / "disc.toml"
     path.write_text(path.read_text().replace("inertia.lab_bench/disc", "inertia/pendulum"))

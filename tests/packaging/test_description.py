@@ -55,7 +55,7 @@ def test_both_versions_describe_the_same_variables(described: Described) -> None
     assert list(of_two) == list(of_three)
     for key, first in of_two.items():
         second = of_three[key]
-        for attribute in ("valueReference", "causality", "variability", "initial", "start", "min"):
+        for attribute in ("causality", "variability", "initial", "start", "min"):
             assert first.get(attribute) == second.get(attribute), (key, attribute)
         for attribute in ("max", "nominal", "unit", "description"):
             assert first.get(attribute) == second.get(attribute), (key, attribute)
@@ -80,6 +80,13 @@ def test_names_are_structured_and_references_unique(described: Described) -> Non
         assert grammar.fullmatch(variable["name"]), variable["name"]
     assert len({v["name"] for v in listed}) == len({v["valueReference"] for v in listed})
     assert len({v["name"] for v in listed}) == len(listed)
+
+
+def test_references_of_fmi_3_are_positions_in_the_list(described: Described) -> None:
+    """OMSimulator takes the value references in ModelStructure for positions, counted from 1."""
+    _, _, three = described
+    listed = variables(three)
+    assert [int(v["valueReference"]) for v in listed] == list(range(1, len(listed) + 1))
 
 
 def test_derivatives_stand_in_the_order_of_the_states(described: Described) -> None:

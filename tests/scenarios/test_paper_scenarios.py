@@ -151,6 +151,16 @@ def test_the_swinging_arm_shifts_the_base_sideways() -> None:
         assert np.ptp(sideways[steady]) == pytest.approx(expected, abs=0.06e-3)
 
 
+@pytest.mark.parametrize("name", ["IN1", "IY"])
+def test_the_mobile_manipulator_stands_at_rest_with_all_its_mass(name) -> None:
+    """83 kg of base, 15 kg of cabinet, 20.6 kg of arm with flange; no current before the path."""
+    recording = run(f"mobile_manipulator/{name}", provider=PROVIDER, duration=0.5).recording
+    mass = sum(recording[f"base.loads[{i}]"] for i in range(1, 7)) / 9.81
+    assert mass == pytest.approx(118.6, abs=0.02)  # started off its rest: 112 to 125 kg
+    for side in ("left", "right"):  # 0.72 A from a level start; 8 mA lean on the start of IY's arm
+        assert np.abs(recording[f"current_{side}.i_meas"]).max() < 0.02
+
+
 def test_coupling_error_of_the_mobile_manipulator_shrinks_with_the_step() -> None:
     """README: largest difference of the heading to 0.125 ms; the first 4 s hold two swings."""
     courses = {

@@ -18,6 +18,7 @@
 #include "run.h"
 
 /* Whether a number is whole up to rounding, and fits: see cosim/fmu/values.py. */
+#define ROUNDING 1e-9
 #define WHOLE(v) (fabs((v) - rint(v)) <= 1e-9 + 4.0 * DBL_EPSILON * fabs(v))
 #define SIGNED(bits, v) (WHOLE(v) && rint(v) >= -ldexp(1.0, bits - 1) && rint(v) < ldexp(1.0, bits - 1))
 #define UNSIGNED(bits, v) (WHOLE(v) && rint(v) >= 0.0 && rint(v) < ldexp(1.0, bits))
@@ -87,9 +88,9 @@ static Call *call_converted(Call *c, const Call *end, double *values, int set, i
   return 0;
 }
 
-/* A step that does not end beyond the end of the run by rounding. */
+/* A step that does not miss the end of the run by rounding, and never goes beyond. */
 static double bounded(const Run *run, double t, double h) {
-  if (t + h > run->end)
+  if (t + h > run->end - ROUNDING * h)
     for (h = run->end - t; t + h > run->end;) h = nextafter(h, 0.0);
   return h;
 }

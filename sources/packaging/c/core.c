@@ -2,10 +2,12 @@
    after the generated model.c, which defines the sizes NX NU NY NP NZ NC, the tables and the CasADi
    functions; solvers.c and steps.c follow.
 
-   All variables stand in one array v of doubles; the value reference of a variable is its index:
+   All variables stand in one array v of doubles; the value reference of a variable is its index, in
+   FMI 3 one more:
    [time, x, xdot, u, y, p, z, solver.method, solver.step, solver.tolerance].
    Everything that a saved state must hold is in Memory, a plain struct. */
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -49,7 +51,9 @@ typedef struct {
 typedef struct {
   Memory m;
   int model_exchange;
+  int event_mode; /* of co-simulation, FMI 3: the importer may ask for the ticks at its points */
   int version;
+  uint32_t first; /* value reference of the time */
   int logging;
   char *name;
   void *environment;
@@ -181,6 +185,7 @@ static Instance *instantiate(const char *name, const char *token, int version, i
   Instance *c = calloc(1, sizeof *c);
   if (!c) return 0;
   c->version = version;
+  c->first = version == 3;
   c->model_exchange = model_exchange;
   c->logging = logging;
   c->environment = environment;
@@ -202,9 +207,9 @@ static void release(Instance *c) {
 
 static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
   for (size_t i = 0; i < n; i++) {
-    const uint32_t k = vr[i];
+    const uint32_t k = vr[i] - c->first;
     if (k >= METHOD && (k >= NV || k == METHOD))
-      return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
+      return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
     if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh_for(c, k);
     const double value = c->m.v[k];
     values[i] = value;
@@ -215,7 +220,8 @@ static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[
 
 static int set_value(Instance *c, uint32_t k, double value) {
   double *v = c->m.v;
-  if (k >= NV) return report(c, ERROR, "%s: there is no variable with value reference %u", MODEL, k);
+  if (k >= NV)
+    return report(c, ERROR, "%s: there is no variable with value reference %u", MODEL, k + c->first);
   if (!isfinite(value))
     return report(c, ERROR, "%s: variable %s cannot be set to %g at time %.9g s: not finite", MODEL,
                   NAMES[k], value, v[0]);
@@ -246,14 +252,14 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
   double *v = c->m.v;
   if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
   for (size_t i = 0; i < n; i++) {
-    uint32_t k = vr[i];
+    const uint32_t k = vr[i] - c->first;
     if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input, from now on held */
       if (v[k] != values[i]) c->m.stale = 1;
       v[k] = values[i];
       if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
       continue;
     }
-    if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, k);
+    if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
     int status = set_value(c, k, values[i]);
     if (status != OK) return status;
   }

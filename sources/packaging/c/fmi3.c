@@ -42,11 +42,9 @@ EXPORT Instance *fmi3InstantiateCoSimulation(const char *name, const char *token
   (void)required;
   (void)n;
   (void)update;
-  if (event_mode) {
-    if (log) log(environment, ERROR, "logStatusError", MODEL ": co-simulation has no event mode");
-    return 0;
-  }
-  return instantiate3(name, token, 0, logging, environment, log);
+  Instance *c = instantiate3(name, token, 0, logging, environment, log);
+  if (c) c->event_mode = event_mode;
+  return c;
 }
 
 EXPORT Instance *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *resources,
@@ -74,7 +72,9 @@ EXPORT fmi3Status fmi3EnterInitializationMode(Instance *c, fmi3Boolean tolerance
 }
 
 EXPORT fmi3Status fmi3ExitInitializationMode(Instance *c) { return leave_initialization(c); }
-EXPORT fmi3Status fmi3EnterEventMode(Instance *c) { return fmi2EnterEventMode(c); }
+EXPORT fmi3Status fmi3EnterEventMode(Instance *c) {
+  return c->event_mode ? change_mode(c, STEPPING, EVENT, "entering event mode") : fmi2EnterEventMode(c);
+}
 EXPORT fmi3Status fmi3Terminate(Instance *c) { return fmi2Terminate(c); }
 EXPORT fmi3Status fmi3Reset(Instance *c) { return fmi2Reset(c); }
 
@@ -90,7 +90,7 @@ EXPORT fmi3Status fmi3SetFloat64(Instance *c, const uint32_t vr[], size_t n, con
 
 EXPORT fmi3Status fmi3GetInt64(Instance *c, const uint32_t vr[], size_t n, int64_t values[], size_t nv) {
   for (size_t i = 0; i < n; i++) {
-    if (vr[i] != METHOD || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
+    if (vr[i] != METHOD + c->first || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
     values[i] = (int64_t)c->m.v[METHOD];
   }
   return OK;
@@ -98,7 +98,7 @@ EXPORT fmi3Status fmi3GetInt64(Instance *c, const uint32_t vr[], size_t n, int64
 
 EXPORT fmi3Status fmi3SetInt64(Instance *c, const uint32_t vr[], size_t n, const int64_t values[], size_t nv) {
   for (size_t i = 0; i < n; i++) {
-    if (vr[i] != METHOD || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
+    if (vr[i] != METHOD + c->first || nv != n) return report(c, ERROR, "%s: value reference %u is no Int64", MODEL, vr[i]);
     if (c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
     const int status = set_value(c, METHOD, (double)values[i]);
     if (status != OK) return status;
@@ -282,7 +282,10 @@ EXPORT fmi3Status fmi3UpdateDiscreteStates(Instance *c, fmi3Boolean *needed, fmi
   return status;
 }
 
-EXPORT fmi3Status fmi3EnterContinuousTimeMode(Instance *c) { return fmi2EnterContinuousTimeMode(c); }
+EXPORT fmi3Status fmi3EnterContinuousTimeMode(Instance *c) {
+  if (!c->model_exchange) return report(c, ERROR, "%s: co-simulation has no continuous-time mode", MODEL);
+  return fmi2EnterContinuousTimeMode(c);
+}
 
 EXPORT fmi3Status fmi3CompletedIntegratorStep(Instance *c, fmi3Boolean no_rollback, fmi3Boolean *event,
                                               fmi3Boolean *terminate) {
@@ -321,7 +324,8 @@ EXPORT fmi3Status fmi3GetNumberOfContinuousStates(Instance *c, size_t *n) {
 }
 
 EXPORT fmi3Status fmi3EnterStepMode(Instance *c) {
-  return report(c, ERROR, "%s: co-simulation has no event mode to leave", MODEL);
+  if (!c->event_mode) return report(c, ERROR, "%s: no event mode is used that could be left", MODEL);
+  return change_mode(c, EVENT, STEPPING, "entering step mode");
 }
 
 EXPORT fmi3Status fmi3GetOutputDerivatives(Instance *c, const uint32_t vr[], size_t n, const int32_t order[],
@@ -334,7 +338,7 @@ EXPORT fmi3Status fmi3DoStep(Instance *c, double t, double h, fmi3Boolean no_rol
                              fmi3Boolean *terminate, fmi3Boolean *early, double *last) {
   (void)no_rollback;
   const int status = do_step(c, t, h);
-  if (event) *event = false;
+  if (event) *event = c->event_mode && status == OK && tick_due(c);
   if (terminate) *terminate = false;
   if (early) *early = false;
   if (last) *last = c->m.v[0];

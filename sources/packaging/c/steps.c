@@ -1,8 +1,12 @@
 /* -- sample clocks ----------------------------------------------------------------------------- */
 
-/* Ticks lie at k*T. One within 1e-7 T of the end of a step belongs to the next step, at whose beginning
-   it is due, so that rounding of k*H and k*T cannot split one instant into two. */
+/* Ticks lie at k*T. One within 1e-7 T and the rounding of t of the end of a step belongs to the next
+   step, at whose beginning it is due, so that rounding of k*H and k*T cannot split one instant into two.
+   An importer that uses the event mode of co-simulation (FMI 3) has it executed there, with the inputs of
+   that point, as in model exchange. */
 #define SLACK 1e-7
+
+static double slack(double period, double t) { return SLACK * period + 4 * DBL_EPSILON * fabs(t); }
 
 static int start_clocks(Instance *c) {
 #if NC
@@ -13,7 +17,7 @@ static int start_clocks(Instance *c) {
   for (int k = 0; k < NC; k++) {
     if (!(m->period[k] > 0))
       return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, m->period[k]);
-    m->tick[k] = ceil(m->v[0] / m->period[k] - SLACK);
+    m->tick[k] = ceil((m->v[0] - slack(m->period[k], m->v[0])) / m->period[k]);
     m->next[k] = m->tick[k] * m->period[k];
   }
 #else
@@ -28,7 +32,7 @@ static void run_ticks(Instance *c) {
   Memory *m = &c->m;
   double *v = m->v, z[NZ + 1];
   for (int k = 0; k < NC; k++) {
-    if (!(m->next[k] <= v[0] + SLACK * m->period[k])) continue;
+    if (!(m->next[k] <= v[0] + slack(m->period[k], v[0]))) continue;
     const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
     double *res[] = {z};
     UPDATES[k](arg, res, 0, 0, 0);
@@ -42,11 +46,18 @@ static void run_ticks(Instance *c) {
 #endif
 }
 
+/* Whether a clock is due at the present time. */
+static int tick_due(const Instance *c) {
+  for (int k = 0; k < NC; k++)
+    if (c->m.next[k] <= c->m.v[0] + slack(c->m.period[k], c->m.v[0])) return 1;
+  return 0;
+}
+
 /* Time of the first tick that lies clearly before `end`, else `end`. */
 static double next_tick(const Instance *c, double end) {
   double first = end;
   for (int k = 0; k < NC; k++)
-    if (c->m.next[k] < end - SLACK * c->m.period[k] && c->m.next[k] < first) first = c->m.next[k];
+    if (c->m.next[k] + slack(c->m.period[k], c->m.next[k]) < end && c->m.next[k] < first) first = c->m.next[k];
   return first;
 }
 
@@ -130,7 +141,6 @@ static int terminate(Instance *c) {
   return status;
 }
 
-/* Model exchange only: co-simulation is in step mode once it is initialized. */
 static int change_mode(Instance *c, int from, int to, const char *call) {
   const int status = only_in(c, IN(from), call);
   if (status == OK) c->m.mode = to;
@@ -140,6 +150,7 @@ static int change_mode(Instance *c, int from, int to, const char *call) {
 static int set_time(Instance *c, double time) {
   const int status = only_in(c, IN(EVENT) | IN(CONTINUOUS), "setting the time");
   if (status != OK) return status;
+  if (!c->model_exchange) return report(c, ERROR, "%s: the time of co-simulation is set by its steps", MODEL);
   if (!isfinite(time)) return report(c, ERROR, "%s: time cannot be set to %g: not finite", MODEL, time);
   c->m.v[0] = time;
   c->m.stale = 1;
@@ -165,7 +176,7 @@ static int leave_initialization(Instance *c) {
   status = check_finite(c, IXD, NX);
   if (status == OK) status = check_finite(c, IY, NY);
   if (status != OK) return status;
-  c->m.mode = c->model_exchange ? EVENT : STEPPING;
+  c->m.mode = c->model_exchange || c->event_mode ? EVENT : STEPPING;
   return OK;
 }
 
@@ -174,19 +185,20 @@ static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const 
   double s[NV] = {0}, dxdot[NX + 1], dy[NY + 1];
   double *v = c->m.v;
   for (size_t i = 0; i < nk; i++) {
-    uint32_t k = knowns[i];
+    const uint32_t k = knowns[i] - c->first;
     if (k >= NV || (k >= IXD && k < IU) || (k >= IY && k < IP) || k >= IS)
-      return report(c, ERROR, "%s: no directional derivative with respect to value reference %u", MODEL, k);
+      return report(c, ERROR, "%s: no directional derivative with respect to value reference %u", MODEL,
+                    knowns[i]);
     s[k] = seed[i];
   }
   const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP, s, s + IX, s + IZ, s + IU, s + IP};
   double *res[] = {dxdot, dy};
   f_directional(arg, res, 0, 0, 0);
   for (size_t i = 0; i < nu; i++) {
-    uint32_t k = unknowns[i];
+    const uint32_t k = unknowns[i] - c->first;
     if (k >= IXD && k < IU) result[i] = dxdot[k - IXD];
     else if (k >= IY && k < IP) result[i] = dy[k - IY];
-    else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, k);
+    else return report(c, ERROR, "%s: no directional derivative of value reference %u", MODEL, unknowns[i]);
     if (!isfinite(result[i]))
       return report(c, ERROR, "%s: directional derivative of %s is not finite (%g) at time %.9g s", MODEL, NAMES[k],
                     result[i], v[0]);

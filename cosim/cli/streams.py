@@ -1,0 +1,45 @@
+"""Standard output for one JSON value alone: whatever FMUs print goes to standard error.
+
+FMUs print from C and from Python, to the file descriptor or to `sys.stdout`, and C's buffers are
+written when the process ends. So the descriptor is turned away until then.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+_kept: list[TextIO] = []
+
+
+@contextmanager
+def stdout_for_json() -> Iterator[None]:
+    """Inside, only `print_json` writes to standard output."""
+    given = sys.stdout
+    given.flush()
+    try:
+        own = given.fileno() == 1
+    except (OSError, ValueError):  # in memory
+        own = False
+    if own:
+        _kept.append(os.fdopen(os.dup(1), "w", encoding="utf-8"))
+        os.dup2(2, 1)
+    else:
+        _kept.append(given)
+    sys.stdout = sys.stderr
+    try:
+        yield
+    finally:
+        _kept.pop().flush()
+        sys.stdout = given
+
+
+def print_json(content: Any) -> None:
+    """Print one JSON value."""
+    out = _kept[-1] if _kept else sys.stdout
+    out.write(json.dumps(content, indent=2) + "\n")
+    out.flush()
