@@ -1,9 +1,8 @@
-"""The commands of `cosim fmus`: the catalogue, building, checking."""
+"""The commands of `cosim fmus`: the catalogue, and building."""
 
 from __future__ import annotations
 
 import itertools
-from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -11,15 +10,19 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import CheckError, FmuFileError, InputError, VariantError, listing
+from ..errors import InputError, VariantError, listing
 from ..installation import places
 from ..installation.builder import naming_errors, sources
+from .check import check_command
 from .output import AsJson, new_table, open_console, say
 from .streams import print_json
 
 fmus_app = typer.Typer(
     help="The component catalogue: list, build and check FMUs.", no_args_is_help=True
 )
+
+
+fmus_app.command("check")(check_command)
 
 
 class Kind(StrEnum):
@@ -206,43 +209,3 @@ def _asked(variants: Sequence[str]) -> list[str]:
             else [asked]
         )
     ]
-
-
-@fmus_app.command("check")
-def fmus_check(
-    files: Annotated[
-        list[Path] | None, typer.Argument(help=".fmu files; those of the library if none is given.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check FMUs, ours or anybody's, without running anything of them.
-
-    Errors break the standard of FMI, or keep masters from running the FMU; warnings are allowed,
-    but others may stumble over them.
-
-    Example: `cosim fmus check gearbox.fmu`
-    """
-    from ..fmu.check import check
-
-    paths = list(files or sorted(places.fmus().rglob("*.fmu")))
-    for path in paths:
-        if not path.is_file():
-            raise FmuFileError(f"{path}: there is no such file")
-    if not paths:
-        raise InputError(f"{places.fmus()}: has no .fmu; build some with 'cosim fmus build'")
-    results = {}
-    bad = 0
-    for path in paths:
-        findings = check(path)
-        results[str(path)] = [finding.to_dict() for finding in findings]
-        bad += any(finding.severity == "error" for finding in findings)
-        if not as_json:
-            counts = Counter(finding.severity for finding in findings)
-            shown = ", ".join(f"{number} {kind}(s)" for kind, number in counts.items())
-            typer.echo(f"{path}: {shown or 'ok'}")
-            for finding in findings:
-                typer.echo(f"  {finding}")
-    if as_json:
-        print_json({"checked": len(results), "with_problems": bad, "problems": results})
-    if bad:
-        raise CheckError(f"{bad} of {len(results)} FMUs have problems")

@@ -17,6 +17,7 @@ from ..reading.libraries import cut_short
 from ..reading.limits import TEXT, UNPACKED, VALUES
 from ..spec.cache import cache_folder
 from .description import Description, read_description
+from .metadata import ENTRY
 
 
 def platform_folders(fmi: Literal[2, 3]) -> tuple[str, ...]:
@@ -91,6 +92,10 @@ class Fmu:
         )
 
 
+_TEXTS = ("modelDescription.xml", ENTRY, "SystemStructure.ssd")
+"""Files that are read whole; one that is too long is not unpacked first."""
+
+
 def unpacked(
     path: Path, kind: str, what: str, error: type[InputError], shown: str = ""
 ) -> tuple[Path, str]:
@@ -126,7 +131,11 @@ def unpacked(
     folder = cache_folder() / kind / digest[:32]
     try:
         with archives.opened(path) as archive:
-            if not archives.intact(archives.members(archive), folder):
+            entries = archives.members(archive)
+            for name in _TEXTS:
+                if name in entries and (excess := TEXT.excess(entries[name].file_size)):
+                    raise ArchiveError(f"{name}: {excess}")
+            if not archives.intact(entries, folder):
                 archives.unpack(archive, folder)
     except ArchiveError as problem:
         raise error(f"{shown}: {problem}") from problem

@@ -164,7 +164,9 @@ def read_scenario(path: Path | str, name: str = "") -> ScenarioFile:
     check_outside(table, str(path))
     runs: dict[str, Mapping[str, Any]] = {}
     if "table" in table:
-        runs.update({run: {"": row} for run, row in table_runs(path, table["table"]).items()})
+        with within(str(path)):
+            rows = table_runs(path, table["table"])
+        runs.update({run: {"": row} for run, row in rows.items()})
     for run, changes in table.get("runs", {}).items():
         _only(path, changes, KEYS - {"runs", "table"}, f"run {run}")
         check_outside(changes, f"{path}, run {run}")

@@ -11,6 +11,7 @@ import pytest
 
 from cosim import ssp
 from cosim.errors import FmuFileError, InputError, ScenarioError
+from cosim.fmu import archive
 from cosim.fmu.archive import open_fmu
 from cosim.reading import archives, limits, markup
 from cosim.reading.limits import DATA, UNPACKED
@@ -54,7 +55,12 @@ def test_limits_are_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_long_description(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archive, "cache_folder", lambda: tmp_path / "cache")
     path = pack(tmp_path / "long.fmu", fmi2(definitions=f"<!--{' ' * 2_000_000}-->"))
+    monkeypatch.setenv("COSIM_MAX_TEXT", "1MB")
+    refused(path)
+    assert not list((tmp_path / "cache").rglob("modelDescription.xml"))  # nothing was unpacked
+    monkeypatch.delenv("COSIM_MAX_TEXT")
     assert open_fmu(path).description.name == "m"
     # read with a larger limit, then refused with the smaller one
     monkeypatch.setenv("COSIM_MAX_TEXT", "1MB")

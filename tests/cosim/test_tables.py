@@ -73,6 +73,13 @@ def test_scenarios(tmp_path: Path, content: str, message: str) -> None:
     assert message in refused(tmp_path, scenario, rest + content + "\n")
 
 
+def test_a_table_that_is_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text(SCENARIO + '[table]\nfile = "/none.csv"\nname = "r"\n')
+    with pytest.raises(ScenarioError, match=r"x\.toml: /none\.csv: there is no such file"):
+        read_scenario(path)
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [

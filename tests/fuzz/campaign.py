@@ -179,6 +179,8 @@ def campaign(
             done += batch
             if callable(told):
                 told(found)
+    except KeyboardInterrupt:  # what was counted until then is given
+        print("interrupted", file=sys.stderr)
     finally:
         worker.close()
         worker.folder.cleanup()
