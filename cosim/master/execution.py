@@ -11,6 +11,7 @@ from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, StepError, Va
 from . import kernel
 from .initialization import initialize
 from .interpreter import Interpreter
+from .invented import invented
 from .kernel.stepper import Compiled
 from .outline import Outline
 from .plan import Stepper, decoded
@@ -159,6 +160,7 @@ class Execution:
         time = float(self.outline.times[min(self.run.index, self.outline.count)])
         text = f"run stopped at t = {time:.9g} s: {error}"
         messages = error.messages if isinstance(error, FmuCallError) else ()
+        text = "\n".join([text, *invented(*self.energies())])
         recording = self.recording(text) if keep else None
         return StepError(text, messages, time=time, recording=recording)
 
@@ -168,16 +170,30 @@ class Execution:
 
     def recording(self, error: str = "") -> Recording:
         """What was recorded so far."""
-        run = self.run
-        energies = zip(run.layout.bonds, run.bond_energy, strict=True)
+        run, (energy, turnover) = self.run, self.energies()
         return self.outline.recording(
             run.rows[: run.row],
-            {bond.name: float(energy) for bond, energy in energies},
+            energy,
             {
                 "fmu_steps": self.steps() * len(run.instances),
                 **(self.stepper.report() if self.stepper is not None else {}),
             },
             error,
             objects=run.passing.kept,
-            notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],
+            turnover=turnover,
+            notes=self.notes(),
         )
+
+    def energies(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Energy that each power bond invented, and that went over it [J]."""
+        run = self.run
+        names = [bond.name for bond in run.layout.bonds]
+        return (
+            dict(zip(names, run.bond_energy.tolist(), strict=True)),
+            dict(zip(names, run.bond_turnover.tolist(), strict=True)),
+        )
+
+    def notes(self) -> list[str]:
+        """What is to be known of the run besides what was recorded."""
+        warnings = [text for instance in self.run.instances for text in instance.warnings()]
+        return [*filter(None, [self.ended]), *warnings]

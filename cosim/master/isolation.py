@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,9 @@ class Outcome:
     kind: str
     text: str = ""
     messages: tuple[str, ...] = ()
-    bond_energy: Mapping[str, float] | None = None
+    bond_energy: Mapping[str, float] = field(default_factory=dict)
+    bond_turnover: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     steps: int = 0
 
 
@@ -117,9 +119,11 @@ def run_isolated(
             steps = (outcome.steps if outcome else last) * len(system.members)
             return outline.recording(
                 np.array(rows[: min(int(state[ROW]), rows.shape[0])]),
-                outcome.bond_energy or {} if outcome else {},
+                outcome.bond_energy if outcome else {},
                 {"isolated": True, "fmu_steps": steps},
                 error,
+                turnover=outcome.bond_turnover if outcome else {},
+                notes=outcome.notes if outcome else (),
             )
 
         path = folder / "outcome"

@@ -56,7 +56,10 @@ def execute(order: Order) -> Outcome:
             return Outcome("call", str(error), error.messages)
         except AlgebraicLoopError as error:
             return Outcome("loop", str(error))
-    return Outcome("ok", bond_energy=recording.bond_energy, steps=execution.steps())
+    return Outcome(
+        "ok", bond_energy=recording.bond_energy, bond_turnover=recording.bond_turnover,
+        notes=tuple(execution.notes()), steps=execution.steps(),
+    )  # fmt: skip
 
 
 def orphaned() -> None:

@@ -4,9 +4,9 @@
     i = tau / (eta N K_t),   u = R i + K_t N qd
 
 Current and voltage are those a lossless hold of this torque would take; nothing limits them. Under
-gravity a joint of a UR5 sags by some tenths of a milliradian. The damping is such that the hold can be
-exchanged with the arm every millisecond: d h/J_b < 6/11, the limit of extrapolation by parabolas, with
-the rotors' inertia alone.
+gravity a joint of a UR5 sags by some tenths of a milliradian. The damping is such that hold and arm
+can exchange every millisecond: d h/J_b < 6/11, the limit of extrapolation by parabolas, with the
+rotors' inertia alone.
 
 Not modelled: integral action, limits, dynamics of the winding, friction (attach it as an effect).
 
