@@ -37,6 +37,7 @@ class Quantity:
             signal is delayed by whole samples; between, its steps are smeared).
         visits: output of the component among whose values along a run the right value is, for a
             parameter that tells nothing where it is wrong (where a patch lies).
+        passed_on: of an output: part of the system is lost where no input takes it.
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -53,6 +54,7 @@ class Quantity:
     tries: tuple[float, ...] = ()
     lattice: float = 0.0
     visits: str = ""
+    passed_on: bool = False
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

@@ -54,6 +54,7 @@ class Execution:
     Attributes:
         run: the instances and their values.
         stepper: what makes the communication steps, None until the first one.
+        lost: what the system is without because nothing takes it.
         ended: the words of an FMU that asked to end the run, "" if none did.
     """
 
@@ -72,6 +73,7 @@ class Execution:
         self.run = interpreter(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
+        self.lost: list[str] = []
 
     def execute(self, progress: Callable[[float], None] | None = None) -> Recording:
         """The whole run.
@@ -86,6 +88,7 @@ class Execution:
         count = self.outline.count
         shown = max(count // 100, 1)
         initialize(self.run)
+        self.lost = self._lost()
         try:
             stepper = self.begin()
             try:
@@ -196,4 +199,25 @@ class Execution:
     def notes(self) -> list[str]:
         """What is to be known of the run besides what was recorded."""
         warnings = [text for instance in self.run.instances for text in instance.warnings()]
-        return [*filter(None, [self.ended]), *warnings]
+        return [*self.lost, *filter(None, [self.ended]), *warnings]
+
+    def _lost(self) -> list[str]:
+        """Outputs that are not 0, must be passed on, and are not."""
+        found: dict[tuple[str, str], list[tuple[str, float]]] = {}
+        system = self.outline.system
+        instances = dict(zip(system.members, self.run.instances, strict=True))
+        for full in system.untaken():
+            owner, _, name = full.partition(".")
+            whole = system.declaration(full)
+            values = instances[owner].get(whole.name)
+            value = float(values[whole.elements().index(name)])
+            if value != 0.0:
+                array = name.partition("[")[0]
+                found.setdefault((owner, array), []).append((name, value))
+        return [
+            f"{owner}.{name} = {', '.join(f'{value:.3g}' for _, value in items)} "
+            f"{system.unit(f'{owner}.{items[0][0]}')} is taken by nothing "
+            f"({system.members[owner].description.extra['passed_on'][items[0][0]]}): it is missing "
+            "from the motion; connect it"
+            for (owner, name), items in found.items()
+        ]
