@@ -75,6 +75,7 @@ class Model:
             self.derivatives: dict[str, SX] = {}
             self.clocks: list[Clock] = []
             self.balances: dict[str, Balance] = {}
+            self.left_out: list[tuple[str, float, str]] = []
             self.attachments = attachments
             self.ports: list[tuple[Port, str]] = []
             self.stored: list[SX] = []
@@ -251,6 +252,10 @@ class Model:
     def stored_energy(self, energy: SX) -> None:
         """Add stored energy [J]."""
         self._root.stored.append(ca.SX(energy))
+
+    def leaves_out(self, what: str, amount: float, unit: str) -> None:
+        """Say which part of the real thing, that other fidelities have, this one is without."""
+        self._root.left_out.append((what, float(amount), unit))
 
     def loss(self, name: str, power: SX) -> None:
         """Add a loss [W], positive when it takes energy out of the component."""

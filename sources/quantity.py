@@ -41,6 +41,7 @@ class Quantity:
         size: 0 for a scalar, n for a vector.
         strength: marks the parameter of an effect whose value 0 means that the effect is absent.
         hints: of a parameter; what a search for its value should know.
+        passed_on: of an output: part of the system is lost where no input takes it.
         variability: of a parameter; `fixed` ones can only be set before initialization.
     """
 
@@ -55,6 +56,7 @@ class Quantity:
     units: tuple[str, ...] = ()
     strength: bool = False
     hints: SearchHints = NO_HINTS
+    passed_on: bool = False
     variability: Variability = "tunable"
 
     def __post_init__(self) -> None:

@@ -9,7 +9,6 @@ imported by the command, so that `--help` answers at once.
 
 from __future__ import annotations
 
-import json
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -27,6 +26,7 @@ from .export import draw_command, export_command
 from .fmus import fmus_app
 from .linearize import linearize_command
 from .output import AsJson, new_table, open_console, say
+from .pairs import pairs, values
 from .streams import print_json, stdout_for_json
 from .study import study_command
 
@@ -129,9 +129,9 @@ def run_command(
 
     from ..running.runner import run
 
-    changes = dict(_pair(item, "--set", "INSTANCE=VARIANT") for item in variants or [])
-    values = dict(_pair(item, "--param", "INSTANCE.NAME=VALUE") for item in parameters or [])
-    chosen = dict(_pair(item, "--option", "NAME=VALUE") for item in options or [])
+    changes = pairs(variants, "--set", "INSTANCE=VARIANT")
+    given = values(parameters, "--param", "INSTANCE.NAME=VALUE")
+    chosen = values(options, "--option", "NAME=VALUE")
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
     provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
@@ -146,9 +146,9 @@ def run_command(
         result = run(
             name,
             variants=changes,
-            parameters={key: _number(text) for key, text in values.items()},
+            parameters=given,
             algorithm=algorithm,
-            options={key: _number(text) for key, text in chosen.items()},
+            options=chosen,
             step=step,
             duration=duration,
             provider=provider,
@@ -172,23 +172,6 @@ def _folder_name(name: str) -> str:
     for suffix in (".toml", ".ssp", ".ssd"):
         name = name.removesuffix(suffix)
     return name.strip("./")
-
-
-def _pair(text: str, option: str, form: str) -> tuple[str, str]:
-    key, equals, value = text.partition("=")
-    if not equals or not key or not value:
-        raise InputError(f"{option} {text}: write {option} {form}")
-    return key.strip(), value.strip()
-
-
-def _number(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        try:
-            return float(text)
-        except ValueError:
-            return text
 
 
 def _print_result(result: Result) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +12,7 @@ import typer
 
 from ..files import write_text
 from ..installation import builder
+from .pairs import pairs, values
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -29,6 +31,21 @@ def linearize_command(
         list[str] | None,
         typer.Option(help="Connected input at which a loop is cut [all that feed back]."),
     ] = None,
+    variants: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="INSTANCE=VARIANT", help="E.g. gearbox=elastic."),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option("--param", metavar="INSTANCE.NAME=VALUE", help="E.g. motor.Kp_v=0.8."),
+    ] = None,
+    algorithm: Annotated[
+        str | None, typer.Option(help="With which it runs up to the operating point.")
+    ] = None,
+    options: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="NAME=VALUE", help="E.g. extrapolation=1."),
+    ] = None,
     delay: Annotated[float, typer.Option(help="Dead time added to each loop [s].")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder for bode.png and linear.json.")] = None,
     as_json: Annotated[
@@ -41,8 +58,15 @@ def linearize_command(
     """
     from ..control.linearize import connect, loop_margins, operating_point, plot_bode
 
-    master, inputs = _master(name)
+    master, inputs, changed = _master(
+        name,
+        pairs(variants, "--set", "INSTANCE=VARIANT"),
+        values(parameters, "--param", "INSTANCE.NAME=VALUE"),
+        algorithm,
+        values(options, "--option", "NAME=VALUE"),
+    )
     parts, notes = operating_point(master, at, inputs)
+    notes = [*changed, *notes]
     system = connect(master, parts, notes)
     names = cut or [wire.target for wire in master.system.connections]
     loops = loop_margins(master, parts, names[:MOST] if not cut else names, delay)
@@ -59,32 +83,34 @@ def linearize_command(
         _print(content, out)
 
 
-def _master(name: str) -> tuple[Master, dict[str, Driver]]:
+def _master(
+    name: str,
+    variants: Mapping[str, str],
+    parameters: Mapping[str, Any],
+    algorithm: str | None,
+    options: Mapping[str, Any],
+) -> tuple[Master, dict[str, Driver], tuple[str, ...]]:
+    """What is linearized, what drives it, and notes; changes as in `cosim run`."""
+    from ..errors import InputError
     from ..master.master import Master
+    from ..running.runner import adjusted, prepare
     from ..scenario import scenario as scenarios
     from ..system.system import System
-    from ..system.variants import apply
 
     if name.endswith(".fmu"):
+        if variants:
+            raise InputError(f"--set {next(iter(variants))}: {name} is one FMU; give another one")
         system = System(Path(name).stem)
         system.add("fmu", name)
-        return Master(system), {}
+        for key, value in parameters.items():
+            system.set(key if key.startswith("fmu.") else f"fmu.{key}", value)
+        return Master(system, algorithm or "jacobi", options=options), {}, ()
     file, run = scenarios.find(name)
-    item = file.scenario(run or next(iter(file.runs)))
-    provider = builder.default_provider()
-    instances = apply(item.system.instances, item.variants, provider, item.folder)
-    document = item.system
-    system = System(document.name, provider, document.text)
-    for instance, reference in instances.items():
-        system.add(instance, reference, base=document.path.parent)
-    for wire in document.connections:
-        system.connect(
-            wire.source, wire.target, factor=wire.factor, offset=wire.offset, convert=wire.convert
-        )
-    for key, value in {**document.parameters, **item.parameters}.items():
-        system.set(key, value)
-    master = Master(system, item.algorithm, item.step, item.tolerance, item.name)
-    return master, dict(item.inputs)
+    item = adjusted(file.scenario(run or next(iter(file.runs))), algorithm, options)
+    prepared = prepare(
+        item, builder.default_provider(), variants=variants, parameters=parameters, base=Path.cwd()
+    )
+    return prepared.master, dict(item.inputs), prepared.notes
 
 
 def _finite(value: float) -> float | None:

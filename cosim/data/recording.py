@@ -39,6 +39,7 @@ class Recording:
         provenance: FMU files and hashes, parameters, algorithm, step, versions.
         bond_energy: energy that the coupling invented at each power bond [J], positive if the two
             ends together received more than was sent.
+        bond_turnover: energy that went over each of them, either way [J].
         error: why the run stopped before its end by a fault, "" if it did not.
         objects: columns that doubles do not carry: integers of 64 bits, strings, binaries. The
             first are in `values`, too, as the nearest double; the others are nan there.
@@ -51,6 +52,7 @@ class Recording:
     units: Mapping[str, str]
     provenance: Mapping[str, Any] = field(default_factory=dict)
     bond_energy: Mapping[str, float] = field(default_factory=dict)
+    bond_turnover: Mapping[str, float] = field(default_factory=dict)
     error: str = ""
     objects: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -113,6 +115,7 @@ class Recording:
             "units": {"time": "s", **self.units},
             "provenance": dict(self.provenance),
             "bond_energy_J": dict(self.bond_energy),
+            "bond_turnover_J": dict(self.bond_turnover),
             "error": self.error,
             "notes": list(self.notes),
         }
@@ -241,6 +244,7 @@ def read_recording(path: Path | str) -> Recording:
         units={name: unit for name, unit in meta["units"].items() if name != "time"},
         provenance=meta["provenance"],
         bond_energy=meta["bond_energy_J"],
+        bond_turnover=meta.get("bond_turnover_J", {}),
         error=meta["error"],
         objects=objects,
         notes=tuple(meta.get("notes", ())),
@@ -279,8 +283,10 @@ def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
         missing: Any = [] if key == "notes" else None  # older recordings have none
         if not isinstance(meta, dict) or not isinstance(meta.get(key, missing), kind):
             raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
+    energies = [meta["bond_energy_J"], meta.get("bond_turnover_J", {})]
     if not all(isinstance(unit, str) for unit in meta["units"].values()) or not all(
-        isinstance(energy, (int, float)) for energy in meta["bond_energy_J"].values()
+        isinstance(item, dict) and all(isinstance(energy, (int, float)) for energy in item.values())
+        for item in energies
     ):
         raise ScenarioError(
             f"{path}: its units are no texts, or its energies no numbers; record it again"

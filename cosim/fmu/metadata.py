@@ -69,6 +69,17 @@ def _problem(table: Any) -> str:
     for key in ("slots", "mixes", "tries", "lattices", "visits"):
         if not isinstance(table.get(key, {}), dict):
             return f"{key} is {_kind(table[key])}, not an object"
+    passed_on = table.get("passed_on", {})
+    if not isinstance(passed_on, dict) or not _texts(list(passed_on.values())):
+        return "passed_on is not an object of texts"
+    left_out = table.get("left_out", [])
+    if not isinstance(left_out, list) or not all(
+        isinstance(item, dict)
+        and _texts([item.get("what"), item.get("unit")])
+        and _kind(item.get("amount")) == "a number"
+        for item in left_out
+    ):
+        return "left_out is not a list of objects with what, amount and unit"
     ports = table.get("ports", [])
     if not isinstance(ports, list):
         return f"ports is {_kind(ports)}, not a list"

@@ -11,6 +11,7 @@ from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, StepError, Va
 from . import kernel
 from .initialization import initialize
 from .interpreter import Interpreter
+from .invented import invented
 from .kernel.stepper import Compiled
 from .outline import Outline
 from .plan import Stepper, decoded
@@ -53,6 +54,7 @@ class Execution:
     Attributes:
         run: the instances and their values.
         stepper: what makes the communication steps, None until the first one.
+        lost: what the system is without because nothing takes it.
         ended: the words of an FMU that asked to end the run, "" if none did.
     """
 
@@ -71,6 +73,7 @@ class Execution:
         self.run = interpreter(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
+        self.lost: list[str] = []
 
     def execute(self, progress: Callable[[float], None] | None = None) -> Recording:
         """The whole run.
@@ -85,6 +88,7 @@ class Execution:
         count = self.outline.count
         shown = max(count // 100, 1)
         initialize(self.run)
+        self.lost = self._lost()
         try:
             stepper = self.begin()
             try:
@@ -172,6 +176,7 @@ class Execution:
         time = float(self.outline.times[min(self.run.index, self.outline.count)])
         text = f"run stopped at t = {time:.9g} s: {error}"
         messages = error.messages if isinstance(error, FmuCallError) else ()
+        text = "\n".join([text, *invented(*self.energies())])
         recording = self.recording(text) if keep else None
         return StepError(text, messages, time=time, recording=recording)
 
@@ -181,11 +186,10 @@ class Execution:
 
     def recording(self, error: str = "") -> Recording:
         """What was recorded so far."""
-        run = self.run
-        energies = zip(run.layout.bonds, run.bond_energy, strict=True)
+        run, (energy, turnover) = self.run, self.energies()
         return self.outline.recording(
             run.rows[: run.row],
-            {bond.name: float(energy) for bond, energy in energies},
+            energy,
             {
                 "fmu_steps": self.steps() * len(run.instances),
                 **(self.stepper.report() if self.stepper is not None else {}),
@@ -193,5 +197,41 @@ class Execution:
             error,
             objects=run.passing.kept,
             beside=run.beside,
-            notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],
+            turnover=turnover,
+            notes=self.notes(),
         )
+
+    def energies(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Energy that each power bond invented, and that went over it [J]."""
+        run = self.run
+        names = [bond.name for bond in run.layout.bonds]
+        return (
+            dict(zip(names, run.bond_energy.tolist(), strict=True)),
+            dict(zip(names, run.bond_turnover.tolist(), strict=True)),
+        )
+
+    def notes(self) -> list[str]:
+        """What is to be known of the run besides what was recorded."""
+        warnings = [text for instance in self.run.instances for text in instance.warnings()]
+        return [*self.lost, *filter(None, [self.ended]), *warnings]
+
+    def _lost(self) -> list[str]:
+        """Outputs that are not 0, must be passed on, and are not."""
+        found: dict[tuple[str, str], list[tuple[str, float]]] = {}
+        system = self.outline.system
+        instances = dict(zip(system.members, self.run.instances, strict=True))
+        for full in system.untaken():
+            owner, _, name = full.partition(".")
+            whole = system.declaration(full)
+            values = instances[owner].get(whole.name)
+            value = float(values[whole.elements().index(name)])
+            if value != 0.0:
+                array = name.partition("[")[0]
+                found.setdefault((owner, array), []).append((name, value))
+        return [
+            f"{owner}.{name} = {', '.join(f'{value:.3g}' for _, value in items)} "
+            f"{system.unit(f'{owner}.{items[0][0]}')} is taken by nothing "
+            f"({system.members[owner].description.extra['passed_on'][items[0][0]]}): it is missing "
+            "from the motion; connect it"
+            for (owner, name), items in found.items()
+        ]

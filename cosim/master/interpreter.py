@@ -38,7 +38,7 @@ class Interpreter:
         index: communication point at which the run stands.
         rows, row: recorded values, and how many rows there are.
         beside: communication point of the last row if it is none of every n-th, else None.
-        bond_energy: energy that went over each bond [J].
+        bond_energy, bond_turnover: energy that each bond invented, and that went over it [J].
         newtons: one per algebraic loop.
         history, past: of extrapolated inputs, and how many values it has before the first step.
         derivatives: derivatives of the inputs that move within a step.
@@ -76,6 +76,7 @@ class Interpreter:
         self.row = self.index = 0
         self.beside: int | None = None
         self.bond_energy = np.zeros(len(self.layout.bonds))
+        self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
         self.history = np.zeros((len(self.plan.means), 4))
@@ -115,6 +116,7 @@ class Interpreter:
         """Return to the state before initialization, with the system's values set again."""
         self.values[:] = 0.0
         self.bond_energy[:] = 0.0
+        self.bond_turnover[:] = 0.0
         self.previous = [0.0] * len(self.layout.bond_output)
         self.index = self.row = 0
         self.beside = None
@@ -235,7 +237,9 @@ class Interpreter:
         half = 0.5 * self.step
         for term, bond in enumerate(layout.bond_index.tolist()):
             mean = self.previous[term] + outputs[term]
-            self.bond_energy[bond] += layout.bond_sign[term] * inputs[term] * mean * half
+            part = layout.bond_sign[term] * inputs[term] * mean * half
+            self.bond_energy[bond] += part
+            self.bond_turnover[bond] += 0.5 * abs(part)
 
     # -- algebraic loops -------------------------------------------------------------------------
 

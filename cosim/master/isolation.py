@@ -67,6 +67,7 @@ class Outcome:
     messages: tuple[str, ...] = ()
     bond_energy: Mapping[str, float] = field(default_factory=dict)
     how: Mapping[str, Any] = field(default_factory=dict)
+    bond_turnover: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -157,6 +158,7 @@ def run_isolated(
                     **(outcome.how if outcome else {}),
                 },
                 error,
+                turnover=outcome.bond_turnover if outcome else {},
                 objects=kept,
                 notes=outcome.notes if outcome else (),
                 beside=None if beside == NOTHING else beside,

@@ -89,7 +89,9 @@ def _outcome(
     if recording is None:
         return Outcome(kind, text, messages)
     how = {key: item for key, item in recording.provenance.items() if key in HOW}
-    return Outcome(kind, text, messages, recording.bond_energy, how, recording.notes)
+    return Outcome(
+        kind, text, messages, recording.bond_energy, how, recording.bond_turnover, recording.notes
+    )
 
 
 def orphaned() -> None:

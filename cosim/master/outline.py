@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..data.recording import Recording
 from ..data.signals import Signal
 from ..system.system import System
+from .invented import invented
 from .plan import Plan
 
 Vector = NDArray[np.float64]
@@ -82,6 +83,7 @@ class Outline:
         how: Mapping[str, Any],
         error: str = "",
         *,
+        turnover: Mapping[str, float],
         objects: Mapping[str, Sequence[Any]] | None = None,
         notes: Sequence[str] = (),
         beside: int | None = None,
@@ -90,7 +92,8 @@ class Outline:
 
         Args:
             rows: recorded values, one row per recorded communication point that was reached.
-            bond_energy: per power bond [J].
+            bond_energy: invented, per power bond [J].
+            turnover: went over it [J].
             how: what else its provenance says of how it was run.
             error: what ended it early.
             objects: recorded values that travel as objects.
@@ -116,9 +119,10 @@ class Outline:
                 **how,
             },
             bond_energy=dict(bond_energy),
+            bond_turnover=dict(turnover),
             error=error,
             objects=carried,
-            notes=tuple(notes),
+            notes=tuple(dict.fromkeys([*notes, *invented(bond_energy, turnover)])),
         )
 
     def _provenance(self) -> dict[str, Any]:

@@ -191,6 +191,17 @@ def _system(
     return system, notes
 
 
+def _left_out(system: System, changed: set[str]) -> list[str]:
+    """Notes on what changed variants are without."""
+    return [
+        f"{name} is without the {item['what']} ({item['amount']:.4g} {item['unit']}): "
+        f"{system.members[name].reference} leaves it out, and nothing else carries it"
+        for name in system.members
+        if name in changed
+        for item in system.members[name].description.extra.get("left_out", ())
+    ]
+
+
 def _recorded(
     scenario: Scenario, system: System, changed: set[str]
 ) -> tuple[tuple[str, ...], list[str]]:
@@ -299,6 +310,7 @@ def prepare(
     instances = apply(usual, variants or {}, provider, base)
     changed = {name for name in instances if instances[name] != usual[name]}
     system, notes = _system(scenario, provider, instances, changed, parameters or {})
+    notes += _left_out(system, changed)
     record, others = _recorded(scenario, system, changed)
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,

@@ -329,6 +329,18 @@ class System:
         """The output that drives an input, None if nothing does."""
         return self._drivers.get(target)
 
+    def untaken(self) -> list[str]:
+        """Full scalar names of outputs that must be passed on, and that no input takes."""
+        taken = {connection.source for connection in self.connections}
+        return [
+            f"{member.name}.{element}"
+            for member in self.members.values()
+            for name in member.description.extra.get("passed_on", {})
+            if name in member.description.variables
+            for element in member.description.variables[name].elements()
+            if f"{member.name}.{element}" not in taken
+        ]
+
     # -- structure -------------------------------------------------------------------------------
 
     def dependencies(self) -> dict[str, list[str]]:

@@ -12,7 +12,12 @@ W_B = Quantity("w_b", "rad/s", "speed of flange b", nominal=10.0)
 J_A = Quantity(
     "J_a", "kg.m2", "inertia of the rotor on flange a", start=2.0e-4, minimum=0.0, nominal=1e-4
 )
-J_B = Quantity("J_b", "kg.m2", "inertia that the load carries for the rotor, as seen at flange b")
+J_B = Quantity(
+    "J_b",
+    "kg.m2",
+    "inertia that the load carries for the rotor, as seen at flange b",
+    passed_on=True,
+)
 RATIO = Quantity(
     "ratio", "1", "transmission ratio, w_a / w_b", start=10.167, minimum=1e-3, maximum=1e4
 )

@@ -102,6 +102,13 @@ def component_json(variant: Variant) -> bytes:
         ],
     }
     content |= hints.to_json({v.name: v.quantity.hints for v in model.of_role("parameter")})
+    passed_on = {v.name: v.quantity.text for v in model.of_role("output") if v.quantity.passed_on}
+    if passed_on:
+        content["passed_on"] = passed_on
+    if model.left_out:
+        content["left_out"] = [
+            {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
+        ]
     return (json.dumps(content, indent=2) + "\n").encode()
 
 

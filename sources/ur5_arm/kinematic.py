@@ -43,6 +43,7 @@ def equations(m: Model) -> None:
     m.derivative(q, qd)
     m.derivative(qd, (u.tau + joint_efforts(m, qd, q, u.tau)) / inertia)
     output_motion(m, mount, q, qd, Posture(chain(m), q), u.tau)
+    m.leaves_out("mass of the links", sum(m.constant("mass")), "kg")
     zero = ca.SX.zeros(6)
     output_wrench(m, at_rest(mount), ca.SX.zeros(6, 6), zero, zero)
     m.stored_energy(ca.dot(inertia, qd**2) / 2)

@@ -12,7 +12,9 @@ QD = Quantity("qd", "rad/s", "speeds of the joints (gear outputs)", size=6)
 TAU = Quantity("tau", "N.m", "torques of the gears on the joints", size=6)
 I = Quantity("i", "A", "winding currents, positive turns the joint forward", size=6)  # noqa: E741
 U = Quantity("u", "V", "terminal voltages", size=6)
-J_B = Quantity("J_b", "kg.m2", "inertias that the joints carry for the rotors", size=6)
+J_B = Quantity(
+    "J_b", "kg.m2", "inertias that the joints carry for the rotors", size=6, passed_on=True
+)
 I_MEASURED = Quantity("i_measured", "A", "winding currents as their sensors report them", size=6)
 Q_MEASURED = Quantity("q_measured", "rad", "joint angles as the encoders report them", size=6)
 

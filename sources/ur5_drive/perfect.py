@@ -4,7 +4,9 @@
     i = tau / (eta N K_t),   u = R i + K_t N qd
 
 Current and voltage are those a lossless hold of this torque would take; nothing limits them. Under
-gravity a joint of a UR5 sags by some tenths of a milliradian.
+gravity a joint of a UR5 sags by some tenths of a milliradian. The damping is such that hold and arm
+can exchange every millisecond: d h/J_b < 6/11, the limit of extrapolation by parabolas, with the
+rotors' inertia alone.
 
 Not modelled: integral action, limits, dynamics of the winding, friction (attach it as an effect).
 
@@ -35,7 +37,7 @@ D = Quantity(
     "d",
     "N.m.s/rad",
     "damping of the hold",
-    start=(1200.0, 1200.0, 1200.0, 80.0, 80.0, 80.0),
+    start=(500.0, 500.0, 500.0, 80.0, 80.0, 80.0),
     minimum=0.0,
     nominal=1e3,
     size=6,

@@ -150,3 +150,29 @@ def test_the_command_prints_poles_and_loops(provider, tmp_path: Path, monkeypatc
     assert heave["damping"] == pytest.approx(0.53, abs=0.01)
     assert content["loops"][0]["phase_margin_deg"] > 45.0  # a loop that is stable with room
     assert (tmp_path / "bode.png").stat().st_size > 10_000 and (tmp_path / "linear.json").is_file()
+
+
+def linear(provider, monkeypatch, *arguments: str) -> dict:
+    monkeypatch.setattr("cosim.installation.builder.default_provider", lambda: provider)
+    result = CliRunner().invoke(app, ["linearize", *arguments, "--json"])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return json.loads(result.output)
+
+
+def test_the_command_takes_variants_parameters_and_algorithms(provider, monkeypatch) -> None:
+    bench = ("motor_bench", "--set", "motor=electrical", "--at", "0.01")
+    usual = linear(provider, monkeypatch, *bench)
+    elastic = linear(provider, monkeypatch, *bench, "--set", "gearbox=elastic")
+    assert set(elastic["states"]) - set(usual["states"]) == {"gearbox.twist", "gearbox.rotor_speed"}
+    heavy = linear(provider, monkeypatch, *bench, "--param", "load.J=0.9")
+    assert heavy["poles"] != usual["poles"]
+    with pytest.raises(UnknownNameError, match="there is no algorithm 'jacobbi'"):
+        linear(provider, monkeypatch, *bench, "--algorithm", "jacobbi")
+    followed = linear(
+        provider, monkeypatch, *bench, "--algorithm", "gauss_seidel", "--option", "extrapolation=1"
+    )
+    assert len(followed["poles"]) == len(usual["poles"])
+    with pytest.raises(InputError, match=r"--param load: write --param INSTANCE.NAME=VALUE"):
+        linear(provider, monkeypatch, *bench, "--param", "load")

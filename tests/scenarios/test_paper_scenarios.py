@@ -161,6 +161,20 @@ def test_the_mobile_manipulator_stands_at_rest_with_all_its_mass(name) -> None:
         assert np.abs(recording[f"current_{side}.i_meas"]).max() < 0.02
 
 
+def test_a_stiff_hold_of_the_arm_can_be_exchanged_at_the_scenarios_step() -> None:
+    """`drive=perfect` swung itself up at 1 ms with parabolas and stopped at 0.789 s."""
+    coarse, fine = (
+        run(
+            "mobile_manipulator/IY", provider=PROVIDER, variants={"drive": "perfect"},
+            step=step, duration=3.0,
+        ).recording
+        for step in (1e-3, 2.5e-4)
+    )  # fmt: skip
+    for name, noise in (("base.phi", 0.05e-3), ("arm.q[4]", 0.05e-3), ("drive.i[2]", 30e-3)):
+        assert np.abs(coarse[name] - fine[name]).max() < noise  # 3 urad, 0.5 urad, 15 mA seen
+    assert np.ptp(coarse["base.phi"]) > 1e-3
+
+
 def test_coupling_error_of_the_mobile_manipulator_shrinks_with_the_step() -> None:
     """README: largest difference of the heading to 0.125 ms; the first 4 s hold two swings."""
     courses = {

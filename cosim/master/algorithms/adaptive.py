@@ -211,6 +211,7 @@ class StepControl:
         self.taken += 1
         self.shortest, self.longest = min(self.shortest, size), max(self.longest, size)
         run.bond_energy += first + second
+        run.bond_turnover += passed + also
         self.power = np.maximum(self.power, (passed + also) / size)
         self.size = size * min(3.0, 0.9 * max(error, 1e-6) ** -0.5)
         self.time = time + size if target is None else float(run.times[target])

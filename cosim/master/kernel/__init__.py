@@ -92,8 +92,8 @@ class _Run(ct.Structure):
         ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
         ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
-        ("bond_energy", _P), ("n_terms", _I64), ("carried", _I64), ("index", _I64),
-        ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
+        ("bond_energy", _P), ("bond_turnover", _P), ("n_terms", _I64), ("carried", _I64),
+        ("index", _I64), ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
         ("past", _P), ("n_means", _I64),
         ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
         ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
@@ -243,6 +243,7 @@ class Kernel:
                 ),
             ),
             bond_energy=self._array(bound.bond_energy),
+            bond_turnover=self._array(bound.bond_turnover),
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip

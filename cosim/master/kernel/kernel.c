@@ -150,14 +150,17 @@ static inline void add_energy(Run *run, int held) {
   Term *const end = run->terms + run->n_terms;
   for (Term *t = run->terms; t < end;) {
     const int64_t bond = t->bond;
-    double energy = run->bond_energy[bond];
+    double energy = run->bond_energy[bond], turnover = run->bond_turnover[bond];
     do {
       const double output = values[t->output], mean = t->previous + output;
-      energy += t->sign * (held ? t->held : values[t->input]) * mean * half;
+      const double part = t->sign * (held ? t->held : values[t->input]) * mean * half;
+      energy += part;
+      turnover += 0.5 * fabs(part);
       t->previous = output;
       t++;
     } while (t < end && t->bond == bond);
     run->bond_energy[bond] = energy;
+    run->bond_turnover[bond] = turnover;
   }
 }
 

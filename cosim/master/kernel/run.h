@@ -88,7 +88,7 @@ typedef struct {
   int64_t n_record, every, row;
   double *rows;
   Term *terms;
-  double *bond_energy;
+  double *bond_energy, *bond_turnover;
   int64_t n_terms;
   int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
   int64_t index;       /* communication step under way */
