@@ -79,9 +79,31 @@ def ecos(path: str, step: float, count: int, names: list[str]) -> list[list[floa
     return rows
 
 
+def omsimulator(path: str, step: float, count: int, names: list[str]) -> list[list[float]]:
+    """The archive says the step; one that is not `step` would be seen in the values."""
+    from OMSimulator import SSP, CRef, Settings
+
+    Settings.suppressPath = True
+    package = SSP(path)
+    model = package.instantiate()
+    model.setResultFile("")
+    model.initialize()
+    system = package.activeVariant.system.name
+    places = [CRef(system, *name.split(".", 1)) for name in names]
+    rows = []
+    for k in range(1, count + 1):
+        model.stepUntil((k - 0.5) * step)  # to the end of the step within which it lies
+        rows.append([model.getValue(place) for place in places])
+    model.terminate()
+    return rows
+
+
+CLIENTS = {"libcosim": libcosim, "ecos": ecos, "omsimulator": omsimulator}
+PACKAGES = {"libcosim": "libcosimpy", "ecos": "ecospy", "omsimulator": "OMSimulator"}
+
 if __name__ == "__main__":
     client, path, step, count, *names = sys.argv[1:]
-    rows = {"libcosim": libcosim, "ecos": ecos}[client](path, float(step), int(count), names)
+    rows = CLIENTS[client](path, float(step), int(count), names)
     print("\n" + json.dumps(rows), flush=True)
     # all is done and said: the exit handlers of TBB, which ecos uses, race with its worker
     # threads (they unload libraries that the main thread is leaving), 1 run of 250 crashes there

@@ -40,11 +40,14 @@ def export_command(
 
     Example: `cosim export mobile_manipulator/IY --ssp iy.ssp`
     """
-    from ..ssp import export
+    from ..ssp import export, local_starts, read
 
     if ssp_version not in ("1.0", "2.0"):
         raise InputError(f"--ssp-version {ssp_version}: must be 1.0 or 2.0")
-    print(export(_only(name), ssp, builder.default_provider(), version=ssp_version))
+    path = export(_only(name), ssp, builder.default_provider(), version=ssp_version)
+    if names := local_starts(read(path)):
+        typer.echo(f"note: libcosim sets no local variables: {', '.join(names)}", err=True)
+    print(path)
 
 
 def draw_command(

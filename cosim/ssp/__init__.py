@@ -9,7 +9,7 @@ scenario = ssp.read_scenario("from_elsewhere.ssp", step=1e-3)
 from .document import open_package
 from .experiment import export, read_scenario
 from .read import Experiment, Package, Terminal, read, read_package
-from .write import PARAMETER_SET, write
+from .write import PARAMETER_SET, local_starts, write
 
 __all__ = [
     "PARAMETER_SET",
@@ -17,6 +17,7 @@ __all__ = [
     "Package",
     "Terminal",
     "export",
+    "local_starts",
     "open_package",
     "read",
     "read_package",

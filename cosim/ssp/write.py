@@ -30,11 +30,14 @@ from .xml import Units, attributes, encode, pack, text
 VERSIONS = ("1.0", "2.0")
 PARAMETER_SET = "parameters"
 """Name of the parameter sets; Ecos applies one only when it is told this name."""
+OMS_TOLERANCE = 1e-6
+"""To which OMSimulator solves loops; its own 1e-4 would be more than the error of a usual step."""
 _NAMESPACES = {
     "xmlns:ssd": SSD,
     "xmlns:ssc": SSC,
     # libcosim takes an attribute inside its annotation for an algorithm, so these stand here
     "xmlns:osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "xmlns:oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
     "xmlns:cosim": "cosim",
 }
 
@@ -65,6 +68,26 @@ def write(
     if version not in VERSIONS:
         raise InputError(f"SSP version {version!r}: choose {' or '.join(VERSIONS)}")
     return _Writer(system, version, experiment or Experiment(), inputs or {}).write(Path(path))
+
+
+def local_starts(system: System) -> list[str]:
+    """Start values that only tools set which set local variables, as FMI allows; libcosim does not.
+
+    Returns:
+        Full names of variables, neither parameters nor inputs, that start otherwise than their FMU
+        says.
+    """
+    found = []
+    for member in system.members.values():
+        for key, value in member.parameters.items():
+            name = f"{member.name}.{key}"
+            _, variables = system.variables(name)
+            starts = tuple(start for variable in variables for start in variable.start)
+            if variables[0].causality in ("local", "output") and starts != tuple(
+                check_values(name, variables, value)
+            ):
+                found.append(name)
+    return found
 
 
 class _Writer:
@@ -136,6 +159,7 @@ class _Writer:
             *components,
             "    </ssd:Elements>",
             *self.connections(),
+            *self.master(),
             "  </ssd:System>",
             *self.units.lines("ssd"),
             *self.default_experiment(),
@@ -370,6 +394,26 @@ class _Writer:
                 "</ssv:ParameterSet>",
             ]
         )  # fmt: skip
+
+    def master(self) -> list[str]:
+        """OMSimulator's Jacobi with our step: the element is for its library, the attributes, under
+        the name that it gives the master of FMUs without one, for its Python package.
+        """
+        step = self.experiment.step
+        if step is None:
+            return []
+        loops = {"relativeTolerance": OMS_TOLERANCE}
+        known = attributes(name="oms_ma_default", method="oms_ma", fixedStepSize=step, **loops)
+        master = attributes(description="oms-ma", stepSize=step, **loops)
+        return [
+            "    <ssd:Annotations>",
+            '      <ssc:Annotation type="org.openmodelica">',
+            f"        <oms:Annotations><oms:SimulationInformation{known}>",
+            f"          <oms:FixedStepMaster{master}/>",
+            "        </oms:SimulationInformation></oms:Annotations>",
+            "      </ssc:Annotation>",
+            "    </ssd:Annotations>",
+        ]
 
     def default_experiment(self) -> list[str]:
         content = self.experiment

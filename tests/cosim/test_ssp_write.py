@@ -288,3 +288,20 @@ def test_arrays_need_version_2(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"a.w - b.tau joins single elements of arrays"):
         ssp.read(swapped)
     assert again.members["a"].parameters == {"tau": [1.0, 2.0, 3.0]}
+
+
+def test_master_of_omsimulator_has_our_step(tmp_path: Path) -> None:
+    path = ssp.write(bench(), tmp_path / "a.ssp", experiment=ssp.Experiment(0.0, 2.0, 1e-4))
+    with zipfile.ZipFile(path) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    # where its library and its Python package look; both take the first annotation only
+    spaces = {prefix: uri for prefix, uri in root.nsmap.items() if prefix}
+    place = "ssd:System/ssd:Annotations/ssc:Annotation[1]/oms:Annotations/oms:SimulationInformation"
+    (known,) = root.findall(place, spaces)
+    assert known.get("name") == "oms_ma_default" and known.get("method") == "oms_ma"
+    (master,) = known.findall("oms:FixedStepMaster", spaces)
+    assert float(known.get("fixedStepSize")) == float(master.get("stepSize")) == 1e-4
+    assert master.get("description") == "oms-ma"
+    plain = ssp.write(bench(), tmp_path / "b.ssp")
+    with zipfile.ZipFile(plain) as archive:
+        assert b"org.openmodelica" not in archive.read("SystemStructure.ssd")
