@@ -137,6 +137,7 @@ def _parquet(path: Path) -> Read:
             units[item.name] = (item.metadata or {}).get(b"unit", b"").decode(errors="replace")
         if whole and (
             pa.types.is_string(item.type)
+            or pa.types.is_large_string(item.type)
             or pa.types.is_binary(item.type)
             or (pa.types.is_integer(item.type) and np.any(np.abs(columns[item.name]) >= _INTEGERS))
         ):
