@@ -75,6 +75,8 @@ def parquet_table(path: Path) -> Table:
                 continue
             elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
                 held = Gaps(strange=1, example=f"of type {kind}", row=1, count=1)
+                if pa.types.is_binary(kind) and not column.null_count:
+                    table.exact[item.name] = column.to_pylist()
                 table.texts[item.name] = held
                 continue
         except (pa.ArrowException, ValueError) as error:

@@ -155,12 +155,12 @@ class Fmi2:
             return False, None
         asked, last = ct.c_int(0), ct.c_double(0.0)
         status = functions["fmi2GetBooleanStatus"](address, _TERMINATED, ct.addressof(asked))
-        if status > 1 or not asked.value:
+        if status not in (0, 1) or not asked.value:
             return False, None
         if "fmi2GetRealStatus" not in functions:
             return True, None
         status = functions["fmi2GetRealStatus"](address, _LAST_TIME, ct.addressof(last))
-        return True, last.value if status <= 1 else None
+        return True, last.value if status in (0, 1) else None
 
     @staticmethod
     def directional_arguments(

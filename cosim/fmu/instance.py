@@ -40,8 +40,8 @@ from .messages import STATUS, forget, new_key, take
 from .values import check_values
 
 Vector = NDArray[np.float64]
-ENDED = STATUS.index("pending") + 1
-"""Beyond FMI's statuses: a step of FMI 3 that asked to end the simulation."""
+ENDED = 1000
+"""Far from FMI's statuses: a step of FMI 3 that asked to end the simulation."""
 SAME = 1e-9
 """Part of a step by which the time that an FMU has reached may differ from the end of the step."""
 WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
@@ -159,7 +159,7 @@ class Instance:
         if name not in self._functions:
             raise FmuCallError(f"{self.label}: the FMU has no function {name}")
         status = self._functions[name](self.address, *arguments)
-        if status > 1:
+        if status not in (0, 1):
             raise self.failure(what, status)
         if status:
             self.warned(what)
@@ -183,7 +183,7 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
-        if status > 1:
+        if status not in (0, 1):
             raise self.failed_access(True, part, status)
         if status:
             self.warned("getting values")
@@ -193,7 +193,7 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
-        if status > 1:
+        if status not in (0, 1):
             raise self.failed_access(False, part, status)
         if status:
             self.warned("setting values")
@@ -206,7 +206,7 @@ class Instance:
             self.address, references.ctypes.data, references.size, orders.ctypes.data,
             values.ctypes.data,
         )  # fmt: skip
-        if status > 1:
+        if status not in (0, 1):
             raise self.failed_derivatives(references, status)
 
     def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
@@ -314,7 +314,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
         status = self._step(self.address, time, size, *self._step_arguments)
-        if status > 1 or self.binding.stopped():
+        if status not in (0, 1) or self.binding.stopped():
             raise self.failed_step(size, status, self.binding.reached())
         if status:
             self.warned("a step")
@@ -332,7 +332,7 @@ class Instance:
             status: what it returned.
             reached: the time at which the FMU of FMI 3 says that it stands [s].
         """
-        asked, last = status <= 1 or status == ENDED, reached
+        asked, last = status in (0, 1, ENDED), reached
         if status == STATUS.index("discard"):
             asked, last = self.binding.terminated(self._functions, self.address)
         if not asked:

@@ -123,11 +123,11 @@ class _Code(IntEnum):
     SET_DERIVATIVES = 16
 
 
-UNFIT = 8
+UNFIT = 1002
 """Status of a set call that was not made, because a number does not fit the variable's type."""
-UNSETTLED = 9
+UNSETTLED = 1003
 """Status of an algebraic loop that has no solution or does not settle."""
-TOO_LONG, TOO_LARGE = 10, 11
+TOO_LONG, TOO_LARGE = 1004, 1005
 """Statuses of a run that took more than its limit, and of one that ran away."""
 _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
 

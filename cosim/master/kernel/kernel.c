@@ -62,7 +62,7 @@ static inline int access_call(const Call *c) {
 static Call *call2(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
-    if (*status > 1) return c;
+    if (FAILED(*status)) return c;
     c->warned |= *status;
   }
   return 0;
@@ -71,7 +71,7 @@ static Call *call2(Call *c, const Call *end, int *status) {
 static Call *call3(Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
-    if (*status > 1) return c;
+    if (FAILED(*status)) return c;
     c->warned |= *status;
   }
   return 0;
@@ -81,7 +81,7 @@ static Call *call_converted(Call *c, const Call *end, double *values, int set, i
   for (; c < end; c++) {
     if (set && c->slots && (*status = convert(c, values, 1))) return c;
     *status = access_call(c);
-    if (*status > 1) return c;
+    if (FAILED(*status)) return c;
     c->warned |= *status;
     if (!set && c->slots) convert(c, values, 0);
   }
@@ -98,7 +98,7 @@ static double bounded(const Run *run, double t, double h) {
 static Member *step2(Member *m, const Member *end, double t, double h, int *status) {
   for (; m < end; m++) {
     *status = ((Step2)m->step)(m->component, t, h, 1);
-    if (*status > 1) return m;
+    if (FAILED(*status)) return m;
     m->warned |= *status;
   }
   return 0;
@@ -108,8 +108,8 @@ static Member *step3(Member *m, const Member *end, double t, double h, int *stat
   bool event = false, stop = false, early = false;
   for (; m < end; m++) {
     *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
-    if (*status <= 1 && stop) *status = TERMINATED;
-    if (*status > 1) return m;
+    if (!FAILED(*status) && stop) *status = TERMINATED;
+    if (FAILED(*status)) return m;
     m->warned |= *status;
   }
   return 0;
@@ -210,7 +210,7 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
 static const Derivatives *set_derivatives(const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
     *status = ((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values);
-    if (*status > 1) return r;
+    if (FAILED(*status)) return r;
   }
   return 0;
 }
@@ -268,7 +268,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
       break;
     case SOLVE:
       status = solve(run, run->loops + in->first);
-      if (status > 1) return status; /* the instruction inside has said what failed */
+      if (FAILED(status)) return status; /* the instruction inside has said what failed */
       break;
     case NOTE:
       for (int64_t i = 0; i < run->n_means; i++) {
@@ -295,7 +295,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
       member = substep(run, members + in->first, in->last, &status);
       break;
     }
-    if (status > 1) {
+    if (FAILED(status)) {
       run->failed_call = call ? call - calls : -1;
       run->failed_member = member ? member - members : -1;
       run->failed_derivatives = refused ? refused - run->derivatives : -1;

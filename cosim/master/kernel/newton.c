@@ -14,7 +14,7 @@ static int execute(Run *run, int64_t first, int64_t last);
 static int sweep(Run *run, const Loop *loop, const double *z, double *value) {
   for (int64_t i = 0; i < loop->n; i++) run->values[loop->sources[i]] = z[i];
   const int status = execute(run, loop->first, loop->last);
-  if (status > 1) return status;
+  if (FAILED(status)) return status;
   for (int64_t i = 0; i < loop->n; i++) value[i] = run->values[loop->sources[i]];
   return 0;
 }
@@ -53,7 +53,7 @@ static int difference(Run *run, const Loop *loop, const double *z, const double 
     for (int64_t i = 0; i < n; i++) moved[i] = z[i];
     moved[j] += increment;
     const int status = sweep(run, loop, moved, there);
-    if (status > 1) return status;
+    if (FAILED(status)) return status;
     for (int64_t i = 0; i < n; i++) {
       rows[2 * n * i + j] = (i == j ? 1.0 : 0.0) - (there[i] - value[i]) / increment;
       rows[2 * n * i + n + j] = i == j ? 1.0 : 0.0;
@@ -89,7 +89,7 @@ static int solve(Run *run, const Loop *loop) {
   for (int64_t i = 0; i < n; i++) z[i] = run->values[loop->sources[i]];
   for (int iteration = 0; iteration < ITERATIONS; iteration++) {
     int status = sweep(run, loop, z, value);
-    if (status > 1) return status;
+    if (FAILED(status)) return status;
     const int renewed = !*loop->valid;
     if (renewed && (status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
     double size = newton_step(loop, z, value, change);

@@ -9,7 +9,9 @@
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
        SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
 /* beyond the statuses of FMI */
-enum { TERMINATED = 6, NOT_FINITE = 7, UNFIT = 8, UNSETTLED = 9, TOO_LONG = 10, TOO_LARGE = 11 };
+enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE };
+/* FMI knows 0 (ok), 1 (warning) and more that are errors; what it does not know is one, too. */
+#define FAILED(status) ((unsigned)(status) > 1)
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
 enum { PARTS = 1 << 16 };        /* as in cosim/master/plan.py */
 
