@@ -6,8 +6,8 @@ close them, loops of direct feedthrough included:
     y = (I - D K)^-1 (C x + D e),   u = K y + e,   x' = A x + B u
 
 An FMU that declares neither derivatives of states nor directional derivatives counts as static, its
-D by differences; that is noted. Sampled values are held: a sampled controller appears with what it
-passes on at once, not with its difference equation.
+D by differences; that is noted. FMUs with sampled values are linearized through their samples
+(`sampled`), where their periods are known; else their values are held, and that is noted.
 
 Source: Åström and Murray, Feedback systems, 2008, sections 6.4 and 10.3 (margins).
 """
@@ -32,6 +32,8 @@ from ..master.initialization import initialize
 from ..master.master import Master
 from ..master.plan import Op, decoded
 from ..system.inputs import Driver
+from ..system.system import Member
+from .sampled import matrices, period
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -122,7 +124,7 @@ def require_control() -> Any:
 # -- one FMU ---------------------------------------------------------------------------------------
 
 
-def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
+def linearize_instance(instance: Instance, member: Member) -> tuple[Linear, list[str]]:
     """An instance at its present communication point, and notes."""
     known = instance.description.variables
     states = [name[4:-1] for name in known if name.startswith("der(") and name[4:-1] in known]
@@ -136,6 +138,28 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
     notes = []
     sampled = [v.name for v in known.values() if v.variability == "discrete"
                and v.causality in ("local", "output")]  # fmt: skip
+    interval = period(member) if sampled else None
+    held = [
+        v.name
+        for v in known.values()
+        if v.variability == "discrete" and v.causality == "local" and v.type.startswith("Float")
+    ]
+    found = None
+    if interval is not None and held:
+        every = [*states, *held]
+        found = matrices(instance, member, every, inputs, outputs, interval)
+    if found is not None:
+        notes.append(
+            f"{instance.name}: linearized through its samples, every {interval:g} s; right below "
+            f"{0.1 / (interval or 1.0):.3g} Hz"
+        )
+        flat = ~np.any(np.hstack([found[2], found[3]]), axis=1)
+        notes += [
+            f"{instance.name}: {name} does not change with anything here (it may be rounded)"
+            for name, still in zip(outputs, flat, strict=True)
+            if still
+        ]
+        return _named(instance, found, every, inputs, outputs), notes
     if sampled:
         notes.append(f"{instance.name}: {len(sampled)} sampled values are held")
     if instance.description.can("providesDirectionalDerivatives"):
@@ -166,13 +190,15 @@ def linearize_instance(instance: Instance) -> tuple[Linear, list[str]]:
                 ends.append(instance.get(*outputs))
             instance.set({name: start[name]})
             full[:, column] = (ends[0] - ends[1]) / (2.0 * step)
-    prefix = f"{instance.name}."
-    model = Linear(
-        full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:],
-        tuple(prefix + name for name in states), tuple(prefix + name for name in inputs),
-        tuple(prefix + name for name in outputs), instance.time,
-    )  # fmt: skip
-    return model, notes
+    found = full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:]
+    return _named(instance, found, states, inputs, outputs), notes
+
+
+def _named(
+    instance: Instance, found: tuple[Matrix, Matrix, Matrix, Matrix], *names: Sequence[str]
+) -> Linear:
+    states, inputs, outputs = (tuple(f"{instance.name}.{n}" for n in group) for group in names)
+    return Linear(*found, states, inputs, outputs, instance.time)
 
 
 # -- a system --------------------------------------------------------------------------------------
@@ -209,6 +235,7 @@ def operating_point(
     with ExitStack() as stack:
         execution = Execution(outline, stack)
         run = execution.run
+        members = list(master.system.members.values())
         initialize(run)
         if count:
             execution.prepare().advance(count)
@@ -219,7 +246,7 @@ def operating_point(
             run.do(Op.COPY, *run.layout.copies[index].tolist())
             run.do(Op.SET, index, 0)
             instance.time = float(outline.times[count])
-            part, said = linearize_instance(instance)
+            part, said = linearize_instance(instance, members[index])
             parts.append(part)
             notes += said
     return parts, notes

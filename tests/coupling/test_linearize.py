@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from cosim.cli.app import app
 from cosim.control.linearize import (
     RASTER,
+    connect,
     linearize,
     loop_margins,
     margins,
@@ -24,6 +25,8 @@ from cosim.control.linearize import (
 )
 from cosim.errors import InputError, UnknownNameError
 from cosim.master.master import Master
+from cosim.running.runner import prepare
+from cosim.scenario.scenario import find
 from cosim.system.system import System
 
 S = control.tf("s")
@@ -176,3 +179,44 @@ def test_the_command_takes_variants_parameters_and_algorithms(provider, monkeypa
     assert len(followed["poles"]) == len(usual["poles"])
     with pytest.raises(InputError, match=r"--param load: write --param INSTANCE.NAME=VALUE"):
         linear(provider, monkeypatch, *bench, "--param", "load")
+
+
+def loop_of_speed(provider, motor: str):
+    item = find("motor_bench")[0].scenario("ST1")
+    master = prepare(item, provider, variants={"motor": motor}).master
+    parts, notes = operating_point(master, 1.0, item.inputs)
+    (loop,) = loop_margins(master, parts, ["motor.w"])
+    return connect(master, parts, notes), loop
+
+
+def test_sampled_loops_are_closed_with_the_delay_of_their_samples(provider) -> None:
+    sampled, loop = loop_of_speed(provider, "sampled")
+    smooth, other = loop_of_speed(provider, "electrical")
+    assert any("motor: linearized through its samples, every 0.0005 s" in n for n in sampled.notes)
+    assert loop.crossover == pytest.approx(other.crossover, rel=5e-3)
+    # the speed loop holds its value for T = 0.5 ms, T/2 on the average; the current loop is quicker
+    delay = 360.0 * other.crossover * 0.5 * 5e-4
+    assert other.phase - loop.phase == pytest.approx(delay, abs=0.2)
+
+    def ringing(found):
+        return next(p for p in found.poles if p.imag > 1.0)
+
+    assert ringing(sampled) == pytest.approx(ringing(smooth), rel=1e-2)
+    assert np.isfinite(loop.gain)  # with a delay there is an end to the gain
+
+
+def test_a_rounded_output_of_a_sampled_sensor_is_named(provider) -> None:
+    found, _ = loop_of_speed(provider, "sampled")
+    assert any(n.startswith("encoder: w_meas does not change with anything") for n in found.notes)
+
+
+def test_one_sampled_fmu_is_its_difference_equation(provider) -> None:
+    """A held signal passes slow signals with the delay of half its period."""
+    system = System("held", provider)
+    system.add("link", "command_link/held")
+    found = linearize(Master(system, step=1e-3), at=0.05)  # 0 before the first tick
+    period = float(system.members["link"].description.variables["T"].start[0])
+    slow = np.array([0.01 / period])
+    answer = found.response(slow, "link.v_set", "link.v_d")[0]
+    assert abs(answer) == pytest.approx(1.0, rel=1e-3)
+    assert np.angle(answer) == pytest.approx(-np.pi * slow[0] * period, rel=0.02)
