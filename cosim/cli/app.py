@@ -9,10 +9,14 @@ imported by the command, so that `--help` answers at once.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
+import signal
 import sys
+import threading
 from collections import Counter
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -327,6 +331,7 @@ def run_command(
             out=out or Path("out") / _folder_name(name),
             progress=told,
             isolate=time_limit if isolate else None,
+            guard=True,
         )
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         _say(f"note: {note}")
@@ -438,15 +443,40 @@ def _print_json(content: Any) -> None:
     typer.echo(json.dumps(content, indent=2))
 
 
+class Terminated(KeyboardInterrupt):
+    """Somebody asked the process to end."""
+
+
+@contextlib.contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """Let SIGTERM end the block like Ctrl-C: what it has started and made is put away."""
+
+    def terminate(*_: Any) -> None:
+        raise Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        app()
+        with terminated_as_interrupted():
+            app()
     except CosimError as error:
         _say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):
             _say(note)
         raise SystemExit(error.exit_code) from None
+    except Terminated:
+        _say("terminated")
+        raise SystemExit(128 + signal.SIGTERM) from None
     except KeyboardInterrupt:
         _say("interrupted")
         raise SystemExit(130) from None

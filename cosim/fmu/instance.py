@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import EndRequest, FmuCallError, ValueRangeError
 from .archive import Fmu, open_fmu
+from .calls import announce
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
@@ -84,12 +85,14 @@ class Instance:
                 f"{self.label}: the FMU says that it can be instantiated only once per process, "
                 "and it already is; run the other instance in a process of its own"
             )
+        announce(self.name, "loading its library")
         self.binding: Fmi2 | Fmi3
         self.binding, self._functions = bind(fmu)
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments(True)
         self._warned: dict[str, float] = {}
         self._key = new_key()
+        announce(self.name, "creation")
         address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
             messages = take(self._key)
@@ -104,7 +107,7 @@ class Instance:
         self._dead = [False]
         self._finalizer = weakref.finalize(
             self, _free, self.binding.free_, address, self._key, self._dead, self._alive,
-            fmu.digest,
+            fmu.digest, self.name,
         )  # fmt: skip
 
     def __repr__(self) -> str:
@@ -158,6 +161,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         if name not in self._functions:
             raise FmuCallError(f"{self.label}: the FMU has no function {name}")
+        announce(self.name, what)
         status = self._functions[name](self.address, *arguments)
         if status > 1:
             raise self.failure(what, status)
@@ -456,8 +460,11 @@ def _tail(messages: Sequence[str]) -> str:
     return ": " + "; ".join(messages) if messages else " (the FMU logged nothing)"
 
 
-def _free(function: Any, address: int, key: int, dead: list[bool], alive: Any, digest: str) -> None:
+def _free(
+    function: Any, address: int, key: int, dead: list[bool], alive: Any, digest: str, name: str
+) -> None:
     if not dead[0]:
+        announce(name, "being freed")
         function(address)
     forget(key)
     _single.discard(digest)

@@ -166,6 +166,11 @@ class Execution:
         """Steps of the whole system that were made, repeated ones too."""
         return self.stepper.steps() if self.stepper is not None else self.run.index
 
+    def how(self) -> dict[str, Any]:
+        """What provenance says of how it was run."""
+        report = self.stepper.report() if self.stepper is not None else {}
+        return {"fmu_steps": self.steps() * len(self.run.instances), **report}
+
     def recording(self, error: str = "") -> Recording:
         """What was recorded so far."""
         run = self.run
@@ -173,10 +178,7 @@ class Execution:
         return self.outline.recording(
             run.rows[: run.row],
             {bond.name: float(energy) for bond, energy in energies},
-            {
-                "fmu_steps": self.steps() * len(run.instances),
-                **(self.stepper.report() if self.stepper is not None else {}),
-            },
+            self.how(),
             error,
             objects=run.passing.kept,
             notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],

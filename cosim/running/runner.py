@@ -278,6 +278,7 @@ def prepare(
     parameters: Mapping[str, Any] | None = None,
     base: Path | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> Prepared:
     """Choose the FMUs of a scenario and set its values; arguments as of `run_scenario`.
 
@@ -291,7 +292,7 @@ def prepare(
     record, others = _recorded(scenario, system, changed)
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
-        isolate=isolate, options=scenario.options,
+        isolate=isolate, guard=guard, options=scenario.options,
     )  # fmt: skip
     return Prepared(scenario, instances, master, record, _every(scenario), (*notes, *others))
 
@@ -305,6 +306,7 @@ def run_scenario(
     progress: Callable[[float], None] | None = None,
     base: Path | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> RunResult:
     """Run one scenario.
 
@@ -316,14 +318,15 @@ def run_scenario(
         parameters: values on top of the scenario's.
         progress: told now and then which fraction is done.
         base: folder against which .fmu paths among the variants are taken.
-        isolate: as of `Master`.
+        isolate, guard: as of `Master`.
 
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
     """
     prepared = prepare(
-        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate
-    )
+        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate,
+        guard=guard,
+    )  # fmt: skip
     started = time.perf_counter()
     recording = prepared.run(progress)
     return prepared.conclude(recording, time.perf_counter() - started)
@@ -355,6 +358,7 @@ def run(
     folder: Path | None = None,
     progress: Callable[[str, float], None] | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> Result:
     """Run a scenario, all its runs or the one that the name ends with.
 
@@ -371,7 +375,7 @@ def run(
         out: folder for recording, plot and result; nothing is written without it.
         folder: where scenarios are looked for; the library's by default.
         progress: told run and fraction now and then.
-        isolate: as of `Master`.
+        isolate, guard: as of `Master`.
 
     Raises:
         CosimError: see `errors`.
@@ -389,7 +393,7 @@ def run(
         try:
             result = run_scenario(
                 item, provider, variants=variants, parameters=parameters, progress=told,
-                base=Path.cwd(), isolate=isolate,
+                base=Path.cwd(), isolate=isolate, guard=guard,
             )  # fmt: skip
         except StepError as error:
             if place is not None and error.recording is not None:

@@ -12,6 +12,7 @@ import math
 import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
@@ -95,7 +96,7 @@ class _Run(ct.Structure):
         ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
         ("past", _P), ("n_means", _I64),
         ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
-        ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
+        ("at", _P), ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
         ("failed_derivatives", _I64),
     )  # fmt: skip
 
@@ -128,7 +129,32 @@ UNSETTLED = 9
 """Status of an algebraic loop that has no solution or does not settle."""
 TOO_LONG, TOO_LARGE = 10, 11
 """Statuses of a run that took more than its limit, and of one that ran away."""
+RUN_SIZE = ct.sizeof(_Run)
 _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a compiled run stands: step, rows, and what is under way (-1: it is not this)."""
+
+    index: int = 0
+    row: int = 0
+    call: int = -1
+    member: int = -1
+    derivatives: int = -1
+
+
+def standing(memory: NDArray[np.uint8]) -> Standing:
+    """Where a run of another process stands, whose structure is in shared memory."""
+    run = _Run.from_buffer(memory.data)
+    begins = [run.calls or 0, run.members or 0, run.derivatives or 0]
+    found = [-1, -1, -1]
+    if run.at:
+        # arrays are apart: the one that begins last before the address holds it
+        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= run.at else -1)
+        size = ct.sizeof((_Call, _Member, _Derivatives)[near])
+        found[near] = (run.at - begins[near]) // size
+    return Standing(int(run.index), int(run.row), *found)
 
 
 def library_name() -> str:
@@ -243,6 +269,8 @@ class Kernel:
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
+        if bound.witness is not None:
+            self.run = bound.witness.compiled(self.run)
         told = self._derivatives(bound.derivatives)
         instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
@@ -272,6 +300,12 @@ class Kernel:
         )
         self.run.n_means = len(plan.means)
         self.run.history, self.run.past = self._array(bound.history), self._array(bound.past)
+        if bound.witness is not None:
+            numbers = {instance: number for number, instance in enumerate(instances)}
+            bound.witness.list_calls(
+                [(int(op), numbers[instance]) for op, instance, _ in self._parts],
+                [(int(Op.SET_DERIVATIVES), numbers[instance]) for instance, _ in self._told],
+            )
 
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""

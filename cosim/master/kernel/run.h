@@ -100,6 +100,8 @@ typedef struct {
   int64_t n_means;
   double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
   const Derivatives *derivatives;
+  const void *volatile at; /* the call under way, member or derivatives; null between calls: who waits for this
+                              process can say which FMU it was in when it ended */
   int64_t failed_loop, failed_call, failed_member, failed_derivatives; /* -1: none; none of them: a recorded value is not finite */
 } Run;
 
