@@ -443,16 +443,13 @@ def _print_json(content: Any) -> None:
     typer.echo(json.dumps(content, indent=2))
 
 
-class Terminated(KeyboardInterrupt):
-    """Somebody asked the process to end."""
-
-
 @contextlib.contextmanager
-def terminated_as_interrupted() -> Iterator[None]:
-    """Let SIGTERM end the block like Ctrl-C: what it has started and made is put away."""
+def leaving_nothing() -> Iterator[None]:
+    """Let SIGTERM end the block like an error: what it has started and made is put away."""
 
     def terminate(*_: Any) -> None:
-        raise Terminated
+        _say("terminated")
+        raise SystemExit(128 + signal.SIGTERM)
 
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -467,16 +464,13 @@ def terminated_as_interrupted() -> Iterator[None]:
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        with terminated_as_interrupted():
+        with leaving_nothing():
             app()
     except CosimError as error:
         _say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):
             _say(note)
         raise SystemExit(error.exit_code) from None
-    except Terminated:
-        _say("terminated")
-        raise SystemExit(128 + signal.SIGTERM) from None
     except KeyboardInterrupt:
         _say("interrupted")
         raise SystemExit(130) from None
