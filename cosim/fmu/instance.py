@@ -22,7 +22,7 @@ import ctypes as ct
 import math
 import os
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -38,6 +38,7 @@ from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .library import bind
 from .messages import STATUS, forget, new_key, take
+from .surroundings import MODES, kept, modes
 from .values import check_values
 
 Vector = NDArray[np.float64]
@@ -93,7 +94,9 @@ class Instance:
         self._warned: dict[str, float] = {}
         self._key = new_key()
         announce(self.name, "creation")
-        address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
+        self._changed: dict[str, str] = {}
+        with self._putting_back("its creation"):
+            address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
             messages = take(self._key)
             forget(self._key)
@@ -180,7 +183,22 @@ class Instance:
             when = "" if math.isnan(time) else f", first at t = {time:.9g} s"
             found.append(f"{self.label}: {what} returned status 'warning'{when}")
         self._warned.clear()
+        for what, when in self._changed.items():
+            found.append(f"{self.label}: changed {what} in {when}, which was put back")
+        self._changed.clear()
         return found
+
+    def changed(self, what: str, when: str) -> None:
+        """Note what a call has changed in this process that was put back."""
+        self._changed.setdefault(what, when)
+
+    @contextlib.contextmanager
+    def _putting_back(self, when: str) -> Iterator[None]:
+        found: list[str] = []
+        with kept(found):
+            yield
+        for what in found:
+            self.changed(what, when)
 
     def get_part(self, part: Part) -> None:
         """One get call for the values of a block's part."""
@@ -299,12 +317,14 @@ class Instance:
     ) -> None:
         """Begin initialization at time `start`."""
         self.time = start
-        for name, arguments in self.binding.enter_calls(start, stop, tolerance):
-            self._call("initialization", name, *arguments)
+        with self._putting_back("initialization"):
+            for name, arguments in self.binding.enter_calls(start, stop, tolerance):
+                self._call("initialization", name, *arguments)
 
     def exit_initialization(self) -> None:
         """End initialization; the instance is then at its first communication point."""
-        self._call("initialization", f"fmi{self.binding.version}ExitInitializationMode")
+        with self._putting_back("initialization"):
+            self._call("initialization", f"fmi{self.binding.version}ExitInitializationMode")
         self._terminable = True
 
     def step(self, time: float, size: float) -> None:
@@ -317,7 +337,11 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
+        before = modes.get()
         status = self._step(self.address, time, size, *self._step_arguments)
+        if modes.get() != before:
+            modes.put(before)
+            self.changed(MODES, "a step")
         if status > 1 or self.binding.stopped():
             raise self.failed_step(size, status, self.binding.reached())
         if status:

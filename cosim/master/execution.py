@@ -8,6 +8,7 @@ from typing import Any
 
 from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, StepError, ValueRangeError
+from ..fmu.surroundings import Surroundings
 from . import kernel
 from .initialization import initialize
 from .interpreter import Interpreter
@@ -54,6 +55,7 @@ class Execution:
         run: the instances and their values.
         stepper: what makes the communication steps, None until the first one.
         ended: the words of an FMU that asked to end the run, "" if none did.
+        changed: what FMUs have left changed in this process.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Execution:
         self.run = interpreter(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
+        self.changed: list[str] = []
 
     def execute(self, progress: Callable[[float], None] | None = None) -> Recording:
         """The whole run.
@@ -85,6 +88,7 @@ class Execution:
         count = self.outline.count
         shown = max(count // 100, 1)
         initialize(self.run)
+        before = Surroundings.now()
         try:
             stepper = self.begin()
             try:
@@ -97,6 +101,8 @@ class Execution:
             self.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self.stopped(error, keep=True) from error
+        finally:
+            self.changed = before.restore()
         if progress is not None:
             progress(1.0)
         return self.recording()
@@ -181,5 +187,13 @@ class Execution:
             self.how(),
             error,
             objects=run.passing.kept,
-            notes=[*filter(None, [self.ended]), *(w for i in run.instances for w in i.warnings())],
+            notes=[
+                *filter(None, [self.ended]),
+                *(w for i in run.instances for w in i.warnings()),
+                *(
+                    f"an FMU changed {what} in a step ({', '.join(run.system.members)} made some), "
+                    "which was put back"
+                    for what in self.changed
+                ),
+            ],
         )

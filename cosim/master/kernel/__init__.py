@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
@@ -47,7 +48,7 @@ class _Call(ct.Structure):
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64))
+    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64), ("modes", _I64))
 
 
 class _Instruction(ct.Structure):
@@ -394,6 +395,8 @@ class Kernel:
         for instance, member in zip(self._instances, self._made[_Member], strict=False):
             if member.warned:
                 instance.warned("a step", math.nan)
+            if member.modes:
+                instance.changed(MODES, "a step")
 
     def failed(self) -> tuple[Op, Instance | None, Any]:
         """What failed: operation, instance and what it was about.

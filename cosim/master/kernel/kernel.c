@@ -13,6 +13,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
+#include <fenv.h>
 #include <float.h>
 
 #include "run.h"
@@ -98,10 +99,25 @@ static double bounded(const Run *run, double t, double h) {
   return h;
 }
 
+/* Rounding and treatment of tiny numbers, which a step must leave as they are for the other FMUs. */
+#if defined(__x86_64__)
+#define MODES() ((unsigned)__builtin_ia32_stmxcsr() & ~0x3fu) /* without the flags of exceptions */
+static void undo_modes(Member *m, unsigned wanted) {
+  if (fegetround() != FE_TONEAREST) fesetround(FE_TONEAREST);
+  __builtin_ia32_ldmxcsr(wanted);
+  m->modes = 1;
+}
+#else
+#define MODES() 0u
+static void undo_modes(Member *m, unsigned wanted) {}
+#endif
+
 static Member *step2(Run *run, Member *m, const Member *end, double t, double h, int *status) {
+  const unsigned modes = MODES();
   for (; m < end; m++) {
     run->at = m;
     *status = ((Step2)m->step)(m->component, t, h, 1);
+    if (MODES() != modes) undo_modes(m, modes);
     if (*status > 1) return m;
     m->warned |= *status;
   }
@@ -110,9 +126,11 @@ static Member *step2(Run *run, Member *m, const Member *end, double t, double h,
 
 static Member *step3(Run *run, Member *m, const Member *end, double t, double h, int *status) {
   bool event = false, stop = false, early = false;
+  const unsigned modes = MODES();
   for (; m < end; m++) {
     run->at = m;
     *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
+    if (MODES() != modes) undo_modes(m, modes);
     if (*status <= 1 && stop) *status = TERMINATED;
     if (*status > 1) return m;
     m->warned |= *status;

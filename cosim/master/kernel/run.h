@@ -29,6 +29,7 @@ typedef struct {
   void *component, *step;
   double reached; /* the time at which an FMU of FMI 3 says that it stands */
   int64_t warned;
+  int64_t modes;  /* whether a step has left the rounding of numbers changed; it was undone */
 } Member;
 
 /* What one operation does: with calls, members, copies from first to before last. */
