@@ -37,7 +37,7 @@ from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .library import bind
-from .messages import STATUS, forget, new_key, take
+from .messages import STATUS, forget, known, new_key, status_name, take
 from .surroundings import MODES, kept, modes
 from .values import check_values
 
@@ -94,7 +94,7 @@ class Instance:
         self._warned: dict[str, float] = {}
         self._key = new_key()
         announce(self.name, "creation")
-        self._changed: dict[str, str] = {}
+        self._notes: dict[str, None] = {}
         with self._putting_back("its creation"):
             address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
@@ -149,8 +149,8 @@ class Instance:
         messages = take(self._key)
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(
-            f"{self.label}: {what}{when} failed with status "
-            f"{STATUS[status] if 0 <= status < len(STATUS) else status!r}" + _tail(messages),
+            f"{self.label}: {what}{when} failed with status {status_name(status)}"
+            + _tail(messages),
             messages,
         )
 
@@ -166,7 +166,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: the FMU has no function {name}")
         announce(self.name, what)
         status = self._functions[name](self.address, *arguments)
-        if status > 1:
+        if not 0 <= status <= 1:
             raise self.failure(what, status)
         if status:
             self.warned(what)
@@ -183,14 +183,17 @@ class Instance:
             when = "" if math.isnan(time) else f", first at t = {time:.9g} s"
             found.append(f"{self.label}: {what} returned status 'warning'{when}")
         self._warned.clear()
-        for what, when in self._changed.items():
-            found.append(f"{self.label}: changed {what} in {when}, which was put back")
-        self._changed.clear()
+        found += [f"{self.label}: {text}" for text in self._notes]
+        self._notes.clear()
         return found
+
+    def note(self, text: str) -> None:
+        """Note something once, for `warnings`."""
+        self._notes.setdefault(text)
 
     def changed(self, what: str, when: str) -> None:
         """Note what a call has changed in this process that was put back."""
-        self._changed.setdefault(what, when)
+        self.note(f"changed {what} in {when}, which was put back")
 
     @contextlib.contextmanager
     def _putting_back(self, when: str) -> Iterator[None]:
@@ -205,7 +208,7 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
-        if status > 1:
+        if not 0 <= status <= 1:
             raise self.failed_access(True, part, status)
         if status:
             self.warned("getting values")
@@ -215,7 +218,7 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
-        if status > 1:
+        if not 0 <= status <= 1:
             raise self.failed_access(False, part, status)
         if status:
             self.warned("setting values")
@@ -228,7 +231,7 @@ class Instance:
             self.address, references.ctypes.data, references.size, orders.ctypes.data,
             values.ctypes.data,
         )  # fmt: skip
-        if status > 1:
+        if not 0 <= status <= 1:
             raise self.failed_derivatives(references, status)
 
     def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
@@ -338,7 +341,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
         before = modes.get()
-        status = self._step(self.address, time, size, *self._step_arguments)
+        status = known(self._step(self.address, time, size, *self._step_arguments))
         if modes.get() != before:
             modes.put(before)
             self.changed(MODES, "a step")

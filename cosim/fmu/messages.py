@@ -11,9 +11,28 @@ import itertools
 from collections import deque
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+UNKNOWN = 1 << 16
+"""Begin of numbers for statuses that FMI does not know; see `known`."""
 _LIMIT = 50
 _messages: dict[int, deque[str]] = {}
 _keys = itertools.count(1)
+
+
+def known(status: int) -> int:
+    """The status of a call; one that FMI does not know gets a number of its own.
+
+    Executors have further statuses behind FMI's, which an FMU must not return.
+    """
+    return status if 0 <= status < len(STATUS) else UNKNOWN + (status & 0xFFFF)
+
+
+def status_name(status: int) -> str:
+    """A status in error texts."""
+    if 0 <= status < len(STATUS):
+        return repr(STATUS[status])
+    if status >= UNKNOWN:
+        status = (status & 0x7FFF) - (status & 0x8000)
+    return f"{status}, which FMI does not know"
 
 
 def new_key() -> int:

@@ -52,6 +52,11 @@ static int convert(const Call *c, double *values, int into) {
   return 0;
 }
 
+/* The status of a call; one that FMI does not know gets a number of its own. */
+static inline int known(int status) {
+  return (unsigned)status <= 5 ? status : UNKNOWN + (status & 0xffff);
+}
+
 static inline int access_call(const Call *c) {
   if (c->version == 2)
     return ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
@@ -62,7 +67,7 @@ static inline int access_call(const Call *c) {
 static Call *call2(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     run->at = c;
-    *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
+    *status = known(((Access2)c->function)(c->component, c->references, c->n_references, c->buffer));
     if (*status > 1) return c;
     c->warned |= *status;
   }
@@ -72,7 +77,7 @@ static Call *call2(Run *run, Call *c, const Call *end, int *status) {
 static Call *call3(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     run->at = c;
-    *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
+    *status = known(((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values));
     if (*status > 1) return c;
     c->warned |= *status;
   }
@@ -84,7 +89,7 @@ static Call *call_converted(Run *run, Call *c, const Call *end, int set, int *st
   for (; c < end; c++) {
     if (set && c->slots && (*status = convert(c, values, 1))) return c;
     run->at = c;
-    *status = access_call(c);
+    *status = known(access_call(c));
     if (*status > 1) return c;
     c->warned |= *status;
     if (!set && c->slots) convert(c, values, 0);
@@ -116,7 +121,7 @@ static Member *step2(Run *run, Member *m, const Member *end, double t, double h,
   const unsigned modes = MODES();
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step2)m->step)(m->component, t, h, 1);
+    *status = known(((Step2)m->step)(m->component, t, h, 1));
     if (MODES() != modes) undo_modes(m, modes);
     if (*status > 1) return m;
     m->warned |= *status;
@@ -129,7 +134,7 @@ static Member *step3(Run *run, Member *m, const Member *end, double t, double h,
   const unsigned modes = MODES();
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
+    *status = known(((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached));
     if (MODES() != modes) undo_modes(m, modes);
     if (*status <= 1 && stop) *status = TERMINATED;
     if (*status > 1) return m;
@@ -230,7 +235,7 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
 static const Derivatives *set_derivatives(Run *run, const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
     run->at = r;
-    *status = ((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values);
+    *status = known(((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values));
     if (*status > 1) return r;
   }
   return 0;

@@ -10,6 +10,7 @@ enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, ST
        SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 6, NOT_FINITE = 7, UNFIT = 8, UNSETTLED = 9, TOO_LONG = 10, TOO_LARGE = 11 };
+enum { UNKNOWN = 1 << 16 };        /* begin of numbers for statuses that FMI does not know, as in cosim/fmu/messages.py */
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
 enum { PARTS = 1 << 16 };        /* as in cosim/master/plan.py */
 
