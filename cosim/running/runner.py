@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
 from ..errors import StepError, UnknownNameError, ValueRangeError
-from ..files import write_text
+from ..files import claimed, write_text
 from ..installation import builder
 from ..master.master import Master
 from ..master.outline import Outline
@@ -382,19 +383,34 @@ def run(
     """
     if provider is None:
         provider = builder.default_provider()
-    whole, text, wanted, items = find_runs(name, folder, duration, step)
+    found = find_runs(name, folder, duration, step)
+    with contextlib.nullcontext() if out is None else claimed(Path(out)):
+        return _run(
+            found, None if out is None else Path(out), provider, progress,
+            {"algorithm": algorithm, "options": options, "step": step, "duration": duration},
+            {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard},
+        )  # fmt: skip
+
+
+def _run(
+    found: tuple[str, str, str, dict[str, Scenario]],
+    out: Path | None,
+    provider: Provider,
+    progress: Callable[[str, float], None] | None,
+    adjustments: Mapping[str, Any],
+    how: Mapping[str, Any],
+) -> Result:
+    """Make the runs that were found; arguments as of `run`."""
+    whole, text, wanted, items = found
     chosen = list(items)
     results: dict[str, RunResult] = {}
     files: list[Path] = []
     for run_name, item in items.items():
-        item = adjusted(item, algorithm, options, step, duration)
-        place = None if out is None else Path(out) / run_name
+        item = adjusted(item, **adjustments)
+        place = None if out is None else out / run_name
         told = None if progress is None else _told(progress, item.name)
         try:
-            result = run_scenario(
-                item, provider, variants=variants, parameters=parameters, progress=told,
-                base=Path.cwd(), isolate=isolate, guard=guard,
-            )  # fmt: skip
+            result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
             if place is not None and error.recording is not None:
                 path = error.recording.write_parquet(place / "recording.parquet")
@@ -414,10 +430,10 @@ def run(
     if out is not None:
         quantities = final.overview
         if quantities and len(runs) > 1:
-            path = Path(out) / "overview.png"
+            path = out / "overview.png"
             plot_overview(quantities, text or whole, path)
             files.append(path)
-        path = Path(out) / "result.json"
+        path = out / "result.json"
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
     return final

@@ -190,11 +190,22 @@ def _load(path: str) -> Any:
 
 def find() -> Path | None:
     """The library, None if this machine has none."""
-    for folder in (SOURCES[0].parent / "lib", cache_folder()):
-        path = folder / library_name()
-        if path.is_file():
-            return path
-    return None
+    installed, compiled = (
+        folder / library_name() for folder in (SOURCES[0].parent / "lib", cache_folder())
+    )
+    if installed.is_file():
+        return installed
+    try:
+        stat = compiled.stat()
+    except OSError:
+        return None
+    return compiled if _whole(compiled, stat.st_mtime_ns, stat.st_size) else None
+
+
+@lru_cache(maxsize=8)
+def _whole(path: Path, changed: int, size: int) -> bool:
+    """Whether a compiled library is as it was written; loading another one may end the process."""
+    return bool(cache.sealed(path, path.read_bytes()))
 
 
 class Kernel:
