@@ -9,7 +9,11 @@ imported by the command, so that `--help` answers at once.
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -155,6 +159,7 @@ def run_command(
             out=out or Path("out") / _folder_name(name),
             progress=told,
             isolate=time_limit if isolate else None,
+            guard=True,
         )
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         say(f"note: {note}")
@@ -235,10 +240,28 @@ def _unjudged(checks: list[dict[str, Any]]) -> dict[str, list[str]]:
 # -- frame -----------------------------------------------------------------------------------------
 
 
+@contextlib.contextmanager
+def leaving_nothing() -> Iterator[None]:
+    """Let SIGTERM end the block like an error: what it has started and made is put away."""
+
+    def terminate(*_: Any) -> None:
+        say("terminated")
+        raise SystemExit(128 + signal.SIGTERM)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
     try:
-        with stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+        with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
             app()
     except CosimError as error:
         say(f"error: {error}")

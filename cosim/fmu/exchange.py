@@ -50,6 +50,9 @@ class Caller(Protocol):
     def binding(self) -> Any:
         """`fmi2` or `fmi3`."""
 
+    def note(self, text: str) -> None:
+        """Note something once."""
+
     def get_part(self, part: Part) -> None:
         """Fetch values."""
 
@@ -133,6 +136,11 @@ class Block:
             if part.type in OBJECTS:
                 found = _objects(part)
                 self.objects[part.slots] = found
+                if part.type == "String" and not part.buffer.all():
+                    slot = np.arange(len(self.names))[part.slots][int(np.argmin(part.buffer))]
+                    self._instance.note(
+                        f"gave no string for {self.names[slot]}, which counts as an empty one"
+                    )
                 if part.type in ("Int64", "UInt64"):
                     self.values[part.slots] = [float(item) for item in found]
             elif part.buffer is not self.values:

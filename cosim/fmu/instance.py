@@ -22,7 +22,7 @@ import ctypes as ct
 import math
 import os
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -32,11 +32,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import EndRequest, FmuCallError, ValueRangeError
 from .archive import Fmu, open_fmu
+from .calls import announce
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .library import bind
-from .messages import STATUS, forget, new_key, take
+from .messages import STATUS, forget, new_key, status_name, take
+from .surroundings import MODES, kept, modes
 from .values import check_values
 
 Vector = NDArray[np.float64]
@@ -84,13 +86,17 @@ class Instance:
                 f"{self.label}: the FMU says that it can be instantiated only once per process, "
                 "and it already is; run the other instance in a process of its own"
             )
+        announce(self.name, "loading its library")
         self.binding: Fmi2 | Fmi3
         self.binding, self._functions = bind(fmu)
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments(True)
         self._warned: dict[str, float] = {}
         self._key = new_key()
-        address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
+        announce(self.name, "creation")
+        self._notes: dict[str, None] = {}
+        with self._putting_back("its creation"):
+            address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
         if not address:
             messages = take(self._key)
             forget(self._key)
@@ -104,7 +110,7 @@ class Instance:
         self._dead = [False]
         self._finalizer = weakref.finalize(
             self, _free, self.binding.free_, address, self._key, self._dead, self._alive,
-            fmu.digest,
+            fmu.digest, self.name,
         )  # fmt: skip
 
     def __repr__(self) -> str:
@@ -143,8 +149,8 @@ class Instance:
         messages = take(self._key)
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(
-            f"{self.label}: {what}{when} failed with status "
-            f"{STATUS[status] if 0 <= status < len(STATUS) else status!r}" + _tail(messages),
+            f"{self.label}: {what}{when} failed with status {status_name(status)}"
+            + _tail(messages),
             messages,
         )
 
@@ -158,6 +164,7 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         if name not in self._functions:
             raise FmuCallError(f"{self.label}: the FMU has no function {name}")
+        announce(self.name, what)
         status = self._functions[name](self.address, *arguments)
         if status not in (0, 1):
             raise self.failure(what, status)
@@ -176,7 +183,25 @@ class Instance:
             when = "" if math.isnan(time) else f", first at t = {time:.9g} s"
             found.append(f"{self.label}: {what} returned status 'warning'{when}")
         self._warned.clear()
+        found += [f"{self.label}: {text}" for text in self._notes]
+        self._notes.clear()
         return found
+
+    def note(self, text: str) -> None:
+        """Note something once, for `warnings`."""
+        self._notes.setdefault(text)
+
+    def changed(self, what: str, when: str) -> None:
+        """Note what a call has changed in this process that was put back."""
+        self.note(f"changed {what} in {when}, which was put back")
+
+    @contextlib.contextmanager
+    def _putting_back(self, when: str) -> Iterator[None]:
+        found: list[str] = []
+        with kept(found):
+            yield
+        for what in found:
+            self.changed(what, when)
 
     def get_part(self, part: Part) -> None:
         """One get call for the values of a block's part."""
@@ -295,12 +320,14 @@ class Instance:
     ) -> None:
         """Begin initialization at time `start`."""
         self.time = start
-        for name, arguments in self.binding.enter_calls(start, stop, tolerance):
-            self._call("initialization", name, *arguments)
+        with self._putting_back("initialization"):
+            for name, arguments in self.binding.enter_calls(start, stop, tolerance):
+                self._call("initialization", name, *arguments)
 
     def exit_initialization(self) -> None:
         """End initialization; the instance is then at its first communication point."""
-        self._call("initialization", f"fmi{self.binding.version}ExitInitializationMode")
+        with self._putting_back("initialization"):
+            self._call("initialization", f"fmi{self.binding.version}ExitInitializationMode")
         self._terminable = True
 
     def step(self, time: float, size: float) -> None:
@@ -313,7 +340,11 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
+        before = modes.get()
         status = self._step(self.address, time, size, *self._step_arguments)
+        if modes.get() != before:
+            modes.put(before)
+            self.changed(MODES, "a step")
         if status not in (0, 1) or self.binding.stopped():
             raise self.failed_step(size, status, self.binding.reached())
         if status:
@@ -456,8 +487,11 @@ def _tail(messages: Sequence[str]) -> str:
     return ": " + "; ".join(messages) if messages else " (the FMU logged nothing)"
 
 
-def _free(function: Any, address: int, key: int, dead: list[bool], alive: Any, digest: str) -> None:
+def _free(
+    function: Any, address: int, key: int, dead: list[bool], alive: Any, digest: str, name: str
+) -> None:
     if not dead[0]:
+        announce(name, "being freed")
         function(address)
     forget(key)
     _single.discard(digest)

@@ -16,6 +16,13 @@ _messages: dict[int, deque[str]] = {}
 _keys = itertools.count(1)
 
 
+def status_name(status: int) -> str:
+    """A status in error texts."""
+    if 0 <= status < len(STATUS):
+        return repr(STATUS[status])
+    return f"{status}, which FMI does not know"
+
+
 def new_key() -> int:
     """A key under which an instance's messages are kept."""
     key = next(_keys)

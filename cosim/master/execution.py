@@ -8,6 +8,7 @@ from typing import Any
 
 from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, StepError, ValueRangeError
+from ..fmu.surroundings import Surroundings
 from . import kernel
 from .initialization import initialize
 from .interpreter import Interpreter
@@ -56,6 +57,7 @@ class Execution:
         stepper: what makes the communication steps, None until the first one.
         lost: what the system is without because nothing takes it.
         ended: the words of an FMU that asked to end the run, "" if none did.
+        changed: what FMUs have left changed in this process.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Execution:
         self.stepper: Stepper | None = None
         self.ended = ""
         self.lost: list[str] = []
+        self.changed: list[str] = []
 
     def execute(self, progress: Callable[[float], None] | None = None) -> Recording:
         """The whole run.
@@ -89,6 +92,7 @@ class Execution:
         shown = max(count // 100, 1)
         initialize(self.run)
         self.lost = self._lost()
+        before = Surroundings.now()
         try:
             stepper = self.begin()
             try:
@@ -103,6 +107,8 @@ class Execution:
                 self.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self.stopped(error, keep=True) from error
+        finally:
+            self.changed = before.restore()
         if progress is not None:
             progress(1.0)
         return self.recording()
@@ -184,16 +190,18 @@ class Execution:
         """Steps of the whole system that were made, repeated ones too."""
         return self.stepper.steps() if self.stepper is not None else self.run.index
 
+    def how(self) -> dict[str, Any]:
+        """What provenance says of how it was run."""
+        report = self.stepper.report() if self.stepper is not None else {}
+        return {"fmu_steps": self.steps() * len(self.run.instances), **report}
+
     def recording(self, error: str = "") -> Recording:
         """What was recorded so far."""
         run, (energy, turnover) = self.run, self.energies()
         return self.outline.recording(
             run.rows[: run.row],
             energy,
-            {
-                "fmu_steps": self.steps() * len(run.instances),
-                **(self.stepper.report() if self.stepper is not None else {}),
-            },
+            self.how(),
             error,
             objects=run.passing.kept,
             beside=run.beside,
@@ -213,7 +221,12 @@ class Execution:
     def notes(self) -> list[str]:
         """What is to be known of the run besides what was recorded."""
         warnings = [text for instance in self.run.instances for text in instance.warnings()]
-        return [*self.lost, *filter(None, [self.ended]), *warnings]
+        changed = [
+            f"an FMU changed {what} in a step ({', '.join(self.run.system.members)} made some), "
+            "which was put back"
+            for what in self.changed
+        ]
+        return [*self.lost, *filter(None, [self.ended]), *warnings, *changed]
 
     def _lost(self) -> list[str]:
         """Outputs that are not 0, must be passed on, and are not."""

@@ -47,8 +47,8 @@ def initialize(run: Interpreter) -> None:
         raise AlgebraicLoopError(_unsettled(run, change))
     for instance in run.instances:
         instance.exit_initialization()
-    for block in run.outputs:
-        block.get()
+    for index in range(len(run.instances)):
+        run.do(Op.GET, index, 0)
     run.started = True
 
 

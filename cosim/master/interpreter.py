@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from .newton import Newton
 from .objects import ObjectPassing
 from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
+
+if TYPE_CHECKING:
+    from .witness import Witness
 
 Vector = NDArray[np.float64]
 ROUNDING = 1e-9
@@ -44,6 +48,9 @@ class Interpreter:
         derivatives: derivatives of the inputs that move within a step.
         bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
+
+    witness: Witness | None = None
+    """What another process learns of the run."""
 
     def __init__(self, outline: Outline, stack: ExitStack) -> None:
         self.outline, self.system, self.step = outline, outline.system, outline.step

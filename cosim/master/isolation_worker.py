@@ -2,99 +2,124 @@
 
 from __future__ import annotations
 
+import ctypes as ct
+import faulthandler
 import os
 import pickle
+import shutil
+import signal
 import sys
 import threading
 import time
+import traceback
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from ..data.recording import Recording
-from ..errors import AlgebraicLoopError, FmuCallError, StepError
+from ..errors import StepError
+from ..fmu import calls
 from .execution import Execution
-from .interpreter import Interpreter, Vector
-from .isolation import (
-    BESIDE,
-    CALLS,
-    INDEX,
-    INSTANCE,
-    NOTHING,
-    OBJECTS,
-    OPERATION,
-    ROW,
-    Order,
-    Outcome,
-    shared,
-)
+from .interpreter import Interpreter
 from .outline import Outline
 from .plan import Op
+from .witness import Witness
 
-HOW = ("fmu_steps", "step_control")
-"""Entries of a provenance that only the executing process knows."""
 WATCH = 0.2
 """Time between two looks whether the ordering process is still there [s]."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What the other process shall run, and the folder that it shares with this one."""
+
+    outline: Outline
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What it says at the end.
+
+    Attributes:
+        error: what it raised, but for the end of a run by an FMU's error.
+        text, messages: of that error.
+        bond_energy, how, objects, notes, bond_turnover: of the recording.
+        beside: communication point of its last row if it is none of every n-th.
+    """
+
+    error: Exception | None = None
+    text: str = ""
+    messages: tuple[str, ...] = ()
+    bond_energy: Mapping[str, float] = field(default_factory=dict)
+    how: Mapping[str, Any] = field(default_factory=dict)
+    objects: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    bond_turnover: Mapping[str, float] = field(default_factory=dict)
+    beside: int | None = None
 
 
 class _Told(Interpreter):
     """An interpreter that says what it is about to do."""
 
-    def __init__(self, outline: Outline, stack: ExitStack, folder: Path) -> None:
+    def __init__(self, outline: Outline, stack: ExitStack, witness: Witness) -> None:
+        self.witness = witness
+        calls.listen(witness.say)
         super().__init__(outline, stack)
-        self.state, self.rows = shared(folder, *self.rows.shape)
-        self._written = stack.enter_context((folder / OBJECTS).open("wb"))
+        self.rows = witness.rows
 
     def do(self, op: Op, a: int, b: int) -> None:
+        assert self.witness is not None
         self.tell()
         if op in (Op.SET, Op.GET, Op.STEP, Op.SUBSTEP):
-            self.state[INSTANCE], self.state[OPERATION] = a, op
-        self.state[CALLS] += 1
+            self.witness.do(op, a)
+        elif op is Op.SET_DERIVATIVES:
+            self.witness.do(op, self.derivatives.calls[a, b][0].instance)
         super().do(op, a, b)
-
-    def keep(self, row: Vector) -> None:
-        super().keep(row)
-        if self.passing.kept:
-            pickle.dump({n: items[-1] for n, items in self.passing.kept.items()}, self._written)
-            self._written.flush()
 
     def tell(self) -> None:
         """Say where the run stands."""
-        self.state[INDEX], self.state[ROW] = self.index, self.row
-        self.state[BESIDE] = NOTHING if self.beside is None else self.beside
+        assert self.witness is not None
+        self.witness.stand(self.index, self.row)
+
+    def record(self) -> None:
+        before = self.row
+        super().record()
+        if self.passing and self.row > before:
+            assert self.witness is not None
+            self.witness.keep({name: items[-1] for name, items in self.passing.kept.items()})
 
 
-def execute(order: Order) -> Outcome:
+def execute(order: Order, witness: Witness) -> Outcome:
     """Run what was ordered."""
-    with ExitStack() as stack:
-        try:
-            told = _Told(order.outline, stack, order.folder)
+    text, messages = "", tuple[str, ...]()
+    try:
+        with ExitStack() as stack:
+            told = _Told(order.outline, stack, witness)
             execution = Execution(order.outline, stack, lambda *_: told)
             try:
                 recording = execution.execute()
+            except StepError as error:
+                recording, text, messages = error.recording, str(error), error.messages
             finally:
                 told.tell()
-        except StepError as error:
-            return _outcome("step", error.recording, str(error), error.messages)
-        except FmuCallError as error:
-            return Outcome("call", str(error), error.messages)
-        except AlgebraicLoopError as error:
-            return Outcome("loop", str(error))
-    return _outcome("ok", recording)
-
-
-def _outcome(
-    kind: str, recording: Recording | None, text: str = "", messages: tuple[str, ...] = ()
-) -> Outcome:
-    """What is said of a recording; its values are in the shared files."""
-    if recording is None:
-        return Outcome(kind, text, messages)
-    how = {key: item for key, item in recording.provenance.items() if key in HOW}
+    except Exception as error:
+        error.__context__ = error.__cause__ = None
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:  # whatever keeps it from going to the other process
+            return Outcome(RuntimeError(traceback.format_exc()))
+        return Outcome(error)
+    how = {key: recording.provenance[key] for key in execution.how()}
+    objects = {name: list(items) for name, items in recording.objects.items()}
     return Outcome(
-        kind, text, messages, recording.bond_energy, how, recording.bond_turnover, recording.notes
-    )
+        None, text, messages, recording.bond_energy, how, objects, tuple(recording.notes),
+        recording.bond_turnover, told.beside,
+    )  # fmt: skip
 
 
-def orphaned() -> None:
+def orphaned(folder: Path) -> None:
     """End this process when the one that ordered it is gone; nobody else would end a hanging FMU.
 
     An FMU's call holds no interpreter lock, so this thread runs beside it.
@@ -102,18 +127,29 @@ def orphaned() -> None:
     parent = os.getppid()
     while os.getppid() == parent:
         time.sleep(WATCH)
+    shutil.rmtree(folder, ignore_errors=True)
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
     os._exit(1)
 
 
-def main(path: Path) -> None:
-    """Read the order, run it, write the outcome."""
-    threading.Thread(target=orphaned, daemon=True).start()
-    order: Order = pickle.loads(path.read_bytes())
-    outcome = execute(order)
+def serve(order: Order, witness: Witness) -> None:
+    """Run the order, write the outcome, end the process."""
+    faulthandler.disable()  # the ordering process says in a sentence what happened
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the ordering process decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=orphaned, args=(order.folder,), daemon=True).start()
+    outcome = execute(order, witness)
     part = order.folder / "outcome.part"
     part.write_bytes(pickle.dumps(outcome))
     part.rename(order.folder / "outcome")
+    if sys.platform != "win32":
+        ct.CDLL(None).fflush(None)  # what FMUs printed
+    os._exit(0)  # what libraries of FMUs do at an ordinary end is of no use here
 
 
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+def main() -> None:
+    """Read the order whose path is the program's argument, and serve it."""
+    order: Order = pickle.loads(Path(sys.argv[1]).read_bytes())
+    outline = order.outline
+    serve(order, Witness(order.folder, outline.capacity, len(outline.observed)))

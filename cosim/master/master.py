@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -34,7 +35,7 @@ from ..system.inputs import Driver, spread
 from ..system.system import System
 from .algorithms import compile_plan, names
 from .execution import Execution
-from .isolation import run_isolated
+from .isolation import can_fork, run_isolated
 from .outline import Outline
 from .plan import Plan
 
@@ -56,6 +57,8 @@ class Master:
         options: of the algorithm.
         isolate: run in a process of its own, where a call to an FMU may take this long [s]: what
             crashes or hangs there ends the run with an error and the recording up to then.
+        guard: the same without a time limit, in a fork of this process where the system has that:
+            quick to start, but for programs without other threads that hold locks.
     """
 
     system: System
@@ -66,6 +69,7 @@ class Master:
     executor: str = "auto"
     options: Mapping[str, Any] = field(default_factory=dict)
     isolate: float | None = None
+    guard: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.system, System):
@@ -118,6 +122,8 @@ class Master:
             if not self.isolate > 0.0:
                 raise ValueRangeError(f"time limit {self.isolate} s is not positive")
             return run_isolated(outline, self.isolate, progress)
+        if self.guard and can_fork():
+            return run_isolated(outline, math.inf, progress, fork=True)
         with ExitStack() as stack:
             return Execution(outline, stack).execute(progress)
 

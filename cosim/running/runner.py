@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -16,7 +17,7 @@ from ..arguments import need_function, need_number, need_table, need_text
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
 from ..errors import StepError, UnknownNameError, ValueRangeError
-from ..files import write_text
+from ..files import claimed, write_text
 from ..installation import builder
 from ..master.algorithms import names
 from ..master.master import Master
@@ -300,6 +301,7 @@ def prepare(
     parameters: Mapping[str, Any] | None = None,
     base: Path | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> Prepared:
     """Choose the FMUs of a scenario and set its values; arguments as of `run_scenario`.
 
@@ -314,7 +316,7 @@ def prepare(
     record, others = _recorded(scenario, system, changed)
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
-        isolate=isolate, options=scenario.options,
+        isolate=isolate, guard=guard, options=scenario.options,
     )  # fmt: skip
     return Prepared(scenario, usual, instances, master, record, _every(scenario), (*notes, *others))
 
@@ -328,6 +330,7 @@ def run_scenario(
     progress: Callable[[float], None] | None = None,
     base: Path | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> RunResult:
     """Run one scenario.
 
@@ -339,14 +342,15 @@ def run_scenario(
         parameters: values on top of the scenario's.
         progress: told now and then which fraction is done.
         base: folder against which .fmu paths among the variants are taken.
-        isolate: as of `Master`.
+        isolate, guard: as of `Master`.
 
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
     """
     prepared = prepare(
-        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate
-    )
+        scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate,
+        guard=guard,
+    )  # fmt: skip
     started = time.perf_counter()
     recording = prepared.run(progress)
     return prepared.conclude(recording, time.perf_counter() - started)
@@ -378,6 +382,7 @@ def run(
     folder: Path | None = None,
     progress: Callable[[str, float], None] | None = None,
     isolate: float | None = None,
+    guard: bool = False,
 ) -> Result:
     """Run a scenario, all its runs or the one that the name ends with.
 
@@ -394,7 +399,7 @@ def run(
         out: folder for recording, plot and result; nothing is written without it.
         folder: where scenarios are looked for; the library's by default.
         progress: told run and fraction now and then.
-        isolate: as of `Master`.
+        isolate, guard: as of `Master`.
 
     Raises:
         CosimError: see `errors`.
@@ -417,19 +422,34 @@ def run(
     need_function("progress of a run", progress)
     if provider is None:
         provider = builder.default_provider()
-    whole, text, wanted, items = find_runs(name, folder, duration, step)
+    found = find_runs(name, folder, duration, step)
+    with contextlib.nullcontext() if out is None else claimed(Path(out)):
+        return _run(
+            found, None if out is None else Path(out), provider, progress,
+            {"algorithm": algorithm, "options": options, "step": step, "duration": duration},
+            {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard},
+        )  # fmt: skip
+
+
+def _run(
+    found: tuple[str, str, str, dict[str, Scenario]],
+    out: Path | None,
+    provider: Provider,
+    progress: Callable[[str, float], None] | None,
+    adjustments: Mapping[str, Any],
+    how: Mapping[str, Any],
+) -> Result:
+    """Make the runs that were found; arguments as of `run`."""
+    whole, text, wanted, items = found
     chosen = list(items)
     results: dict[str, RunResult] = {}
     files: list[Path] = []
     for run_name, item in items.items():
-        item = adjusted(item, algorithm, options, step, duration)
-        place = None if out is None else Path(out) / run_name
+        item = adjusted(item, **adjustments)
+        place = None if out is None else out / run_name
         told = None if progress is None else _told(progress, item.name)
         try:
-            result = run_scenario(
-                item, provider, variants=variants, parameters=parameters, progress=told,
-                base=Path.cwd(), isolate=isolate,
-            )  # fmt: skip
+            result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
             if place is not None and error.recording is not None:
                 path = error.recording.write_parquet(place / "recording.parquet")
@@ -449,10 +469,10 @@ def run(
     if out is not None:
         quantities = final.overview
         if quantities and len(runs) > 1:
-            path = Path(out) / "overview.png"
+            path = out / "overview.png"
             plot_overview(quantities, text or whole, path)
             files.append(path)
-        path = Path(out) / "result.json"
+        path = out / "result.json"
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
     return final

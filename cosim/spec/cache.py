@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import tempfile
@@ -22,3 +23,17 @@ def cache_folder() -> Path:
     if sys.platform == "darwin":
         return home / "Library" / "Caches" / "cosim"
     return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "cosim"
+
+
+def seal(path: Path) -> Path:
+    """The file beside a kept one that holds the SHA-256 of its content."""
+    return path.with_name(f"{path.name}.sha256")
+
+
+def sealed(path: Path, content: bytes) -> bool | None:
+    """Whether content of a kept file is what its seal says; None without one."""
+    try:
+        expected = seal(path).read_text(encoding="ascii")
+    except (OSError, ValueError):
+        return None
+    return hashlib.sha256(content).hexdigest() == expected

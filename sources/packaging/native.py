@@ -18,8 +18,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from cosim.spec.cache import sealed
+
 from ..function import Functions
-from .cache import cache_folder, write_atomically
+from .cache import cache_folder, keep
 from .elimination import eliminate
 from .layout import Entry, owners
 
@@ -228,7 +230,9 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
     key = hashlib.sha256(text.encode()).hexdigest()
     cached = cache_folder("libraries") / f"{key}{target.suffix}"
     if cached.exists():
-        return cached.read_bytes()
+        content_kept = cached.read_bytes()
+        if sealed(cached, content_kept) is not False:  # older ones have no seal
+            return content_kept
     folder = Path(tempfile.mkdtemp(prefix=key[:16], dir=cache_folder("compile")))
     try:
         for name, text in files.items():
@@ -255,5 +259,5 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
         library = output.read_bytes()
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    write_atomically(cached, library)
+    keep(cached, library)
     return library

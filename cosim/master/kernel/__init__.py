@@ -12,6 +12,7 @@ import math
 import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
-from ...reading.libraries import cut_short
+from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
@@ -47,7 +48,7 @@ class _Call(ct.Structure):
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64))
+    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64), ("modes", _I64))
 
 
 class _Instruction(ct.Structure):
@@ -96,7 +97,7 @@ class _Run(ct.Structure):
         ("index", _I64), ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
         ("past", _P), ("n_means", _I64),
         ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
-        ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
+        ("at", _P), ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
         ("failed_derivatives", _I64),
     )  # fmt: skip
 
@@ -129,7 +130,32 @@ UNSETTLED = 1003
 """Status of an algebraic loop that has no solution or does not settle."""
 TOO_LONG, TOO_LARGE = 1004, 1005
 """Statuses of a run that took more than its limit, and of one that ran away."""
+RUN_SIZE = ct.sizeof(_Run)
 _STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a compiled run stands: step, rows, and what is under way (-1: it is not this)."""
+
+    index: int = 0
+    row: int = 0
+    call: int = -1
+    member: int = -1
+    derivatives: int = -1
+
+
+def standing(memory: NDArray[np.uint8]) -> Standing:
+    """Where a run of another process stands, whose structure is in shared memory."""
+    run = _Run.from_buffer(memory.data)
+    begins = [run.calls or 0, run.members or 0, run.derivatives or 0]
+    found = [-1, -1, -1]
+    if run.at:
+        # arrays are apart: the one that begins last before the address holds it
+        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= run.at else -1)
+        size = ct.sizeof((_Call, _Member, _Derivatives)[near])
+        found[near] = (run.at - begins[near]) // size
+    return Standing(int(run.index), int(run.row), *found)
 
 
 def library_name() -> str:
@@ -164,13 +190,22 @@ def _load(path: str) -> Any:
 
 def find() -> Path | None:
     """The library, None if this machine has none."""
-    for folder in (SOURCES[0].parent / "lib", cache_folder()):
-        path = folder / library_name()
-        if path.is_file() and not cut_short(path):
-            return path
-        if path.is_file() and folder == cache_folder():
-            path.unlink()  # so that it is compiled again
-    return None
+    installed, compiled = (
+        folder / library_name() for folder in (SOURCES[0].parent / "lib", cache_folder())
+    )
+    if installed.is_file():
+        return installed
+    try:
+        stat = compiled.stat()
+    except OSError:
+        return None
+    return compiled if _whole(compiled, stat.st_mtime_ns, stat.st_size) else None
+
+
+@lru_cache(maxsize=8)
+def _whole(path: Path, changed: int, size: int) -> bool:
+    """Whether a compiled library is as it was written; loading another one may end the process."""
+    return bool(cache.sealed(path, path.read_bytes()))
 
 
 class Kernel:
@@ -247,6 +282,8 @@ class Kernel:
             n_terms=len(layout.bond_output),
             carried=_carried(plan),
         )  # fmt: skip
+        if bound.witness is not None:
+            self.run = bound.witness.compiled(self.run)
         told = self._derivatives(bound.derivatives)
         instructions = _instructions(plan, plan.step, spans, calls, instances, told)
         self.run.n_instructions = len(instructions)
@@ -276,6 +313,12 @@ class Kernel:
         )
         self.run.n_means = len(plan.means)
         self.run.history, self.run.past = self._array(bound.history), self._array(bound.past)
+        if bound.witness is not None:
+            numbers = {instance: number for number, instance in enumerate(instances)}
+            bound.witness.list_calls(
+                [(int(op), numbers[instance]) for op, instance, _ in self._parts],
+                [(int(Op.SET_DERIVATIVES), numbers[instance]) for instance, _ in self._told],
+            )
 
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
@@ -364,6 +407,8 @@ class Kernel:
         for instance, member in zip(self._instances, self._made[_Member], strict=False):
             if member.warned:
                 instance.warned("a step", math.nan)
+            if member.modes:
+                instance.changed(MODES, "a step")
 
     def failed(self) -> tuple[Op, Instance | None, Any]:
         """What failed: operation, instance and what it was about.

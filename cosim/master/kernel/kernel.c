@@ -13,6 +13,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
+#include <fenv.h>
 #include <float.h>
 
 #include "run.h"
@@ -59,8 +60,9 @@ static inline int access_call(const Call *c) {
 }
 
 /* Calls whose buffers are part of the run's values; the first that failed, or null. */
-static Call *call2(Call *c, const Call *end, int *status) {
+static Call *call2(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
+    run->at = c;
     *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
     if (FAILED(*status)) return c;
     c->warned |= *status;
@@ -68,8 +70,9 @@ static Call *call2(Call *c, const Call *end, int *status) {
   return 0;
 }
 
-static Call *call3(Call *c, const Call *end, int *status) {
+static Call *call3(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
+    run->at = c;
     *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
     if (FAILED(*status)) return c;
     c->warned |= *status;
@@ -77,9 +80,11 @@ static Call *call3(Call *c, const Call *end, int *status) {
   return 0;
 }
 
-static Call *call_converted(Call *c, const Call *end, double *values, int set, int *status) {
+static Call *call_converted(Run *run, Call *c, const Call *end, int set, int *status) {
+  double *const values = run->values;
   for (; c < end; c++) {
     if (set && c->slots && (*status = convert(c, values, 1))) return c;
+    run->at = c;
     *status = access_call(c);
     if (FAILED(*status)) return c;
     c->warned |= *status;
@@ -95,19 +100,38 @@ static double bounded(const Run *run, double t, double h) {
   return h;
 }
 
-static Member *step2(Member *m, const Member *end, double t, double h, int *status) {
+/* Rounding and treatment of tiny numbers, which a step must leave as they are for the other FMUs. */
+#if defined(__x86_64__)
+#define MODES() ((unsigned)__builtin_ia32_stmxcsr() & ~0x3fu) /* without the flags of exceptions */
+static void undo_modes(Member *m, unsigned wanted) {
+  if (fegetround() != FE_TONEAREST) fesetround(FE_TONEAREST);
+  __builtin_ia32_ldmxcsr(wanted);
+  m->modes = 1;
+}
+#else
+#define MODES() 0u
+static void undo_modes(Member *m, unsigned wanted) {}
+#endif
+
+static Member *step2(Run *run, Member *m, const Member *end, double t, double h, int *status) {
+  const unsigned modes = MODES();
   for (; m < end; m++) {
+    run->at = m;
     *status = ((Step2)m->step)(m->component, t, h, 1);
+    if (MODES() != modes) undo_modes(m, modes);
     if (FAILED(*status)) return m;
     m->warned |= *status;
   }
   return 0;
 }
 
-static Member *step3(Member *m, const Member *end, double t, double h, int *status) {
+static Member *step3(Run *run, Member *m, const Member *end, double t, double h, int *status) {
   bool event = false, stop = false, early = false;
+  const unsigned modes = MODES();
   for (; m < end; m++) {
+    run->at = m;
     *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
+    if (MODES() != modes) undo_modes(m, modes);
     if (!FAILED(*status) && stop) *status = TERMINATED;
     if (FAILED(*status)) return m;
     m->warned |= *status;
@@ -207,18 +231,19 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   }
 }
 
-static const Derivatives *set_derivatives(const Derivatives *r, const Derivatives *end, int *status) {
+static const Derivatives *set_derivatives(Run *run, const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
+    run->at = r;
     *status = ((SetDerivatives2)r->function)(r->component, r->references, r->n, r->orders, r->values);
     if (FAILED(*status)) return r;
   }
   return 0;
 }
 
-static Member *substep(const Run *run, Member *m, int64_t code, int *status) {
+static Member *substep(Run *run, Member *m, int64_t code, int *status) {
   const double parts = (double)(code / PARTS / 4), part = (double)(code / 4 % PARTS);
   const double t = run->times[run->index] + part * run->step / parts, h = bounded(run, t, run->step / parts);
-  return code % 4 == 2 ? step2(m, m + 1, t, h, status) : step3(m, m + 1, t, h, status);
+  return code % 4 == 2 ? step2(run, m, m + 1, t, h, status) : step3(run, m, m + 1, t, h, status);
 }
 
 #include "newton.c"
@@ -247,20 +272,20 @@ static int execute(Run *run, int64_t first, int64_t last) {
       copy_scaled(run->copies + in->first, run->copies + in->last, run->values);
       break;
     case CALL2:
-      call = call2(calls + in->first, calls + in->last, &status);
+      call = call2(run, calls + in->first, calls + in->last, &status);
       break;
     case CALL3:
-      call = call3(calls + in->first, calls + in->last, &status);
+      call = call3(run, calls + in->first, calls + in->last, &status);
       break;
     case CONVERT_SET:
     case CONVERT_GET:
-      call = call_converted(calls + in->first, calls + in->last, run->values, in->operation == CONVERT_SET, &status);
+      call = call_converted(run, calls + in->first, calls + in->last, in->operation == CONVERT_SET, &status);
       break;
     case STEP2:
-      member = step2(members + in->first, members + in->last, now, size, &status);
+      member = step2(run, members + in->first, members + in->last, now, size, &status);
       break;
     case STEP3:
-      member = step3(members + in->first, members + in->last, now, size, &status);
+      member = step3(run, members + in->first, members + in->last, now, size, &status);
       break;
     case ENERGY:
       if (in->first == 1) add_energy(run, 1);
@@ -289,7 +314,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
       extrapolate(run, in->first, in->last);
       break;
     case SET_DERIVATIVES:
-      refused = set_derivatives(run->derivatives + in->first, run->derivatives + in->last, &status);
+      refused = set_derivatives(run, run->derivatives + in->first, run->derivatives + in->last, &status);
       break;
     case SUBSTEP:
       member = substep(run, members + in->first, in->last, &status);
@@ -307,11 +332,11 @@ static int execute(Run *run, int64_t first, int64_t last) {
 
 /* Communication steps from run->index up to `last`; 0 or the status that ended it. */
 EXPORT int cosim_run(Run *run, int64_t last) {
-  for (; run->index < last; run->index++) {
-    const int status = execute(run, 0, run->n_instructions);
-    if (status) return status;
-  }
-  return 0;
+  int status = 0;
+  for (; run->index < last; run->index++)
+    if ((status = execute(run, 0, run->n_instructions))) break;
+  run->at = 0;
+  return status;
 }
 
 /* Processor time of this thread [s]. */

@@ -31,6 +31,7 @@ typedef struct {
   void *component, *step;
   double reached; /* the time at which an FMU of FMI 3 says that it stands */
   int64_t warned;
+  int64_t modes;  /* whether a step has left the rounding of numbers changed; it was undone */
 } Member;
 
 /* What one operation does: with calls, members, copies from first to before last. */
@@ -102,6 +103,8 @@ typedef struct {
   int64_t n_means;
   double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */
   const Derivatives *derivatives;
+  const void *volatile at; /* the call under way, member or derivatives; null between calls: who waits for this
+                              process can say which FMU it was in when it ended */
   int64_t failed_loop, failed_call, failed_member, failed_derivatives; /* -1: none; none of them: a recorded value is not finite */
 } Run;
 
