@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.data.recording import Recording
+from cosim.data.recording import read_recording
 from cosim.errors import InputError
 from cosim.files import claimed
 from tests.faults import matrix
@@ -55,7 +55,7 @@ def test_a_command_survives_its_fmus(tmp_path: Path, fault: str, text: str) -> N
     _, errors = process.communicate(timeout=120.0)  # a second on an idle machine
     assert process.returncode == 1
     assert f"bad_{fault} (" in errors and text in errors and "Traceback" not in errors
-    recording = Recording.read_parquet(tmp_path / "out" / "recording.parquet")
+    recording = read_recording(tmp_path / "out" / "recording.parquet")
     assert recording.error in " ".join(errors.split()) and recording.time[-1] >= 0.2
     assert not list((tmp_path / "temporary").iterdir())
 
@@ -97,9 +97,9 @@ def test_what_an_fmu_changed_is_said(tmp_path: Path) -> None:
 
 def test_a_folder_in_use_is_refused(tmp_path: Path) -> None:
     with claimed(tmp_path / "out"):
-        with pytest.raises(InputError, match=r"out: another run writes its results there; wait"):
-            with claimed(tmp_path / "out"):
-                pass
+        in_use = pytest.raises(InputError, match=r"out: another run writes its results there; wait")
+        with in_use, claimed(tmp_path / "out"):
+            pass
         with claimed(tmp_path / "other"):
             pass
     with claimed(tmp_path / "out"):
