@@ -46,14 +46,26 @@ def make_folder(path: Path) -> Path:
 
 @contextlib.contextmanager
 def claimed(folder: Path) -> Iterator[None]:
-    """Make a folder for results and keep others out of it in the block.
+    """Make a folder for results and keep others out of it in the block; gone if it stays empty.
 
     Raises:
         InputError: it cannot be made or written, or another program has claimed it.
     """
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
     make_folder(folder)
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{folder}: cannot be written; choose another folder with --out")
+    try:
+        if not os.access(folder, os.W_OK):
+            raise InputError(f"{folder}: cannot be written; choose another folder with --out")
+        with _locked(folder):
+            yield
+    finally:
+        with contextlib.suppress(OSError):  # those with results stay
+            for path in new:
+                path.rmdir()
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return

@@ -32,10 +32,11 @@ WATCH = 0.2
 
 @dataclass(frozen=True)
 class Order:
-    """What the other process shall run, and the folder that it shares with this one."""
+    """What the other process shall run, the folder that it shares with this one, and this one."""
 
     outline: Outline
     folder: Path
+    owner: int = field(default_factory=os.getpid)
 
 
 @dataclass(frozen=True)
@@ -119,15 +120,14 @@ def execute(order: Order, witness: Witness) -> Outcome:
     )  # fmt: skip
 
 
-def orphaned(folder: Path) -> None:
+def orphaned(order: Order) -> None:
     """End this process when the one that ordered it is gone; nobody else would end a hanging FMU.
 
     An FMU's call holds no interpreter lock, so this thread runs beside it.
     """
-    parent = os.getppid()
-    while os.getppid() == parent:
+    while os.getppid() == order.owner:
         time.sleep(WATCH)
-    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(order.folder, ignore_errors=True)
     if hasattr(os, "killpg"):
         os.killpg(0, signal.SIGKILL)
     os._exit(1)
@@ -138,7 +138,7 @@ def serve(order: Order, witness: Witness) -> None:
     faulthandler.disable()  # the ordering process says in a sentence what happened
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the ordering process decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=orphaned, args=(order.folder,), daemon=True).start()
+    threading.Thread(target=orphaned, args=(order,), daemon=True).start()
     outcome = execute(order, witness)
     part = order.folder / "outcome.part"
     part.write_bytes(pickle.dumps(outcome))

@@ -61,7 +61,7 @@ static int act(Model *m, const char *phase) {
   if (!strcmp(k, "prints")) { puts("printed by the FMU"); fflush(stdout); }
   if (!strcmp(k, "logs")) for (int i = 0; i < 20000; i++) m->host->logger(m->host->environment, m->name, 3, "all", "line %d", i);
   if (!strcmp(k, "long")) { char *s = malloc(100001); memset(s, 'a', 100000); s[100000] = 0; m->host->logger(m->host->environment, m->name, 3, "all", s); free(s); }
-  if (!strcmp(k, "format")) m->host->logger(m->host->environment, m->name, 3, "all", "%s %n %d", "text");
+  if (!strcmp(k, "format")) m->host->logger(m->host->environment, m->name, 3, "all", "%y %d %s", 1, "text");
   if (!strcmp(k, "null")) m->host->logger(m->host->environment, 0, 3, 0, 0);
   if (!strcmp(k, "bytes")) { m->host->logger(m->host->environment, m->name, 3, "all", "\xff\xfe"); return 3; }
   if (!strcmp(k, "thread")) { unsigned long t; pthread_create(&t, 0, stay, 0); }
