@@ -133,6 +133,8 @@ class Block:
         """Fetch the values from the FMU."""
         for part in self.parts:
             self._instance.get_part(part)
+            if part.buffer is self.values:
+                continue
             if part.type in OBJECTS:
                 found = _objects(part)
                 self.objects[part.slots] = found
@@ -143,7 +145,7 @@ class Block:
                     )
                 if part.type in ("Int64", "UInt64"):
                     self.values[part.slots] = [float(item) for item in found]
-            elif part.buffer is not self.values:
+            else:
                 self.values[part.slots] = part.buffer
         return self.values
 
@@ -164,9 +166,11 @@ class Block:
         if values is not None:
             self._take(values)
         for part in self.parts:
-            if part.type in OBJECTS:
+            if part.buffer is self.values:
+                pass
+            elif part.type in OBJECTS:
                 self._fill(part)
-            elif part.buffer is not self.values:
+            else:
                 numbers = self.values[part.slots]
                 if not fitting(part.type, numbers).all():
                     raise self.unfit(part)

@@ -46,6 +46,7 @@ ENDED = 1000
 """Far from FMI's statuses: a step of FMI 3 that asked to end the simulation."""
 SAME = 1e-9
 """Part of a step by which the time that an FMU has reached may differ from the end of the step."""
+WARNING = STATUS.index("warning")
 WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
 """How messages begin that are more than information."""
 
@@ -166,9 +167,9 @@ class Instance:
             raise FmuCallError(f"{self.label}: the FMU has no function {name}")
         announce(self.name, what)
         status = self._functions[name](self.address, *arguments)
-        if status not in (0, 1):
-            raise self.failure(what, status)
         if status:
+            if status != WARNING:
+                raise self.failure(what, status)
             self.warned(what)
 
     def warned(self, what: str, time: float | None = None) -> None:
@@ -208,9 +209,9 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.GET[part.type]](self.address, *part.arguments)
-        if status not in (0, 1):
-            raise self.failed_access(True, part, status)
         if status:
+            if status != WARNING:
+                raise self.failed_access(True, part, status)
             self.warned("getting values")
 
     def set_part(self, part: Part) -> None:
@@ -218,9 +219,9 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         status = self._functions[self.binding.SET[part.type]](self.address, *part.arguments)
-        if status not in (0, 1):
-            raise self.failed_access(False, part, status)
         if status:
+            if status != WARNING:
+                raise self.failed_access(False, part, status)
             self.warned("setting values")
 
     def set_input_derivatives(
@@ -231,7 +232,7 @@ class Instance:
             self.address, references.ctypes.data, references.size, orders.ctypes.data,
             values.ctypes.data,
         )  # fmt: skip
-        if status not in (0, 1):
+        if status not in (0, WARNING):
             raise self.failed_derivatives(references, status)
 
     def failed_derivatives(self, references: NDArray[np.uint32], status: int) -> FmuCallError:
@@ -345,9 +346,9 @@ class Instance:
         if modes.get() != before:
             modes.put(before)
             self.changed(MODES, "a step")
-        if status not in (0, 1) or self.binding.stopped():
-            raise self.failed_step(size, status, self.binding.reached())
-        if status:
+        if status or self.binding.stopped():
+            if status != WARNING or self.binding.stopped():
+                raise self.failed_step(size, status, self.binding.reached())
             self.warned("a step")
         self.time = time + size
 
@@ -363,7 +364,7 @@ class Instance:
             status: what it returned.
             reached: the time at which the FMU of FMI 3 says that it stands [s].
         """
-        asked, last = status in (0, 1, ENDED), reached
+        asked, last = status in (0, WARNING, ENDED), reached
         if status == STATUS.index("discard"):
             asked, last = self.binding.terminated(self._functions, self.address)
         if not asked:

@@ -41,6 +41,7 @@ class Interpreter:
         instances, outputs, inputs: the FMUs and the blocks through which they exchange values.
         index: communication point at which the run stands.
         rows, row: recorded values, and how many rows there are.
+        passes: whether values travel as objects.
         beside: communication point of the last row if it is none of every n-th, else None.
         bond_energy, bond_turnover: energy that each bond invented, and that went over it [J].
         newtons: one per algebraic loop.
@@ -79,6 +80,7 @@ class Interpreter:
         for block, owner in zip(self.inputs, self.system.members, strict=True):
             block.origins = [origins.get(f"{owner}.{name}", "") for name in block.names]
         self.passing = ObjectPassing(self.layout, outline.observed, outline.objects)
+        self.passes = bool(self.passing)
         self.rows = np.empty((outline.capacity, len(outline.observed)))
         self.row = self.index = 0
         self.beside: int | None = None
@@ -138,9 +140,10 @@ class Interpreter:
 
     def size(self, time: float, step: float) -> float:
         """A step that does not miss the end of the run by rounding, and never goes beyond."""
-        if time + step > self.instants[-1] - ROUNDING * step:
-            step = self.instants[-1] - time
-            while time + step > self.instants[-1]:
+        end = self.instants[-1]
+        if time + step > end - ROUNDING * step:
+            step = end - time
+            while time + step > end:
                 step = math.nextafter(step, 0.0)
         return step
 
@@ -155,18 +158,20 @@ class Interpreter:
             case Op.GET:
                 self.outputs[a].get()
             case Op.STEP:
-                time = self.instants[self.index]
-                self.instances[a].step(time, self.size(time, self.step))
+                time, step = self.instants[self.index], self.step
+                if self.index >= self.times.size - 2:
+                    step = self.size(time, step)
+                self.instances[a].step(time, step)
             case Op.COPY:
                 values[layout.copy_target[a:b]] = (
                     values[layout.copy_source[a:b]] * layout.copy_gain[a:b]
                     + layout.copy_offset[a:b]
                 )
-                if self.passing:
+                if self.passes:
                     self.passing.copy(self.values, self.objects, a, b)
             case Op.EXTERNAL:
                 values[layout.external] = self.external[self.index]
-                if self.passing:
+                if self.passes:
                     self.passing.drive(self.objects, self.index)
             case Op.RECORD:
                 self.record()
@@ -233,7 +238,7 @@ class Interpreter:
             raise FmuCallError(f"{name} became {value} without an error of its FMU")
         self.rows[self.row] = row
         self.row += 1
-        if self.passing:
+        if self.passes:
             self.passing.keep(self.objects)
 
     def account(self, held: Vector) -> None:

@@ -22,6 +22,7 @@ from tests.cosim_fmus import slave
 from tests.fmus import fmu
 from tests.tiny_fmus import V, tiny
 
+ISOLATED = pytest.param("isolated", marks=pytest.mark.slow)
 CLOCK = [V("y", "Float64", "output"), V("u", "Float64", "input", "0")]
 TIME = "v->r[0][0] = v->t;"
 """Its output is the time that it has reached."""
@@ -83,7 +84,7 @@ def scenario(folder: Path, path: Path, text: str = "") -> Path:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("executor", ["python", "auto", "isolated"])
+@pytest.mark.parametrize("executor", ["python", "auto", ISOLATED])
 @pytest.mark.parametrize("every", [1, 3])
 def test_an_end_that_an_fmu_asks_for_is_one(
     every: int, executor: str, fmi: int, tmp_path: Path
@@ -145,7 +146,7 @@ def test_the_command_line_takes_a_requested_end_as_an_end(
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("executor", ["python", "auto", "isolated"])
+@pytest.mark.parametrize("executor", ["python", "auto", ISOLATED])
 @pytest.mark.parametrize("status", [0, 1])
 def test_warnings_are_notes(status: int, executor: str, fmi: int, tmp_path: Path) -> None:
     step = f'if (t > 0.15) {{ say(m, 1, "hot"); v->t = t + h; return {status}; }}'

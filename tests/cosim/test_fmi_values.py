@@ -107,7 +107,7 @@ def test_the_ends_of_every_integer_type(type_: str, tmp_path: Path) -> None:
         short(system, inputs={"a.u": over})
 
 
-@pytest.mark.parametrize("isolate", [None, 30.0])
+@pytest.mark.parametrize("isolate", [None, pytest.param(30.0, marks=pytest.mark.slow)])
 def test_integers_of_64_bits_stay_exact_from_file_to_file(
     isolate: float | None, tmp_path: Path
 ) -> None:
@@ -184,7 +184,7 @@ def test_truth_values(fmi: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("isolate", [None, 30.0])
+@pytest.mark.parametrize("isolate", [None, pytest.param(30.0, marks=pytest.mark.slow)])
 def test_texts_are_set_driven_connected_and_recorded(
     isolate: float | None, fmi: int, tmp_path: Path
 ) -> None:
