@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,21 @@ from .objects import ObjectPassing
 from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
 
-if TYPE_CHECKING:
-    from .witness import Witness
-
 Vector = NDArray[np.float64]
 ROUNDING = 1e-9
 """Part of a step by which its end may miss the end of the run: sums of steps round by far less."""
+
+
+class Shared(Protocol):
+    """Memory that the process of a run shares with the one that waits for it: see `witness`."""
+
+    def compiled(self, run: Any) -> Any:
+        """The compiled executor's structure with the same content, in shared memory."""
+
+    def list_calls(
+        self, calls: Sequence[tuple[int, int]], derivatives: Sequence[tuple[int, int]]
+    ) -> None:
+        """Operation and instance of each call of the compiled executor."""
 
 
 class Interpreter:
@@ -50,7 +59,7 @@ class Interpreter:
         bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
 
-    witness: Witness | None = None
+    witness: Shared | None = None
     """What another process learns of the run."""
 
     def __init__(self, outline: Outline, stack: ExitStack) -> None:

@@ -65,31 +65,28 @@ class _Told(Interpreter):
     """An interpreter that says what it is about to do."""
 
     def __init__(self, outline: Outline, stack: ExitStack, witness: Witness) -> None:
-        self.witness = witness
+        self.witness = self.shared = witness
         calls.listen(witness.say)
         super().__init__(outline, stack)
         self.rows = witness.rows
 
     def do(self, op: Op, a: int, b: int) -> None:
-        assert self.witness is not None
         self.tell()
         if op in (Op.SET, Op.GET, Op.STEP, Op.SUBSTEP):
-            self.witness.do(op, a)
+            self.shared.do(op, a)
         elif op is Op.SET_DERIVATIVES:
-            self.witness.do(op, self.derivatives.calls[a, b][0].instance)
+            self.shared.do(op, self.derivatives.calls[a, b][0].instance)
         super().do(op, a, b)
 
     def tell(self) -> None:
         """Say where the run stands."""
-        assert self.witness is not None
-        self.witness.stand(self.index, self.row)
+        self.shared.stand(self.index, self.row)
 
     def record(self) -> None:
         before = self.row
         super().record()
         if self.passing and self.row > before:
-            assert self.witness is not None
-            self.witness.keep({name: items[-1] for name, items in self.passing.kept.items()})
+            self.shared.keep({name: items[-1] for name, items in self.passing.kept.items()})
 
 
 def execute(order: Order, witness: Witness) -> Outcome:
