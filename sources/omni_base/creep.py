@@ -2,13 +2,14 @@
 
     T X'' + C X' = Gamma + A^T f,   X = (x, y, theta, beta, phi)
     s_x = J1_i R xi' + r phi',   s_y = C1_i R xi' + e beta'   (slip along and across the heading)
-    p = -N (c_x s_x, c_y s_y)/V,   V = sqrt((r phi')^2 + v_0^2),   f = p tanh(|p|/(mu N))/(|p|/(mu N))
-    sum N = W,   sum N C_i = W r_G   (level floor, no load transfer by acceleration)
-    axles: -b_s beta',   -b_d phi' - f_r N r tanh(phi'/w_0)
+    p = -N (c_x s_x, c_y s_y)/V,   V = sqrt((r phi')^2 + v_0^2)
+    f = p tanh(a)/a,   a = |p|/(mu N)
+    sum N_i = W,   sum N_i C_i = W r_G   (level floor, no load transfer by acceleration)
+    axles: -b_s beta',   -b_d phi' - f_r N r tanh(phi'/w_r)
 
-T has the rotors of the steering motors, J_beta, on beta'' alone; what the rolling motors' rotors add
-at the wheels belongs to I_phi. r_G is the mass centre of platform and wheel sets, which moves with
-the steering angles, C_i are the contact points.
+T has the rotors of the steering motors, J_beta, on beta'' alone; what the rotors of the rolling
+motors add at the wheels belongs to I_phi. r_G is the mass centre of platform and wheel sets, which
+moves with the steering angles, C_i are the contact points.
 
 Not modelled: load transfer by acceleration, the steering rotors' share in the yaw momentum, tyre
 relaxation, stiction.
@@ -30,7 +31,6 @@ from ..model import SX, Model
 from ..quantity import Quantity
 from . import platform as base
 from .rigid_body import (
-    Geometry,
     inertia_blocks,
     kinetic_energy,
     lateral_rows,
@@ -54,6 +54,7 @@ W_R = Quantity(
 C_X = Quantity("c_x", "1", "force over load and creepage along the heading", 12.0, minimum=1e-3)
 C_Y = Quantity("c_y", "1", "force over load and creepage across the heading", 9.0, minimum=1e-3)
 MU = Quantity("mu", "1", "friction coefficient on the floor", start=0.6, minimum=1e-3)
+NORMAL = Quantity("normal", "N", "loads of the wheels", size=3, nominal=800.0)
 V_0 = Quantity("v_0", "m/s", "rolling speed that counts as standstill", start=0.05, minimum=1e-5)
 
 
@@ -74,7 +75,7 @@ def equations(m: Model) -> None:
     masses = body.masses
     contact_x = g.x - g.e * ca.cos(motion.beta)
     contact_y = g.y - g.e * ca.sin(motion.beta)
-    normal = loads(m, g, motion, body, p.gravity, contact_x, contact_y)
+    normal = m.output(NORMAL, loads(motion, body, contact_x, contact_y))
 
     j1, c1 = rolling_rows(g, motion.beta), lateral_rows(g, motion.beta)
     along = m.output(SLIP_ALONG, j1 @ motion.u + g.r * phi_rate)
@@ -136,15 +137,7 @@ def each(m: Model, name: str, kind: str, unit: str = "", **signals: SX) -> SX:
     return together.effort + ca.vertcat(*single)
 
 
-def loads(
-    m: Model,
-    g: Geometry,
-    motion: base.Motion,
-    body: base.Bodies,
-    gravity: SX,
-    x: SX,
-    y: SX,
-) -> SX:
+def loads(motion: base.Motion, body: base.Bodies, x: SX, y: SX) -> SX:
     """Normal forces from the equilibrium of the whole weight on the contact points (x, y).
 
     Each wheel carries the share of the triangle that the mass centre spans with the other two.

@@ -6,13 +6,15 @@ With v_i the set velocity of steering axis A_i, t_i and n_i along and across whe
               I += Ki_d e T         unless |v| >= i_d_max
               i_set = sat(Kp_s (n . v/e_c - w_set - beta'), i_s_max)        (steering)
               i_mean = i_set + (i - i_set) (1 - exp(-T/T_i)) T_i/T
-    between:  T_i i' = i_set - i,   tau_phi = -N_d eta_d K_d i_mean,   tau_beta = N_s eta_s K_s i_mean
+    between:  T_i i' = i_set - i
+              tau_phi = -N_d eta_d K_d i_mean,   tau_beta = N_s eta_s K_s i_mean
 
-i_mean is the mean of the coming period, known when it begins, so that a master which steps the drive
-before the base, period by period, gives it the impulse of that period. The rotors turn with the
-axles, so their inertia belongs to the base.
+i_mean is the mean of the coming period, known when it begins, so that a master which steps the
+drive before the base, period by period, gives it the impulse of that period. The rotors turn with
+the axles, so their inertia belongs to the base. The factors eta act in both directions of power
+flow, as on the sheet.
 
-Not modelled: voltage limit, elasticity and play of the gears, resolution of the speeds in the loops.
+Not modelled: voltage limit, elasticity and play of the gears, resolution of the loops' speeds.
 
 Source: rig sheet omni_bench; Åström and Wittenmark, Computer-Controlled Systems, 1997, ch. 8.
 """
