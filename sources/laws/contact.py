@@ -60,6 +60,17 @@ def creep(s_x: SX, s_y: SX, c_x: SX, c_y: SX, limit: SX) -> tuple[SX, SX]:
     return scale * p_x, scale * p_y
 
 
+def creepage(s_x: SX, s_y: SX, speed: SX, c_x: SX, c_y: SX, load: SX, limit: SX) -> tuple[SX, SX]:
+    """Friction in proportion to load and creepage, that approaches a limit.
+
+    p_i = -c_i load s_i/speed,   f_i = p_i tanh(|p|/limit)/(|p|/limit)
+    """
+    p_x, p_y = -c_x * load * s_x / speed, -c_y * load * s_y / speed
+    ratio = ca.sqrt(p_x * p_x + p_y * p_y + SMALL) / ca.fmax(limit, FORCE_FLOOR)
+    scale = ca.tanh(ratio) / ratio
+    return scale * p_x, scale * p_y
+
+
 def creep_coefficient(c: SX, rest: SX, v: SX, v_creep: SX) -> SX:
     """Creep coefficient at the rolling speed v, `c (rest + (1 - rest) v^2/(v^2 + v_creep^2))`."""
     square = v * v

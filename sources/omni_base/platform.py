@@ -7,6 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from .. import omni_base as qs
+from ..declarations import Symbols
 from ..model import SX, Model
 from ..quantity import Quantity
 from .rigid_body import Geometry, Masses, rotation
@@ -103,19 +104,23 @@ class Forces(NamedTuple):
     normal: SX
 
 
-def forces(
-    m: Model, g: Geometry, motion: Motion, beta_rate: SX, phi_rate: SX
-) -> tuple[Masses, Forces]:
-    """Declare inputs and masses, open the balances, and add up what acts on the base.
+class Bodies(NamedTuple):
+    """Masses with what effects add, first moment of all [kg.m], weight [N], wrench of effects."""
 
-    Axle friction is f_s tanh(q'/w_0) + f_v q' on all six axles. Each wheel carries a third of the
-    weight.
+    masses: Masses
+    moment: SX
+    weight: SX
+    wrench: SX
+
+
+def bodies(m: Model, g: Geometry, motion: Motion, p: Symbols) -> Bodies:
+    """Open the balances of the platform and gather its masses.
+
+    The first moment is taken with the wheel sets at their steering axes.
     """
-    u = m.inputs(qs.TAU_BETA, qs.TAU_PHI)
-    p = m.parameters(M_P, M_W, D, I_P, I_S, I_PHI, X_G, Y_G, GRAVITY, F_S, F_V, W_0)
-
     load = m.balance("load", "position", value=ca.vertcat(p.x_G, p.y_G, 0))
     centre = ca.vertcat(p.x_G, p.y_G, 0) + load.effort
+    first_moment = p.m_p * centre + p.m_w * ca.vertcat(ca.sum1(g.x), ca.sum1(g.y), 0)
     body = m.balance(
         "body",
         "body",
@@ -125,13 +130,8 @@ def forces(
         position=ca.vertcat(motion.x, motion.y, 0),
         rotation=motion.to_platform.T,
         mass=p.m_p + 3 * p.m_w,
-        first_moment=p.m_p * centre + p.m_w * ca.vertcat(ca.sum1(g.x), ca.sum1(g.y), 0),
+        first_moment=first_moment,
     )
-    steering = m.balance(
-        "steering", "rotation", velocity=beta_rate, angle=motion.beta, load=u.tau_beta
-    )
-    rolling = m.balance("rolling", "rotation", velocity=phi_rate, angle=motion.phi, load=u.tau_phi)
-
     masses = Masses(
         p.m_p + body.mass,
         p.m_p * centre[0] + body.first_moment[0],
@@ -142,18 +142,48 @@ def forces(
         p.I_s,
         p.I_phi,
     )
-    normal = ca.repmat(((masses.mass + 3 * p.m_w) * p.gravity - body.effort[2]) / 3, 3)
-    speed = ca.sqrt((g.r * phi_rate) ** 2 + ROLLING_FLOOR**2)
-    pivot = m.balance("pivot", "pivot", spin=beta_rate + motion.u[2], rolling=speed, normal=normal)
+    weight = (masses.mass + 3 * p.m_w) * p.gravity - body.effort[2]
+    return Bodies(masses, first_moment[:2] + body.first_moment[:2], weight, body.effort)
+
+
+def forces(
+    m: Model, g: Geometry, motion: Motion, beta_rate: SX, phi_rate: SX
+) -> tuple[Masses, Forces]:
+    """Declare inputs and masses, open the balances, and add up what acts on the base.
+
+    Axle friction is f_s tanh(q'/w_0) + f_v q' on all six axles. Each wheel carries a third of the
+    weight.
+    """
+    u = m.inputs(qs.TAU_BETA, qs.TAU_PHI)
+    p = m.parameters(M_P, M_W, D, I_P, I_S, I_PHI, X_G, Y_G, GRAVITY, F_S, F_V, W_0)
+    body = bodies(m, g, motion, p)
+    steering = m.balance(
+        "steering", "rotation", velocity=beta_rate, angle=motion.beta, load=u.tau_beta
+    )
+    rolling = m.balance("rolling", "rotation", velocity=phi_rate, angle=motion.phi, load=u.tau_phi)
+    normal = ca.repmat(body.weight / 3, 3)
+    pivot = pivot_torques(m, g.r, motion, beta_rate, phi_rate, normal)
 
     friction_beta = p.f_s * ca.tanh(beta_rate / p.w_0) + p.f_v * beta_rate
     friction_phi = p.f_s * ca.tanh(phi_rate / p.w_0) + p.f_v * phi_rate
     m.loss("axles", ca.dot(friction_beta, beta_rate) + ca.dot(friction_phi, phi_rate))
     m.port(qs.STEERING, u.tau_beta, beta_rate)
     m.port(qs.ROLLING, u.tau_phi, phi_rate)
-    on_pose = ca.vertcat(body.effort[0], body.effort[1], body.effort[5] + ca.sum1(pivot.effort))
-    on_beta = u.tau_beta - friction_beta + steering.effort + pivot.effort
-    return masses, Forces(on_pose, on_beta, u.tau_phi - friction_phi + rolling.effort, normal)
+    on_beta = u.tau_beta - friction_beta + steering.effort + pivot
+    on_phi = u.tau_phi - friction_phi + rolling.effort
+    return body.masses, Forces(on_pose(body.wrench, pivot), on_beta, on_phi, normal)
+
+
+def pivot_torques(m: Model, r: SX, motion: Motion, beta_rate: SX, phi_rate: SX, normal: SX) -> SX:
+    """Open the balance of the contact patches' torques about the vertical."""
+    speed = ca.sqrt((r * phi_rate) ** 2 + ROLLING_FLOOR**2)
+    spin = beta_rate + motion.u[2]
+    return m.balance("pivot", "pivot", spin=spin, rolling=speed, normal=normal).effort
+
+
+def on_pose(wrench: SX, pivot: SX) -> SX:
+    """Generalised forces of effects on (x, y, theta), platform axes."""
+    return ca.vertcat(wrench[0], wrench[1], wrench[5] + ca.sum1(pivot))
 
 
 def finish(m: Model, motion: Motion, acceleration: SX, beta_rate: SX, phi_rate: SX) -> None:

@@ -17,7 +17,7 @@ from tests.attachments import (
 
 pytestmark = pytest.mark.slow
 
-PLAIN = ["omni_base/kinematic", "omni_base/dynamic", "omni_base/slip"]
+PLAIN = ["omni_base/kinematic", "omni_base/dynamic", "omni_base/slip", "omni_base/creep"]
 CASES = [name for plain in PLAIN for name in attachable(plain)]
 
 

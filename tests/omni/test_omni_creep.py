@@ -1,0 +1,147 @@
+"""The rig omni_bench tick by tick: drives before a base on creeping wheels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from sources.function import Oracle
+from sources.variant import build_model
+from tests.omni import lagrange as la
+from tests.support import Stepper
+
+TICK, SUBSTEPS = 1e-3, 20  # the rig's mechanics advance in steps of 50 us
+J_D, J_S = 20**2 * 2e-4, 40**2 * 6e-5
+MU, C_X, C_Y, F_R, B_D, B_S = 0.6, 12.0, 9.0, 0.012, 0.6, 0.8
+AXES = np.array(la.AXES)
+
+
+def named(**vectors: Iterable[float] | float) -> dict[str, float]:
+    return {
+        key if np.ndim(value) == 0 else f"{key}[{i + 1}]": float(item)
+        for key, value in vectors.items()
+        for i, item in enumerate(np.atleast_1d(value))
+    }
+
+
+def vector(values: dict[str, float], name: str) -> np.ndarray:
+    return np.array([values[f"{name}[{k}]"] for k in (1, 2, 3)])
+
+
+def loads(beta: np.ndarray) -> np.ndarray:
+    """Equilibrium of forces and moments, with the masses one by one."""
+    t = np.stack([np.cos(beta), np.sin(beta)], axis=1)
+    centres, contacts = AXES - la.D * t, AXES - la.E * t
+    weights = 9.81 * np.array([la.M_P, *[la.M_W] * 3])
+    places = np.vstack([[la.X_G, 0.0], centres])
+    matrix = np.vstack([np.ones(3), contacts.T])
+    return np.linalg.solve(matrix, np.append(weights.sum(), weights @ places))
+
+
+def test_loads_are_those_of_statics() -> None:
+    base = Oracle(build_model("omni_base/creep"))
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        beta, theta = rng.uniform(-4, 4, 3), float(rng.uniform(-4, 4))
+        seen = base.outputs(named(steering_angle=beta, pose_theta=theta))
+        # rounding of 2500 N
+        np.testing.assert_allclose(vector(seen, "normal"), loads(beta), rtol=1e-12)
+
+
+def test_a_payload_presses_on_the_wheels_that_it_is_near() -> None:
+    base = Oracle(build_model("omni_base/creep+payload"))
+    place = AXES[0] - la.E * np.array([1.0, 0.0])  # above the contact of the first wheel
+    at = named(**{"payload.position": [*place, 0.3]})
+    bare = vector(base.outputs({**at, "payload.mass": 0.0}), "normal")
+    full = vector(base.outputs({**at, "payload.mass": 30.0}), "normal")
+    np.testing.assert_allclose(full - bare, [30 * 9.81, 0.0, 0.0], atol=1e-9)
+
+
+class Sheet:
+    """The rig's sentences written out with Lagrange's equations; p' is positive forward."""
+
+    def __init__(self, beta: np.ndarray) -> None:
+        self.equations = la.equations()
+        self.q, self.v = np.zeros(9), np.zeros(9)
+        self.q[3:6] = beta
+        self.i_d, self.i_s, self.integral = np.zeros(3), np.zeros(3), np.zeros(3)
+
+    def acceleration(self, i_d: np.ndarray, i_s: np.ndarray) -> np.ndarray:
+        q, v = self.q, self.v
+        t = np.asarray(self.equations.inertia(q, v)) + np.diag([0.0] * 3 + [J_S] * 3 + [J_D] * 3)
+        force = -np.asarray(self.equations.christoffel(q, v)) @ v
+        roll, n = -v[6:], loads(q[3:6])
+        slip = np.asarray(self.equations.slip(q, v)).ravel()
+        s_n, s_t = slip[:3], slip[3:]
+        speed = np.hypot(la.R * roll, 0.05)
+        p_t, p_n = C_X * n * s_t / speed, C_Y * n * s_n / speed
+        f = np.hypot(p_t, p_n) + 1e-12
+        g = MU * n * np.tanh(f / (MU * n)) / f
+        contact = np.concatenate([-g * p_n, -g * p_t])
+        force += np.asarray(self.equations.constraint(q, v)).T @ contact
+        force[3:6] += 40 * 0.78 * 0.06 * i_s - B_S * v[3:6]
+        resistance = F_R * n * la.R * np.tanh(roll / 0.1)
+        force[6:] -= 20 * 0.8 * 0.10 * i_d - B_D * roll - resistance
+        return np.linalg.solve(t, force)
+
+    def tick(self, twist: np.ndarray) -> None:
+        beta, roll = self.q[3:6], -self.v[6:]
+        x, y = AXES.T
+        v_x, v_y = twist[0] - twist[2] * y, twist[1] + twist[2] * x
+        error = (np.cos(beta) * v_x + np.sin(beta) * v_y) / 0.1 - roll
+        wanted = 6 * error + self.integral
+        set_d = np.clip(wanted, -25, 25)
+        self.integral += np.where(np.abs(wanted) < 25, 30 * error * TICK, 0)
+        across = np.cos(beta) * v_y - np.sin(beta) * v_x
+        set_s = np.clip(14 * (across / 0.08 - twist[2] - self.v[3:6]), -15, 15)
+        h = TICK / SUBSTEPS
+        for k in range(SUBSTEPS):
+            decay = np.exp(-(k + 0.5) * h / 1.5e-3)
+            i_d, i_s = set_d + (self.i_d - set_d) * decay, set_s + (self.i_s - set_s) * decay
+            self.v = self.v + h * self.acceleration(i_d, i_s)
+            self.q = self.q + h * self.v
+        decay = np.exp(-TICK / 1.5e-3)
+        self.i_d = set_d + (self.i_d - set_d) * decay
+        self.i_s = set_s + (self.i_s - set_s) * decay
+
+
+@pytest.mark.slow
+def test_rig_is_repeated_tick_by_tick() -> None:
+    beta = np.array([0.4, -0.2, 0.3])
+    rig = Sheet(beta)
+    drive = Stepper("twist_drive/sampled")
+    # RK4 with the rig's step: contact time constants near standstill are 50 us
+    start = named(steering_angle=beta, I_phi=la.I_PHI + J_D)
+    base = Stepper("omni_base/creep", start, max_step=5e-5)
+    seen = base.outputs()
+    for k in range(200):
+        twist = np.array([1.2, 0.5, 0.8]) * k * TICK
+        rig.tick(twist)
+        inputs = named(
+            vx_set=twist[0], vy_set=twist[1], w_set=twist[2],
+            **{name: vector(seen, name) for name in ("beta", "phi", "betad", "phid")},
+        )  # fmt: skip
+        given = drive.step(inputs, TICK)
+        seen = base.step({name: given[name] for name in given if name.startswith("tau_")}, TICK)
+    # The rig's Euler steps err by h/2 = 25 us times rates (0.5 rad/s of the forks, 0.15 m/s) and
+    # accelerations (2 rad/s2); gains of 6 and 14 A.s/rad make currents of it.
+    assert abs(seen["x"] - rig.q[0]) < 1e-5 and abs(seen["y"] - rig.q[1]) < 1e-5
+    assert abs(seen["theta"] - rig.q[2]) < 1e-5
+    np.testing.assert_allclose(vector(seen, "beta"), rig.q[3:6], atol=3e-5)
+    np.testing.assert_allclose(vector(seen, "phid"), rig.v[6:], atol=5e-5)
+    np.testing.assert_allclose(vector(given, "i_d"), rig.i_d, atol=7e-4)
+    np.testing.assert_allclose(vector(given, "i_s"), rig.i_s, atol=7e-4)
+    assert rig.q[0] > 0.01 and np.abs(rig.i_d).min() > 0.5  # it did move
+
+
+@pytest.mark.parametrize(("speed", "left"), [(1.0, 0.0), (0.1, 1.5)])
+def test_integral_stands_still_at_the_current_limit(speed: float, left: float) -> None:
+    """1 m/s asks a wheel that is held for 60 A; 0.1 m/s for 6 A, and 30 A/s more."""
+    drive = Stepper("twist_drive/sampled")
+    held = [drive.step({"vx_set": speed}, TICK) for _ in range(50)][-1]
+    rest = [drive.step({"vx_set": 0.0}, TICK) for _ in range(50)][-1]
+    # 50 ms are 33 time constants; the last tick's 0.03 A of the integral is on its way
+    np.testing.assert_allclose(vector(held, "i_d"), min(25.0, 60 * speed + left), atol=0.07)
+    np.testing.assert_allclose(vector(rest, "i_d"), left, atol=1e-6)
