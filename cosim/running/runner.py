@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..arguments import need_function, need_number, need_table, need_text
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
-from ..errors import StepError, UnknownNameError, ValueRangeError
+from ..errors import StepError, ValueRangeError
 from ..files import claimed, write_text
 from ..installation import builder
 from ..master.algorithms import names
@@ -28,10 +28,10 @@ from ..scenario.checks import CheckResult, evaluate
 from ..scenario.scenario import Scenario
 from ..ssp import read_scenario
 from ..system.provider import Provider
-from ..system.system import System
 from ..system.variants import apply
 from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
+from .preparation import left_out, recorded_signals, recording_interval, swapped_system
 
 Vector = NDArray[np.float64]
 
@@ -157,78 +157,6 @@ def _prefixed(run: str, name: str) -> str:
     return f"{run}: {name}" if run else name
 
 
-def _every(scenario: Scenario) -> int:
-    if scenario.period is None or not 0.0 < scenario.step < scenario.period:
-        return 1  # a step that is not positive is refused by the master
-    every = round(scenario.period / scenario.step)
-    if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
-        raise ValueRangeError(
-            f"{scenario.name}: record period {scenario.period:g} s is not a whole number of steps "
-            f"of {scenario.step:g} s"
-        )
-    return every
-
-
-def _system(
-    scenario: Scenario,
-    provider: Provider | None,
-    instances: Mapping[str, str],
-    changed: set[str],
-    parameters: Mapping[str, Any],
-) -> tuple[System, list[str]]:
-    """The system with its values, and notes on what a changed variant does not have."""
-    notes = []
-    system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
-    for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
-        instance = name.partition(".")[0]
-        try:
-            system.set(name, value)
-        except UnknownNameError:
-            if instance not in changed:
-                raise
-            notes.append(f"{name} of the scenario is left out: {instances[instance]} has none")
-    for name, value in parameters.items():
-        system.set(name, value)
-    return system, notes
-
-
-def _left_out(system: System, changed: set[str]) -> list[str]:
-    """Notes on what changed variants are without."""
-    return [
-        f"{name} is without the {item['what']} ({item['amount']:.4g} {item['unit']}): "
-        f"{system.members[name].reference} leaves it out, and nothing else carries it"
-        for name in system.members
-        if name in changed
-        for item in system.members[name].description.extra.get("left_out", ())
-    ]
-
-
-def _recorded(
-    scenario: Scenario, system: System, changed: set[str]
-) -> tuple[tuple[str, ...], list[str]]:
-    """Signals to record, and notes on what a changed variant does not have."""
-    needed = [name for item in scenario.references.values() for name in item.signals]
-    shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
-    everything = system.signals() if scenario.record is None else scenario.record
-    notes = []
-
-    def has(name: str) -> bool:
-        instance = name.partition(".")[0]
-        try:
-            system.variables(name)
-        except UnknownNameError:
-            if instance not in changed:
-                raise
-            reference = system.members[instance].reference
-            notes.append(f"{name} is not recorded: {reference} has none")
-            return False
-        return True
-
-    kept = list(filter(has, (*everything, *shown)))
-    checked = filter(has, (name for check in scenario.checks for name in check.needs))
-    return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
-
-
 @dataclass(frozen=True)
 class Prepared:
     """A scenario whose FMUs are chosen and whose values are set, ready to run.
@@ -311,14 +239,16 @@ def prepare(
     usual = apply(scenario.system.instances, scenario.variants, provider, scenario.folder)
     instances = apply(usual, variants or {}, provider, base)
     changed = {name for name in instances if instances[name] != usual[name]}
-    system, notes = _system(scenario, provider, instances, changed, parameters or {})
-    notes += _left_out(system, changed)
-    record, others = _recorded(scenario, system, changed)
+    system, notes = swapped_system(scenario, provider, instances, changed, parameters or {})
+    notes += left_out(system, changed)
+    record, others = recorded_signals(scenario, system, changed)
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
         isolate=isolate, guard=guard, options=scenario.options,
     )  # fmt: skip
-    return Prepared(scenario, usual, instances, master, record, _every(scenario), (*notes, *others))
+    return Prepared(
+        scenario, usual, instances, master, record, recording_interval(scenario), (*notes, *others)
+    )
 
 
 def run_scenario(

@@ -86,7 +86,8 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
         c for c in candidates(problem) if c.effect in {"battery_sag", "brush_drop", "elastic"}
     ]
     search = Search(simulator(problem), only=chosen)
-    result = _searched(search, [], tmp_path, lambda text: None, time.perf_counter())
+    base = search.calibrated()
+    result = _searched(search, base, [], tmp_path, lambda text: None, time.perf_counter())
     search.close()
     table = result.to_dict()
     assert table["verdict"] == "effect_found"

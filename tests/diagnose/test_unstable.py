@@ -14,7 +14,7 @@ from cosim.calibrate.loss import WINDOW
 from cosim.calibrate.parts import MeasuredRun, Parameter
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
-from cosim.diagnose.diagnosis import Diagnosis, _judge, _shortened
+from cosim.diagnose.diagnosis import Diagnosis, _shortened, _verdict
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
@@ -134,7 +134,7 @@ def test_further_effects_are_looked_for_before_that(
     middle = float(first.times[first.times.size // 2])
     assert result.ended == ({first.name: pytest.approx(middle, abs=0.02)} if gone else {})
     result.after = found
-    _judge(result, [])
+    _verdict(result, [])
     # tables have the runs in full
     assert result.residuals["after", first.name].shape == first.data.shape
     assert ("<td>1.00 s</td>" in _ended(result.ended)) == gone

@@ -38,6 +38,8 @@ def command(folder: Path, *words: str) -> subprocess.Popen[str]:
         [sys.executable, "-m", "cosim", "run", str(folder / "scenario.toml"), *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
         env={**os.environ, "TMPDIR": str(temporary)},
+        # a shell's background jobs ignore it, and hand that on
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
 
 

@@ -106,7 +106,7 @@ def test_a_limit_that_is_no_fidelity_is_refused(write: Write) -> None:
         variant.fidelities("gearbox")
     assert str(caught.value) == (
         "there is no fidelity, named as a limit by sources.gearbox.planetary, called 'rato'; "
-        "there is ratio, lossy, elastic, planetary"
+        "did you mean 'ratio'? There is ratio, lossy, elastic, planetary"
     )
 
 

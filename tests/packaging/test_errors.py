@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.errors import listing
 from sources.effect import Effect
 from sources.model import ModelError
 from sources.packaging import native
@@ -28,16 +29,24 @@ EFFECTS = ", ".join(effects())
             "'gearbox ratio' is not a variant name; write component/fidelity, then +effect or "
             "+effect@balance as often as wanted, e.g. gearbox/elastic+backlash",
         ),
-        ("gearbx/ratio", f"there is no component 'gearbx'; there is {COMPONENTS}"),
+        (
+            "gearbx/ratio",
+            f"there is no component 'gearbx'; {listing(COMPONENTS.split(', '), 'gearbx')}",
+        ),
         (
             "gearbox/rato",
-            "there is no fidelity of 'gearbox' called 'rato'; there is ratio, lossy, elastic",
+            "there is no fidelity of 'gearbox' called 'rato'; did you mean 'ratio'? There is "
+            "ratio, lossy, elastic",
         ),
         (
             "gearbox.mir/ratio",
-            "component 'gearbox' has no device 'mir'; it has lab_base, lab_bench, mir250",
+            "component 'gearbox' has no device 'mir'; did you mean 'mir250'? There is mir250, "
+            "lab_base, lab_bench",
         ),
-        ("gearbox/ratio+coulom", f"there is no effect 'coulom'; there is {EFFECTS}"),
+        (
+            "gearbox/ratio+coulom",
+            f"there is no effect 'coulom'; {listing(EFFECTS.split(', '), 'coulom')}",
+        ),
         (
             "gearbox/ratio[mesh=ratio]",
             "there is no slot of gearbox/ratio called 'mesh'; there is none",

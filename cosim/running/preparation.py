@@ -1,0 +1,85 @@
+"""From a scenario with swapped variants to its system and to what is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..errors import UnknownNameError, ValueRangeError
+from ..scenario.scenario import Scenario
+from ..system.provider import Provider
+from ..system.system import System
+
+
+def recording_interval(scenario: Scenario) -> int:
+    """Every how many communication steps are recorded."""
+    if scenario.period is None or not 0.0 < scenario.step < scenario.period:
+        return 1  # a step that is not positive is refused by the master
+    every = round(scenario.period / scenario.step)
+    if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
+        raise ValueRangeError(
+            f"{scenario.name}: record period {scenario.period:g} s is not a whole number of steps "
+            f"of {scenario.step:g} s"
+        )
+    return every
+
+
+def swapped_system(
+    scenario: Scenario,
+    provider: Provider | None,
+    instances: Mapping[str, str],
+    changed: set[str],
+    parameters: Mapping[str, Any],
+) -> tuple[System, list[str]]:
+    """The system with its values, and notes on what a changed variant does not have."""
+    notes = []
+    system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
+    for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
+        instance = name.partition(".")[0]
+        try:
+            system.set(name, value)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            notes.append(f"{name} of the scenario is left out: {instances[instance]} has none")
+    for name, value in parameters.items():
+        system.set(name, value)
+    return system, notes
+
+
+def left_out(system: System, changed: set[str]) -> list[str]:
+    """Notes on what changed variants are without."""
+    return [
+        f"{name} is without the {item['what']} ({item['amount']:.4g} {item['unit']}): "
+        f"{system.members[name].reference} leaves it out, and nothing else carries it"
+        for name in system.members
+        if name in changed
+        for item in system.members[name].description.extra.get("left_out", ())
+    ]
+
+
+def recorded_signals(
+    scenario: Scenario, system: System, changed: set[str]
+) -> tuple[tuple[str, ...], list[str]]:
+    """Signals to record, and notes on what a changed variant does not have."""
+    needed = [name for item in scenario.references.values() for name in item.signals]
+    shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
+    everything = system.signals() if scenario.record is None else scenario.record
+    notes = []
+
+    def has(name: str) -> bool:
+        instance = name.partition(".")[0]
+        try:
+            system.variables(name)
+        except UnknownNameError:
+            if instance not in changed:
+                raise
+            reference = system.members[instance].reference
+            notes.append(f"{name} is not recorded: {reference} has none")
+            return False
+        return True
+
+    kept = list(filter(has, (*everything, *shown)))
+    checked = filter(has, (name for check in scenario.checks for name in check.needs))
+    return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
