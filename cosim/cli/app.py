@@ -23,6 +23,7 @@ import typer
 from ..errors import CheckError, CosimError, InputError
 from ..installation.builder import default_provider
 from ..master import algorithms
+from ..spec import distribution
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from ..running.runner import Result
 
 app = typer.Typer(
-    help="Robot subsystems as FMUs, run together and compared with measurements.",
+    invoke_without_command=True,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -51,6 +52,18 @@ app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
 app.command("study")(study_command)
+
+
+@app.callback()
+def whole(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)
+    ] = False,
+) -> None:
+    """Robot subsystems as FMUs, run together and compared with measurements."""
+    if version:
+        typer.echo(f"cosim {distribution.version()} ({distribution.NAME})")
+        raise typer.Exit
 
 
 SHOWN = 40

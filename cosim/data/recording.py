@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
+from ..spec.distribution import has, needed
+from .npz import read_npz
 from .parquet import read_table
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 _META = b"cosim"
+_NPZ_META = "cosim"
 _TYPES = ("double", "int64", "uint64", "string", "binary")
 """Of columns in Parquet; one of objects without rows has none."""
 
@@ -96,9 +99,12 @@ class Recording:
     # -- other forms -----------------------------------------------------------------------------
 
     def to_pandas(self) -> pd.DataFrame:
-        """A data frame over time [s]; units and provenance are in its `attrs`."""
-        import pandas as pd
+        """A data frame over time [s]; units and provenance are in its `attrs`.
 
+        Raises:
+            InputError: pandas is not installed.
+        """
+        pd = needed("pandas", "a recording as data frame", "tables")
         frame = pd.DataFrame(
             self.values, index=pd.Index(self.time, name="time"), columns=list(self.names)
         )
@@ -143,11 +149,15 @@ class Recording:
         return path
 
     def write_parquet(self, path: Path | str) -> Path:
-        """Write a Parquet file; unit in each column's metadata, the rest in the schema's."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        """Write a Parquet file; unit in each column's metadata, the rest in the schema's.
 
+        Raises:
+            InputError: pyarrow is not installed.
+        """
         path = Path(path)
+        pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
+        import pyarrow as pa
+
         fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})] + [
             pa.field(name, pa.array(column[:1]).type, metadata={"unit": self.units.get(name, "")})
             for name, column in zip(self.names, self._columns(), strict=True)
@@ -157,6 +167,31 @@ class Recording:
         with atomic(path) as temporary:
             pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
         return path
+
+    def write_npz(self, path: Path | str) -> Path:
+        """Write an npz archive of numpy with one array per signal; the rest in the array `cosim`.
+
+        Raises:
+            ScenarioError: a signal is binary.
+        """
+        path = Path(path)
+        arrays = {"time": self.time}
+        for name, column in zip(self.names, self._columns(), strict=True):
+            if any(isinstance(item, bytes) for item in column.tolist()):
+                raise ScenarioError(
+                    f"{path}: npz archives hold no binaries such as {name}; write Parquet"
+                )
+            arrays[name] = column.astype(str) if column.dtype == object else column
+        arrays[_NPZ_META] = np.array(json.dumps(self._meta()))
+        with atomic(path) as temporary, temporary.open("wb") as handle:
+            np.savez_compressed(handle, **arrays)  # type: ignore[arg-type]
+        return path
+
+    def keep(self, stem: Path) -> Path:
+        """Write `stem`.parquet, or `stem`.npz where pyarrow is not installed; returns the path."""
+        if has("pyarrow"):
+            return self.write_parquet(stem.with_name(f"{stem.name}.parquet"))
+        return self.write_npz(stem.with_name(f"{stem.name}.npz"))
 
     def plot(
         self,
@@ -212,20 +247,24 @@ def _cell(value: Any) -> str:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read a recording that `write_parquet` wrote.
+    """Read a recording that `write_parquet` or `write_npz` wrote.
 
     Raises:
         ScenarioError: missing, or not such a file.
+        InputError: it is Parquet, and pyarrow is not installed.
     """
     path = Path(path)
-    table = read_table(path)
-    metadata = table.schema.metadata or {}
-    if _META not in metadata or "time" not in table.column_names:
+    if path.suffix.lower() == ".npz":
+        found, content = _read_npz(path)
+    else:
+        table = read_table(path)
+        content = (table.schema.metadata or {}).get(_META)
+        found = {name: _column(path, name, table[name]) for name in table.column_names}
+    if content is None or "time" not in found:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
-    meta = _read_meta(path, metadata[_META])
-    names = tuple(name for name in table.column_names if name != "time")
-    columns = [_column(path, name, table[name]) for name in names]
-    time = _column(path, "time", table["time"])
+    meta = _read_meta(path, content)
+    time = found.pop("time")
+    names, columns = tuple(found), list(found.values())
     if time.dtype != np.float64:
         raise ScenarioError(f"{path}: its times are no floating-point numbers; record it again")
     objects = {
@@ -249,6 +288,27 @@ def read_recording(path: Path | str) -> Recording:
         objects=objects,
         notes=tuple(meta.get("notes", ())),
     )
+
+
+def _read_npz(path: Path) -> tuple[dict[str, NDArray[Any]], bytes | None]:
+    """Columns of an npz archive, and what it says about itself.
+
+    Raises:
+        ScenarioError: it is none, or its columns have no rows of one length.
+    """
+    arrays = read_npz(path)
+    meta = arrays.pop(_NPZ_META, None)
+    if meta is None or meta.dtype.kind != "U" or meta.ndim:
+        return {}, None
+    rows = arrays["time"].shape if "time" in arrays else ()
+    for name, column in arrays.items():
+        if column.shape != rows or column.ndim != 1 or column.dtype.kind not in "fiuU":
+            raise ScenarioError(
+                f"{path}: column {name!r} has the shape {column.shape} and type {column.dtype}; "
+                "record it again"
+            )
+    plain = {n: c.astype(object) if c.dtype.kind == "U" else c for n, c in arrays.items()}
+    return plain, str(meta).encode()
 
 
 def _column(path: Path, name: str, column: Any) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from typing import Any
 
 from ..errors import CosimError, InputError, VariantError
 from ..spec.cache import cache_folder
+from ..spec.distribution import way_out
 from ..system.provider import FolderProvider, Provider
 from . import places
 
@@ -32,8 +33,8 @@ def sources(module: str) -> ModuleType:
         return importlib.import_module(f"{places.sources_package()}.{module}")
     except ModuleNotFoundError as error:
         raise VariantError(
-            f"building FMUs needs {error.name}, which is not installed: "
-            "pip install 'cosim[build]', or use FMUs that are built already"
+            f"building FMUs needs {error.name}, which is not installed: {way_out('build')}, or use "
+            "FMUs that are built already"
         ) from error
 
 
