@@ -40,7 +40,9 @@ bench: $(STAMP)
 	$(BIN)/python -m benchmarks.speed
 	$(BIN)/python -m benchmarks.startup
 
-wheel: $(STAMP)
+PLATFORM ?= host
+wheel: $(RUNS)
+	$(BIN)/python -m distribution --platform $(PLATFORM)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
 
 # what runs, builds FMUs and diagnoses; the tools of the tests are three times as much

@@ -32,6 +32,8 @@ from .fmus import fmus_app
 from .linearize import linearize_command
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
+from .progress import Display
+from .scenarios import scenarios_command
 from .streams import print_json, stdout_for_json
 from .study import study_command
 
@@ -46,6 +48,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.add_typer(fmus_app, name="fmus")
+app.command("scenarios")(scenarios_command)
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)
@@ -70,37 +73,6 @@ SHOWN = 40
 """Comparisons and passed checks that are printed; more are in result.json only."""
 SHOWN_FOLDERS = 8
 """Folders of results that are named one by one."""
-# -- scenarios -------------------------------------------------------------------------------------
-
-
-@app.command("scenarios")
-def list_scenarios(as_json: AsJson = False) -> None:
-    """List what can be run.
-
-    Example: `cosim scenarios`
-    """
-    from ..scenario import scenario
-
-    files = scenario.scenario_files()
-    if as_json:
-        print_json(
-            [
-                {
-                    "scenario": file.name,
-                    "system": file.table.get("system", ""),
-                    "runs": [name for name in file.runs if name],
-                    "description": file.text,
-                }
-                for file in files
-            ]
-        )
-        return
-    table = new_table("scenario", "system", "runs", "description")
-    for file in files:
-        runs = [name for name in file.runs if name]
-        shown = ", ".join(runs[:4]) + (f" … ({len(runs)})" if len(runs) > 4 else "")
-        table.add_row(file.name, str(file.table.get("system", "")), shown, file.text)
-    open_console().print(table)
 
 
 @app.command("run")
@@ -141,9 +113,6 @@ def run_command(
 
     Example: `cosim run motor_bench --set gearbox=elastic+backlash --param gearbox.eta=0.8`
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from ..running.runner import run
 
     changes = pairs(variants, "--set", "INSTANCE=VARIANT")
@@ -151,15 +120,10 @@ def run_command(
     chosen = values(options, "--option", "NAME=VALUE")
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
-    provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        tasks: dict[str, Any] = {}
-
-        def told(item: str, fraction: float) -> None:
-            if item not in tasks:
-                tasks[item] = progress.add_task(item, total=1.0)
-            progress.update(tasks[item], completed=fraction)
-
+    with Display() as display:
+        provider: Provider = (
+            FolderProvider(fmus) if fmus is not None else default_provider(display.building)
+        )
         result = run(
             name,
             variants=changes,
@@ -170,7 +134,7 @@ def run_command(
             duration=duration,
             provider=provider,
             out=out or Path("out") / _folder_name(name),
-            progress=told,
+            progress=lambda item, fraction: display.update(item, fraction, 1.0),
             isolate=time_limit if isolate else None,
             guard=True,
         )

@@ -18,7 +18,7 @@ from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
+from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
 from .bursts import bursts, times
@@ -288,7 +288,14 @@ def _searched(
     winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(

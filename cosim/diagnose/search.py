@@ -12,7 +12,8 @@ from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..system.provider import locate
+from ..errors import UnbuiltError
+from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
 from .deferred import corrected
@@ -79,15 +80,22 @@ class Search(LateFitter):
         Args:
             problem: to which they will be added, the declared one if not given.
         """
-        known = self.known if problem is None else candidates(problem)
+        try:
+            known = self.known if problem is None else candidates(problem)
+        except UnbuiltError:
+            return  # the round that asks for them says so
         problem = problem or self.declared
         self._build(problem, (b.change or b.members[0][0].change for b in batches(known, problem)))
 
     def _build(self, problem: Problem, changes: Iterable[Mapping[str, str]]) -> None:
         """Have changed FMUs of a problem built in the background."""
-        for instance, change in dict.fromkeys(pair for c in changes for pair in c.items()):
-            variant = apply(problem.instances, {instance: change}, problem.provider)
-            self._builder.submit(locate, variant[instance], problem.provider)
+        variants = [
+            apply(problem.instances, {instance: change}, problem.provider)[instance]
+            for instance, change in dict.fromkeys(pair for c in changes for pair in c.items())
+        ]
+        self._builder.submit(expected, problem.provider, variants)
+        for variant in variants:
+            self._builder.submit(locate, variant, problem.provider)
 
     def close(self) -> None:
         """Stop building."""

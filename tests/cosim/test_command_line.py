@@ -81,7 +81,6 @@ def test_fmus_build_and_check(command: Command, tmp_path: Path) -> None:
     done = command("fmus", "build", "gearbox/ratio", "--out", tmp_path / "f", "--json")
     (built,) = json.loads(done.out)["built"]
     assert done.code == 0 and Path(built["file"]).is_file()
-    assert "1/1 gearbox/ratio: " in done.err
     done = command("fmus", "check", built["file"], "--json")
     assert done.code == 0
     assert json.loads(done.out) == {
@@ -181,7 +180,8 @@ RUN = ["run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.1", "--out",
         (["fmus", "build", "gearbox/rubber", "--out", "results"], "called 'rubber'"),
         (["fmus", "build", "gearbox/ratio", "--out", "cut.fmu"], "choose another folder"),
         (["linearize", "motor_bench/ST1", "--out", "cut.fmu/x"], "choose another folder"),
-        (["fmus", "build", "gearbox_", "--out", "results"], "'gearbox_' is not a variant name"),
+        (["fmus", "build", "gearbox_", "--out", "results"],
+         "no component 'gearbox_'; did you mean 'gearbox'"),
         (["fmus", "build", "gearbox/ratio", "--kind", "python", "--fmi", "3", "--out", "results"],
          "python FMUs are FMI 2.0 only"),
         (["fmus", "check", "lost.fmu"], "lost.fmu: there is no such file"),

@@ -1,0 +1,131 @@
+"""FMUs that an installed wheel carries: files of the catalogue, and packs of variants with effects.
+
+A pack is a .tar.xz of what some twenty FMUs contain, folder by folder; they share nearly all of it.
+An FMU is written into the cache when it is first asked for, byte for byte as it was built.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import lzma
+import tarfile
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..errors import CosimError
+from ..files import atomic
+from ..spec.archive import pack
+from ..spec.cache import cache_folder, seal, sealed
+from ..spec.variant import file_stem, parse_name
+
+CATALOGUE = "catalogue.json"
+"""What the library holds and what the sources would say of it: components, candidates."""
+
+
+class Library:
+    """Provider of the FMUs in a folder that `python -m distribution` made.
+
+    Args:
+        folder: with `catalogue.json`, `fmus` and `packs`.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @cached_property
+    def _text(self) -> bytes:
+        try:
+            return (self.folder / CATALOGUE).read_bytes()
+        except FileNotFoundError:
+            return b"{}"
+        except OSError as error:
+            raise CosimError(
+                f"{self.folder / CATALOGUE}: cannot be read ({error.strerror})"
+            ) from error
+
+    @cached_property
+    def content(self) -> Mapping[str, Any]:
+        """The catalogue: `components`, `variants`, `packs`, `candidates`, `refinements`.
+
+        Raises:
+            CosimError: it is damaged.
+        """
+        try:
+            found: dict[str, Any] = json.loads(self._text)
+        except ValueError as error:
+            raise CosimError(
+                f"{self.folder / CATALOGUE}: is damaged ({error}); reinstall"
+            ) from error
+        return found
+
+    @cached_property
+    def _packed(self) -> dict[str, str]:
+        """Stem of an FMU -> its pack."""
+        packs: Mapping[str, Sequence[str]] = self.content.get("packs", {})
+        return {stem: name for name, stems in packs.items() for stem in stems}
+
+    def find(self, variant: str, fmi: int = 2) -> Path | None:
+        """Path of a variant's FMU, None if the library has none.
+
+        Raises:
+            VariantError: the name does not follow the grammar.
+            CosimError: a pack is damaged.
+        """
+        stem = file_stem(str(parse_name(variant)))
+        path = self.folder / "fmus" / f"fmi{fmi}" / f"{stem}.fmu"
+        if path.is_file():
+            return path
+        if fmi != 2 or stem not in self._packed:
+            return None
+        kept = cache_folder() / "library" / hashlib.sha256(self._text).hexdigest()[:16]
+        path = kept / f"{stem}.fmu"
+        if path.is_file() and sealed(path, path.read_bytes()):
+            return path
+        content = self._unpacked(self._packed[stem], stem)
+        with atomic(seal(path)) as temporary:
+            temporary.write_text(hashlib.sha256(content).hexdigest(), encoding="ascii")
+        with atomic(path) as temporary:
+            temporary.write_bytes(content)
+        return path
+
+    def _unpacked(self, name: str, stem: str) -> bytes:
+        path = self.folder / "packs" / name
+        try:
+            with tarfile.open(path, "r|xz") as archive:
+                files = {
+                    inner: file.read()
+                    for member in archive
+                    for folder, _, inner in [member.name.partition("/")]
+                    if folder == stem and (file := archive.extractfile(member)) is not None
+                }
+        except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
+            raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
+        return pack(files)
+
+    def components(self) -> list[dict[str, Any]]:
+        """Every component with its fidelities and devices."""
+        return list(self.content.get("components", []))
+
+    def variants(self) -> list[dict[str, Any]]:
+        """What the catalogued variants offer, as `cosim fmus list --json` says it."""
+        return list(self.content.get("variants", []))
+
+    def names(self) -> Iterator[str]:
+        """Of the variants that have a file of their own."""
+        yield from self.content.get("names", ())
+
+    def candidates(self, variant: str) -> list[tuple[str, str, str]] | None:
+        """Effects that could be added to a variant, None if the library does not know."""
+        found = self.content.get("candidates", {}).get(str(parse_name(variant)))
+        if found is None:
+            return None
+        texts = self.content["effects"]
+        return [(effect, port, texts[effect]) for effect, port in found]
+
+    def refinements(self, variant: str) -> list[dict[str, Any]] | None:
+        """Fidelities of which a variant is the limit, None if the library does not know."""
+        found = self.content.get("refinements", {}).get(str(parse_name(variant)))
+        return None if found is None else list(found)

@@ -1,0 +1,149 @@
+"""Makes what a wheel carries: `python -m distribution`, then `pip wheel`; `make wheel` does both.
+
+FMUs of the catalogue as files, in FMI 2 and 3; variants with effects, which diagnoses need, in
+packs; the compiled executor; and what the sources would say, so that nothing of it needs CasADi.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import lzma
+import shutil
+import tarfile
+import time
+import zipfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, Literal
+
+from cosim.installation.builder import Builder
+from cosim.installation.library import CATALOGUE
+from cosim.master import kernel
+from cosim.spec.cache import cache_folder
+from cosim.spec.variant import file_stem, parse_name
+from sources.packaging import catalog
+from sources.packaging.build import build_many, host_platform
+from sources.packaging.kernel import build_kernel
+from sources.packaging.native import PLATFORMS
+from sources.variant import effects
+
+from . import contents
+
+Choice = Literal["host", "all"]
+TAGS = {
+    "x86_64-linux": "manylinux_2_17_x86_64", "aarch64-linux": "manylinux_2_17_aarch64",
+    "x86_64-windows": "win_amd64", "x86_64-darwin": "macosx_11_0_x86_64",
+    "aarch64-darwin": "macosx_11_0_arm64",
+}  # fmt: skip
+"""Platform tags of wheels: the oldest systems that `PLATFORMS` compiles for."""
+PACKED = 24
+"""FMUs in a pack: all are unpacked to get one, which takes a tenth of a second."""
+
+
+def make(
+    out: Path,
+    platform: Choice = "host",
+    say: Callable[[str], None] = lambda text: None,
+    mappings: Sequence[Path] | None = None,
+) -> None:
+    """Build all FMUs of a wheel into a folder, which is emptied before.
+
+    Args:
+        out: the folder.
+        platform: this machine, or all five.
+        say: told what is done.
+        mappings: whose diagnoses the wheel serves, all if not given.
+    """
+    begun = time.monotonic()
+
+    def told(text: str) -> None:
+        say(f"{time.monotonic() - begun:6.0f} s  {text}")
+
+    provider = Builder()
+    shutil.rmtree(out, ignore_errors=True)
+    (out / "packs").mkdir(parents=True)
+    plain = contents.plain(provider)
+    versions: tuple[Literal[2, 3], ...] = (2, 3)
+    for fmi in versions:
+        told(f"{len(plain)} FMUs of the catalogue, FMI {fmi}")
+        _built(plain, out / "fmus", fmi, platform, told)
+    systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
+    asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
+    extra = [name for name in contents.buildable(asked) if name not in set(plain)]
+    told(f"{len(extra)} FMUs with effects for the diagnoses of {len(systems)} mappings")
+    kept = cache_folder() / f"distribution-{platform}"
+    paths = _built(extra, kept, 2, platform, told)
+    groups: dict[str, list[Path]] = {}
+    for name, path in zip(extra, paths, strict=True):
+        base = parse_name(name)
+        groups.setdefault(file_stem(f"{base.model}/{base.fidelity}"), []).append(path)
+    jobs = [
+        (out / "packs" / f"{stem}.{first // PACKED}.tar.xz", tuple(files[first : first + PACKED]))
+        for stem, files in sorted(groups.items())
+        for first in range(0, len(files), PACKED)
+    ]
+    told(f"{len(jobs)} packs")
+    with ProcessPoolExecutor() as pool:
+        list(pool.map(write_pack, *zip(*jobs, strict=True)) if jobs else ())
+    instances = [name for item in systems for name in item.instances.values()]
+    catalogue = _catalogue(list(dict.fromkeys([*plain, *map(_canonical, instances)])))
+    catalogue["packs"] = {path.name: [file.stem for file in files] for path, files in jobs}
+    (out / CATALOGUE).write_text(json.dumps(catalogue, separators=(",", ":")), encoding="utf-8")
+    targets = list(PLATFORMS) if platform == "all" else [host_platform()]
+    for target in targets:
+        build_kernel(kernel.SOURCES, out / "kernel" / kernel.library_name(target), target)
+    (out / "tag").write_text("any" if platform == "all" else TAGS[targets[0]], encoding="ascii")
+    told(f"done: {sum(p.stat().st_size for p in out.rglob('*') if p.is_file()) / 1e6:.1f} MB")
+
+
+def _canonical(name: str) -> str:
+    return str(parse_name(name))
+
+
+def _built(
+    names: Sequence[str],
+    out: Path,
+    fmi: Literal[2, 3],
+    platform: Choice,
+    say: Callable[[str], None],
+) -> list[Path]:
+    done, last = 0, time.monotonic()
+
+    def progress(name: str, path: Path) -> None:
+        nonlocal done, last
+        done += 1
+        if time.monotonic() - last > 10.0:
+            last = time.monotonic()
+            say(f"{done} of {len(names)}: {name}")
+
+    return build_many(names, out=out, fmi=fmi, platform=platform, progress=progress)
+
+
+def write_pack(path: Path, fmus: Sequence[Path]) -> None:
+    """Write what several FMUs contain, the same bytes for the same FMUs."""
+    with (
+        lzma.open(path, "wb", preset=6) as stream,
+        tarfile.open(fileobj=stream, mode="w", format=tarfile.PAX_FORMAT) as archive,
+    ):
+        for fmu in fmus:
+            with zipfile.ZipFile(fmu) as content:
+                for name in content.namelist():
+                    info = tarfile.TarInfo(f"{fmu.stem}/{name}")
+                    info.size = content.getinfo(name).file_size
+                    archive.addfile(info, io.BytesIO(content.read(name)))
+
+
+def _catalogue(names: Sequence[str]) -> dict[str, Any]:
+    """What the sources say of variants, as `installation.library` reads it."""
+    return {
+        "components": catalog.overview(),
+        "names": list(names),
+        "variants": [catalog.describe(name) for name in names],
+        "effects": {name: module.EFFECT.text for name, module in effects().items()},
+        "candidates": {
+            name: [(effect, port) for effect, port, _ in catalog.candidates(name)] for name in names
+        },
+        "refinements": {name: catalog.refinements(name) for name in names},
+    }
