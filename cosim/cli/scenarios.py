@@ -13,7 +13,7 @@ KINDS = {
     "logs": ("Example logs", "cosim diagnose NAME, or cosim calibrate NAME"),
     "study": ("Studies", "cosim study NAME"),
     "public logs": (
-        "Mappings of logs that are not part of cosim",
+        "Mappings for logs that are not part of cosim",
         "cosim diagnose FOLDER --mapping NAME",
     ),
 }
@@ -104,17 +104,20 @@ def _studies() -> Iterator[dict[str, Any]]:
 
 
 def _public() -> Iterator[dict[str, Any]]:
-    from ..calibrate.mapping import named_mappings, read_mapping
+    from ..calibrate.mapping import example_sets, named_mappings, read_mapping
+    from ..files import read_toml
 
+    sets = [read_toml(folder / "set.toml") for folder in example_sets().values()]
+    shown = {table.get("rig") for table in sets}
     for name, path in named_mappings().items():
         table: Mapping[str, Any] = read_mapping(path)
-        if table.get("origin"):
+        if table.get("origin") or table.get("rig") not in shown:
             yield {
                 "kind": "public logs",
                 "name": name,
                 "system": str(table.get("system", "")),
                 "runs": [str(run["name"]) for run in table.get("run", [])],
                 "description": str(table.get("description", "")),
-                "origin": str(table["origin"]),
+                "origin": str(table.get("origin") or f"rig {table['rig']}, with its sheet"),
                 "readme": str(path.parent / "README.md"),
             }

@@ -29,6 +29,16 @@ _NPZ_META = "cosim"
 _TYPES = ("double", "int64", "uint64", "string", "binary")
 """Of columns in Parquet; one of objects without rows has none."""
 
+MOST_AXES = 8
+"""Axes of a plot for which nobody has chosen signals."""
+_QUANTITIES = {
+    "rad": "angle", "deg": "angle", "rad/s": "angular speed", "rad/s2": "angular acceleration",
+    "m": "length", "m/s": "speed", "m/s2": "acceleration", "N": "force", "N.m": "torque",
+    "A": "current", "V": "voltage", "W": "power", "J": "energy", "kg": "mass", "s": "time",
+    "kg.m2": "inertia", "K": "temperature", "degC": "temperature", "1": "ratio", "ohm": "resistance",
+}  # fmt: skip
+"""Unit -> what it measures, as axes are named."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -199,10 +209,10 @@ class Recording:
         path: Path | str | None = None,
         references: Mapping[str, tuple[Vector, Vector, str]] | None = None,
     ) -> Figure:
-        """Plot signals over time, those with the same unit in one axes.
+        """Plot signals over time, those with the same unit in one axes, named by what it measures.
 
         Args:
-            signals: names (vectors too); all if not given.
+            signals: names (vectors too); all if not given, of the units with most signals.
             path: where to write the figure; the suffix says how.
             references: signal -> (times, values, label), drawn with it.
         """
@@ -214,6 +224,9 @@ class Recording:
         groups: dict[str, list[str]] = {}
         for name in names:
             groups.setdefault(self.units.get(name, ""), []).append(name)
+        if signals is None and len(groups) > MOST_AXES:
+            most = sorted(groups, key=lambda unit: -len(groups[unit]))[:MOST_AXES]
+            groups = {unit: members for unit, members in groups.items() if unit in most}
         figure = Figure(figsize=(9.0, 1.0 + 2.2 * max(len(groups), 1)), layout="constrained")
         axes = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, (unit, members) in zip(axes, groups.items(), strict=False):
@@ -222,7 +235,7 @@ class Recording:
                 if times is not None:
                     axis.plot(times, values, color="0.6", linewidth=2.0, label=label)
                 axis.plot(self.time, self[name], linewidth=1.0, label=name)
-            axis.set_ylabel(f"[{unit}]" if unit else "")
+            axis.set_ylabel(f"{_QUANTITIES.get(unit, '')} [{unit}]".strip() if unit else "")
             axis.grid(True, alpha=0.3)
             if len(members) <= 12:
                 axis.legend(loc="upper right", fontsize="small")

@@ -187,6 +187,7 @@ class Installed:
         try:
             self._builder = self._builder or Builder(told=self._told)
         except UnbuiltError as error:
+            self.library.check(variant)
             raise UnbuiltError(
                 f"{variant!r} is not among the FMUs of this installation, and {error}"
             ) from error

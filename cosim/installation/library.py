@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..errors import CosimError
+from ..errors import CosimError, VariantError, listing
 from ..files import atomic
 from ..spec.archive import pack
 from ..spec.cache import cache_folder, seal, sealed
@@ -104,6 +104,37 @@ class Library:
         except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
             raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
         return pack(files)
+
+    def check(self, variant: str) -> None:
+        """Say which part of a variant's name does not exist, where the library knows that.
+
+        Raises:
+            VariantError: with near names.
+        """
+        name = parse_name(variant)
+        known = {entry["component"]: entry for entry in self.components()}
+        if not known:
+            return
+        if name.component not in known:
+            raise VariantError(
+                f"there is no component {name.component!r}; {listing(known, name.component)}"
+            )
+        entry = known[name.component]
+        if name.fidelity not in entry["fidelities"]:
+            raise VariantError(
+                f"there is no fidelity of {name.component!r} called {name.fidelity!r}; "
+                f"{listing(entry['fidelities'], name.fidelity)}"
+            )
+        if name.device and name.device not in entry["devices"]:
+            raise VariantError(
+                f"component {name.component!r} has no device {name.device!r}; "
+                f"{listing(entry['devices'], name.device)}"
+            )
+        for effect, _ in name.effects:
+            if effect not in self.content["effects"]:
+                raise VariantError(
+                    f"there is no effect {effect!r}; {listing(self.content['effects'], effect)}"
+                )
 
     def components(self) -> list[dict[str, Any]]:
         """Every component with its fidelities and devices."""
