@@ -17,7 +17,6 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import balances, candidates, element_of
 from cosim.diagnose.localise import PROBE
 from cosim.diagnose.probes import batches
-from cosim.errors import CosimError
 from cosim.files import read_toml
 from cosim.installation import places
 from cosim.running.runner import prepare
@@ -28,8 +27,9 @@ from cosim.study.planning import plan_study
 from cosim.system.provider import Provider
 from cosim.system.toml import SystemFile, read_system
 from cosim.system.variants import apply, component
+from sources.model import ModelError
 from sources.packaging import catalog
-from sources.variant import fidelities
+from sources.variant import build_model, fidelities
 
 
 class Asked:
@@ -126,16 +126,18 @@ def _variants(problem: Problem, changes: Iterable[dict[str, str]]) -> list[str]:
     return list(found)
 
 
-def buildable(names: Iterable[str]) -> list[str]:
-    """Those of these variants that exist: some effects fit a balance but not each other."""
-    from sources.model import ModelError
-    from sources.variant import UnknownVariantError, build_model
+def sorted_out(names: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Those of these variants that exist, and those whose effects do not fit together.
 
-    found = []
+    One effect alone fits: it is a candidate.
+    """
+    found, impossible = [], []
     for name in names:
         try:
-            build_model(name)
-        except (ModelError, UnknownVariantError, CosimError):
-            continue
-        found.append(name)
-    return found
+            if len(parse_name(name).effects) > 1:
+                build_model(name)
+        except ModelError:
+            impossible.append(name)
+        else:
+            found.append(name)
+    return found, impossible

@@ -47,6 +47,7 @@ def make(
     platform: Choice = "host",
     say: Callable[[str], None] = lambda text: None,
     mappings: Sequence[Path] | None = None,
+    plain: Sequence[str] | None = None,
 ) -> None:
     """Build all FMUs of a wheel into a folder, which is emptied before.
 
@@ -55,6 +56,7 @@ def make(
         platform: this machine, or all five.
         say: told what is done.
         mappings: whose diagnoses the wheel serves, all if not given.
+        plain: variants that get files of their own; those of `contents.plain` if not given.
     """
     begun = time.monotonic()
 
@@ -64,14 +66,15 @@ def make(
     provider = Builder()
     shutil.rmtree(out, ignore_errors=True)
     (out / "packs").mkdir(parents=True)
-    plain = contents.plain(provider)
+    plain = contents.plain(provider) if plain is None else list(plain)
     versions: tuple[Literal[2, 3], ...] = (2, 3)
     for fmi in versions:
         told(f"{len(plain)} FMUs of the catalogue, FMI {fmi}")
         _built(plain, out / "fmus", fmi, platform, told)
     systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
     asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
-    extra = [name for name in contents.buildable(asked) if name not in set(plain)]
+    fitting, impossible = contents.sorted_out(asked)
+    extra = [name for name in fitting if name not in set(plain)]
     told(f"{len(extra)} FMUs with effects for the diagnoses of {len(systems)} mappings")
     kept = cache_folder() / f"distribution-{platform}"
     paths = _built(extra, kept, 2, platform, told)
@@ -90,6 +93,7 @@ def make(
     instances = [name for item in systems for name in item.instances.values()]
     catalogue = _catalogue(list(dict.fromkeys([*plain, *map(_canonical, instances)])))
     catalogue["packs"] = {path.name: [file.stem for file in files] for path, files in jobs}
+    catalogue["impossible"] = [file_stem(name) for name in impossible]
     (out / CATALOGUE).write_text(json.dumps(catalogue, separators=(",", ":")), encoding="utf-8")
     targets = list(PLATFORMS) if platform == "all" else [host_platform()]
     for target in targets:

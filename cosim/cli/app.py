@@ -237,6 +237,8 @@ def leaving_nothing() -> Iterator[None]:
 
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
+    if note := distribution.shadowed():
+        say(note)
     try:
         with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
             app()

@@ -35,7 +35,7 @@ _QUANTITIES = {
     "rad": "angle", "deg": "angle", "rad/s": "angular speed", "rad/s2": "angular acceleration",
     "m": "length", "m/s": "speed", "m/s2": "acceleration", "N": "force", "N.m": "torque",
     "A": "current", "V": "voltage", "W": "power", "J": "energy", "kg": "mass", "s": "time",
-    "kg.m2": "inertia", "K": "temperature", "degC": "temperature", "1": "ratio", "ohm": "resistance",
+    "kg.m2": "inertia", "K": "temperature", "degC": "temperature", "1": "ratio",
 }  # fmt: skip
 """Unit -> what it measures, as axes are named."""
 

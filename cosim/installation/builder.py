@@ -36,8 +36,7 @@ def sources(module: str) -> ModuleType:
         return importlib.import_module(f"{places.sources_package()}.{module}")
     except ModuleNotFoundError as error:
         raise UnbuiltError(
-            f"building FMUs needs {error.name}, which is not installed: {way_out('build')}, or use "
-            "FMUs that are built already"
+            f"building FMUs needs {error.name}, which is not installed: {way_out('build')}"
         ) from error
 
 
@@ -57,6 +56,8 @@ def naming_errors() -> Iterator[None]:
         ) from error
 
 
+SHOWN = 80
+"""Characters of a variant's name in an error."""
 Told = Callable[[str, int, int], None]
 """Told of FMUs that are built: what is in work ("" for nothing), how many are done, of how many."""
 
@@ -84,6 +85,8 @@ class _Count:
             self._open.pop(variant, None)
             self._done += 1
             self._tell(next(iter(self._open), ""))
+            if not self._open:
+                self._done = 0
 
     def _tell(self, variant: str) -> None:
         if self.told is not None:
@@ -188,8 +191,11 @@ class Installed:
             self._builder = self._builder or Builder(told=self._told)
         except UnbuiltError as error:
             self.library.check(variant)
+            short = variant if len(variant) <= SHOWN else f"{variant[:SHOWN]}…"
+            near = self.library.near(variant)
+            there = f" (there is {' and '.join(near[:3])})" if near else ""
             raise UnbuiltError(
-                f"{variant!r} is not among the FMUs of this installation, and {error}"
+                f"{short} is not among the FMUs of this installation{there}, and {error}"
             ) from error
         return self._builder
 
@@ -199,7 +205,7 @@ class Installed:
         return found if found is not None else self._built(variant).path(variant)
 
     def _lacks(self, variants: Iterable[str]) -> list[str]:
-        return [name for name in variants if self.library.find(name) is None]
+        return [name for name in variants if not self.library.has(name)]
 
     def expect(self, variants: Iterable[str]) -> None:
         """As of `Builder`, for those that must be built."""

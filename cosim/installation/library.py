@@ -67,14 +67,27 @@ class Library:
         packs: Mapping[str, Sequence[str]] = self.content.get("packs", {})
         return {stem: name for name, stems in packs.items() for stem in stems}
 
+    @cached_property
+    def _impossible(self) -> frozenset[str]:
+        """Stems of variants whose effects do not fit together."""
+        return frozenset(self.content.get("impossible", ()))
+
+    def has(self, variant: str) -> bool:
+        """Whether the library has a variant's FMU for FMI 2, or knows that there is none."""
+        stem = file_stem(str(parse_name(variant)))
+        file = self.folder / "fmus" / "fmi2" / f"{stem}.fmu"
+        return stem in self._packed or stem in self._impossible or file.is_file()
+
     def find(self, variant: str, fmi: int = 2) -> Path | None:
         """Path of a variant's FMU, None if the library has none.
 
         Raises:
-            VariantError: the name does not follow the grammar.
+            VariantError: the name does not follow the grammar, or an effect fits no balance.
             CosimError: a pack is damaged.
         """
         stem = file_stem(str(parse_name(variant)))
+        if stem in self._impossible:
+            raise VariantError(f"{variant}: its effects do not fit")
         path = self.folder / "fmus" / f"fmi{fmi}" / f"{stem}.fmu"
         if path.is_file():
             return path
@@ -104,6 +117,15 @@ class Library:
         except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
             raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
         return pack(files)
+
+    def near(self, variant: str) -> list[str]:
+        """Packed variants with the same effect at a named balance."""
+        name = str(parse_name(variant))
+        base, _, effect = name.rpartition("+")
+        stem = file_stem(f"{name}@")
+        found = [item for item in self._packed if item.startswith(stem) and "+" not in
+                 item[len(stem):]] if effect else []  # fmt: skip
+        return [f"{base}+{effect}@{item[len(stem) :]}" for item in found]
 
     def check(self, variant: str) -> None:
         """Say which part of a variant's name does not exist, where the library knows that.

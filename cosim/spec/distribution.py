@@ -60,3 +60,20 @@ def needed(module: str, what: str, extra: str) -> Any:
         raise InputError(
             f"{what} needs {module.partition('.')[0]}, which is not installed: {way_out(extra)}"
         ) from error
+
+
+def shadowed() -> str:
+    """A note if the other package `cosim` is installed, too, which shares this one's folder.
+
+    A checkout has a folder of its own.
+    """
+    if _PROJECT.is_file():
+        return ""
+    try:
+        importlib.metadata.distribution("cosim")
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+    return (
+        "note: the package 'cosim' of another maker is installed, too, in the same folder: "
+        f"pip uninstall cosim, then pip install --force-reinstall --no-deps {NAME}"
+    )
