@@ -85,12 +85,16 @@ def plain(provider: Provider) -> list[str]:
     return list(found | asked.variants)
 
 
+def _has_data(path: Path) -> bool:
+    return (path.parent / "data").is_dir()
+
+
 def searched() -> list[Path]:
-    """Mappings below `scenarios/` whose systems are searched for what they lack.
+    """Mappings below `scenarios/` whose systems are searched for what they lack, rigs first.
 
     Those that another one names in `further` are not: what it finds is only judged on their runs.
     """
-    found = sorted(places.scenarios().rglob("*.toml"))
+    found = sorted(places.scenarios().rglob("*.toml"), key=lambda p: (not _has_data(p), p))
     tables = {p: read_mapping(p) for p in found if {"channels", "base"} & set(read_toml(p))}
     further = {p.parent / name for p, table in tables.items() for name in table.get("further", ())}
     return [path for path in tables if path not in further]

@@ -59,14 +59,14 @@ def site(bare: Path, made: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 def call(site: Path, work: Path, *arguments: str, blocked: str = "") -> tuple[int, str, str]:
-    program = "import sys\n"
+    program = f"import sys\nsys.path.insert(0, {str(site)!r})\n"
     if blocked:
         program += f"sys.modules[{blocked!r}] = None\n"
     program += f"sys.argv = ['cosim', *{list(arguments)!r}]\nfrom cosim.cli import main\nmain()\n"
     cache = {"COSIM_CACHE": str(work / "cache")} if blocked else {}
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=work, capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": str(site), **cache},
+        env={**os.environ, **cache},
     )  # fmt: skip
     return done.returncode, done.stdout, done.stderr
 
