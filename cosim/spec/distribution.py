@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import importlib.util
+import sys
 import tomllib
 from functools import lru_cache
 from pathlib import Path
@@ -63,17 +64,11 @@ def needed(module: str, what: str, extra: str) -> Any:
 
 
 def shadowed() -> str:
-    """A note if the other package `cosim` is installed, too, which shares this one's folder.
-
-    A checkout has a folder of its own.
-    """
-    if _PROJECT.is_file():
-        return ""
-    try:
-        importlib.metadata.distribution("cosim")
-    except importlib.metadata.PackageNotFoundError:
+    """A note if the other package `cosim` has put its `__init__` over ours; else ""."""
+    if hasattr(sys.modules[__name__.partition(".")[0]], "__all__"):
         return ""
     return (
-        "note: the package 'cosim' of another maker is installed, too, in the same folder: "
-        f"pip uninstall cosim, then pip install --force-reinstall --no-deps {NAME}"
+        "note: the package 'cosim' of another maker was installed over this one; commands work, "
+        f"'import cosim' does not: pip uninstall cosim, then pip install --force-reinstall "
+        f"--no-deps {NAME}"
     )

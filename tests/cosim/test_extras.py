@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -75,15 +76,7 @@ def test_the_distribution_is_the_one_of_pyproject() -> None:
     assert distribution.has("numpy") and not distribution.has("no_such_package")
 
 
-def test_the_other_package_of_this_name_is_noted(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(distribution, "_PROJECT", tmp_path / "none")
-    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+def test_the_other_package_of_this_name_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert distribution.shadowed() == ""
-    other = tmp_path / "cosim-0.0.0.dist-info"
-    other.mkdir()
-    (other / "METADATA").write_text("Name: cosim\nVersion: 0.0.0\n")
+    monkeypatch.setitem(sys.modules, "cosim", ModuleType("cosim"))  # as its __init__ leaves it
     assert "pip uninstall cosim, then pip install --force-reinstall" in distribution.shadowed()
-    monkeypatch.undo()
-    assert distribution.shadowed() == ""  # a checkout
