@@ -120,7 +120,7 @@ def _built(
         done += 1
         if time.monotonic() - last > 10.0:
             last = time.monotonic()
-            say(f"{done} of {len(names)}: {name}")
+            say(f"{done} of {len(names)}: {name[:80]}")
 
     return build_many(names, out=out, fmi=fmi, platform=platform, progress=progress)
 
