@@ -15,7 +15,7 @@ from ..data.signals import Table
 from ..errors import ScenarioError, UnitError, UnknownNameError, listing
 from ..files import flatten
 from ..spec.units import Unit
-from ..system.provider import Provider
+from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
 from .columns import ITEM, apart, expand
@@ -72,6 +72,7 @@ class Joined(MappedLogs):
         """The problem, on a system."""
         table = self.table
         model = Model.of(file, provider)
+        get_ready(provider, model.instances.values())
         self.system = model.plain({})
         constants: dict[str, float] = {}
         for name, value in flatten(table.get("parameters", {})).items():

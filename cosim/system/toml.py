@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..errors import ScenarioError, within
 from ..files import flatten, read_toml
 from ..reading.schema import Check, anything, keyed, list_of, table, text
-from .provider import Provider, get_ready
+from .provider import Provider
 from .system import System
 
 
@@ -56,7 +56,6 @@ class SystemFile:
         """
         system = System(self.name, provider, self.text)
         given = parameters or {}
-        get_ready(provider, self.instances.values())
         with within(self.shown or str(self.path)):
             for name, reference in self.instances.items():
                 system.add(name, reference, base=self.path.parent)

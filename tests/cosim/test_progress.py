@@ -85,7 +85,7 @@ def test_json_stays_alone_and_progress_goes_elsewhere(
 ) -> None:
     monkeypatch.setattr(progress, "EVERY", 0.0)
     monkeypatch.chdir(tmp_path)
-    arguments = ["cosim", "run", "motor_bench/ST1", "--duration", "0.2", "--json"]
+    arguments = ["cosim", "run", "motor_bench/ST1", "--step", "5e-5", "--json"]
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit) as end:
         cli.main()
