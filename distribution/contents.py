@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from cosim.calibrate.mapping import find_system, read_mapping
+from cosim.calibrate.mapping import find_system
 from cosim.calibrate.model import Model
 from cosim.calibrate.parts import Coarse
 from cosim.calibrate.problem import Problem
@@ -19,6 +19,7 @@ from cosim.diagnose.localise import PROBE
 from cosim.diagnose.probes import batches
 from cosim.files import read_toml
 from cosim.installation import places
+from cosim.installation.examples import read_mapping
 from cosim.running.runner import prepare
 from cosim.scenario.scenario import scenario_files
 from cosim.spec.variant import parse_name

@@ -17,28 +17,12 @@ from ..data.logs import DataSet, read_data_set, runs_of
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import read_toml
 from ..installation import builder, places
+from ..installation.examples import example_sets, named_mappings, read_mapping
 from ..system.provider import Provider
 from ..system.toml import SystemFile, read_system
 from .joining import Joined
 from .problem import Problem
 from .schema import check_mapping
-
-
-def example_sets() -> dict[str, Path]:
-    """Data sets that come with cosim: name -> folder."""
-    found = sorted(places.scenarios().glob("*/data/*/set.toml"))
-    return {path.parent.name: path.parent for path in found}
-
-
-def named_mappings() -> dict[str, Path]:
-    """Mappings that come with cosim: `emps` for its dataset.toml, `emps/open_loop` for others."""
-    found = {}
-    for path in sorted(places.scenarios().glob("*/*.toml")):
-        table = read_toml(path)
-        if "channels" in table or "base" in table:
-            folder = path.parent.name
-            found[folder if path.stem == "dataset" else f"{folder}/{path.stem}"] = path
-    return found
 
 
 def _folder(given: Path) -> Path:
@@ -151,14 +135,6 @@ def read_problem(
         for name in table.get("further", [])
     ]
     return Joined(path, table, data, only or {}).problem(file, provider).changed(further=further)
-
-
-def read_mapping(path: Path) -> dict[str, Any]:
-    """A mapping file; what it does not say is as in the file that it names as its `base`."""
-    table = read_toml(path)
-    if "base" not in table:
-        return table
-    return {**read_mapping(path.parent / str(table["base"])), "further": [], **table}
 
 
 def _asked(table: Mapping[str, Any]) -> set[str]:

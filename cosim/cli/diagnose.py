@@ -57,7 +57,7 @@ def diagnose_command(
             stage = text
             display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
 
-        with display.watch("diagnosing", lambda: f"after: {stage}"):
+        with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
             result = diagnose(problem, folder, told, workers=workers)
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)

@@ -28,6 +28,7 @@ class Display:
         self._tasks: dict[str, Any] = {}
         self._begun: dict[str, float] = {}
         self._told = time.monotonic()
+        self._last = ("", "")
 
     def __enter__(self) -> Display:
         if sys.stderr.isatty():
@@ -58,6 +59,11 @@ class Display:
         if self._bars is not None:
             self._bars.stop()
 
+    @property
+    def on_terminal(self) -> bool:
+        """Whether there are bars."""
+        return self._bars is not None
+
     def update(
         self, task: str, done: float, total: float | None = None, *, text: str = "", count: str = ""
     ) -> None:
@@ -80,8 +86,8 @@ class Display:
                     self._tasks[task], description=text or task, completed=done, total=total,
                     count=shown,
                 )  # fmt: skip
-            elif now - self._told >= EVERY:
-                self._told = now
+            elif now - self._told >= EVERY and (text, shown) != self._last:
+                self._told, self._last = now, (text, shown)
                 left = _left(now - self._begun[task], done, total)
                 said = ", ".join(part for part in (shown.strip(), left) if part)
                 say(f"{text or task}{': ' if said else ''}{said}")
@@ -95,12 +101,13 @@ class Display:
 
     @contextmanager
     def watch(self, task: str, look: Callable[[], str]) -> Iterator[None]:
-        """Show what `look` says, again and again, as long as the block runs."""
+        """Show what `look` says, again and again, as long as the block runs; "" is not shown."""
         done = threading.Event()
 
         def again() -> None:
             while not done.wait(0.5):
-                self.update(task, 0.0, text=look())
+                if text := look():
+                    self.update(task, 0.0, text=text)
 
         thread = threading.Thread(target=again, daemon=True)
         thread.start()

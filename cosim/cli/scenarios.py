@@ -71,12 +71,14 @@ def _scenarios() -> Iterator[dict[str, Any]]:
 
 
 def _logs() -> Iterator[dict[str, Any]]:
-    from ..calibrate.mapping import example_sets, find_mapping
     from ..files import read_toml
+    from ..installation.examples import example_sets, named_mappings, read_mapping
 
+    mappings = [read_mapping(path) for path in named_mappings().values()]
     for name, folder in example_sets().items():
         table = read_toml(folder / "set.toml")
-        mapping = read_toml(find_mapping(folder, str(table.get("rig", ""))))
+        own = [item for item in mappings if item.get("rig") == table.get("rig")]
+        mapping = own[0] if own else {}
         yield {
             "kind": "logs",
             "name": name,
@@ -104,8 +106,8 @@ def _studies() -> Iterator[dict[str, Any]]:
 
 
 def _public() -> Iterator[dict[str, Any]]:
-    from ..calibrate.mapping import example_sets, named_mappings, read_mapping
     from ..files import read_toml
+    from ..installation.examples import example_sets, named_mappings, read_mapping
 
     sets = [read_toml(folder / "set.toml") for folder in example_sets().values()]
     shown = {table.get("rig") for table in sets}

@@ -44,6 +44,16 @@ def test_elsewhere_a_line_comes_every_few_seconds(
     ]  # fmt: skip
 
 
+def test_what_does_not_change_is_said_once(
+    clock: list[float], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Display() as display:
+        for text in ("round 1", "round 1", "round 2"):
+            clock[0] += 6.0
+            display.update("diagnosing", 0.0, text=text)
+    assert capsys.readouterr().err.splitlines() == ["round 1", "round 2"]
+
+
 def test_what_is_quick_says_nothing(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     with Display() as display:
         display.update("run", 0.0, 1.0)
@@ -85,7 +95,7 @@ def test_json_stays_alone_and_progress_goes_elsewhere(
 ) -> None:
     monkeypatch.setattr(progress, "EVERY", 0.0)
     monkeypatch.chdir(tmp_path)
-    arguments = ["cosim", "run", "motor_bench/ST1", "--step", "5e-5", "--json"]
+    arguments = ["cosim", "run", "motor_bench/ST1", "--duration", "2", "--json"]
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit) as end:
         cli.main()
