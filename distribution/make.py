@@ -1,7 +1,8 @@
 """Makes what a wheel carries: `python -m distribution`, then `pip wheel`; `make wheel` does both.
 
-FMUs of the catalogue as files, in FMI 2 and 3; variants with effects, which diagnoses need, in
-packs; the compiled executor; and what the sources would say, so that nothing of it needs CasADi.
+FMUs of the catalogue as files, in FMI 2 and 3; in packs those of other devices, in both, and
+variants with effects, which diagnoses need, in FMI 2; the compiled executor; and what the sources
+would say, so that nothing of it needs CasADi.
 """
 
 from __future__ import annotations
@@ -67,32 +68,34 @@ def make(
     shutil.rmtree(out, ignore_errors=True)
     (out / "packs").mkdir(parents=True)
     plain = contents.plain(provider) if plain is None else list(plain)
-    versions: tuple[Literal[2, 3], ...] = (2, 3)
-    for fmi in versions:
-        told(f"{len(plain)} FMUs of the catalogue, FMI {fmi}")
-        _built(plain, out / "fmus", fmi, platform, told)
     systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
     asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
     fitting, impossible = contents.sorted_out(asked)
     extra = [name for name in fitting if name not in set(plain)]
-    told(f"{len(extra)} FMUs with effects for the diagnoses of {len(systems)} mappings")
     kept = cache_folder() / f"distribution-{platform}"
-    paths = _built(extra, kept, 2, platform, told)
-    groups: dict[str, list[Path]] = {}
-    for name, path in zip(extra, paths, strict=True):
-        base = parse_name(name)
-        groups.setdefault(file_stem(f"{base.model}/{base.fidelity}"), []).append(path)
+    packed: dict[str, list[tuple[str, Path]]] = {}
+    catalogued = set(catalog.names())
+    versions: tuple[Literal[2, 3], ...] = (2, 3)
+    for fmi in versions:
+        own = [name for name in plain if name in catalogued]
+        told(f"{len(own)} FMUs of the catalogue, FMI {fmi}")
+        _built(own, out / "fmus", fmi, platform, told)
+        others = [name for name in plain if name not in catalogued] + (extra if fmi == 2 else [])
+        told(f"{len(others)} FMUs of other devices and with effects, FMI {fmi}")
+        paths = _built(others, kept, fmi, platform, told)
+        for name, path in zip(others, paths, strict=True):
+            packed.setdefault(_group(name, fmi), []).append((f"{fmi}/{path.stem}", path))
     jobs = [
-        (out / "packs" / f"{stem}.{first // PACKED}.tar.xz", tuple(files[first : first + PACKED]))
-        for stem, files in sorted(groups.items())
-        for first in range(0, len(files), PACKED)
+        (out / "packs" / f"{group}.{first // PACKED}.tar.xz", fmus[first : first + PACKED])
+        for group, fmus in sorted(packed.items())
+        for first in range(0, len(fmus), PACKED)
     ]
     told(f"{len(jobs)} packs")
     with ProcessPoolExecutor() as pool:
         list(pool.map(write_pack, *zip(*jobs, strict=True)) if jobs else ())
     instances = [name for item in systems for name in item.instances.values()]
     catalogue = _catalogue(list(dict.fromkeys([*plain, *map(_canonical, instances)])))
-    catalogue["packs"] = {path.name: [file.stem for file in files] for path, files in jobs}
+    catalogue["packs"] = {path.name: [key for key, _ in fmus] for path, fmus in jobs}
     catalogue["impossible"] = [file_stem(name) for name in impossible]
     (out / CATALOGUE).write_text(json.dumps(catalogue, separators=(",", ":")), encoding="utf-8")
     targets = list(PLATFORMS) if platform == "all" else [host_platform()]
@@ -100,6 +103,13 @@ def make(
         build_kernel(kernel.SOURCES, out / "kernel" / kernel.library_name(target), target)
     (out / "tag").write_text("any" if platform == "all" else TAGS[targets[0]], encoding="ascii")
     told(f"done: {sum(p.stat().st_size for p in out.rglob('*') if p.is_file()) / 1e6:.1f} MB")
+
+
+def _group(name: str, fmi: int) -> str:
+    """Of FMUs that share most: those of one component, or of one fidelity of a device."""
+    parsed = parse_name(name)
+    many = f"{parsed.model}/{parsed.fidelity}" if parsed.effects else parsed.component
+    return f"fmi{fmi}-{file_stem(many)}"
 
 
 def _canonical(name: str) -> str:
@@ -125,16 +135,16 @@ def _built(
     return build_many(names, out=out, fmi=fmi, platform=platform, progress=progress)
 
 
-def write_pack(path: Path, fmus: Sequence[Path]) -> None:
-    """Write what several FMUs contain, the same bytes for the same FMUs."""
+def write_pack(path: Path, fmus: Sequence[tuple[str, Path]]) -> None:
+    """Write what several FMUs contain, each below its key; the same bytes for the same FMUs."""
     with (
         lzma.open(path, "wb", preset=6) as stream,
         tarfile.open(fileobj=stream, mode="w", format=tarfile.PAX_FORMAT) as archive,
     ):
-        for fmu in fmus:
+        for key, fmu in fmus:
             with zipfile.ZipFile(fmu) as content:
                 for name in content.namelist():
-                    info = tarfile.TarInfo(f"{fmu.stem}/{name}")
+                    info = tarfile.TarInfo(f"{key}/{name}")
                     info.size = content.getinfo(name).file_size
                     archive.addfile(info, io.BytesIO(content.read(name)))
 

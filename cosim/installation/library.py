@@ -63,9 +63,9 @@ class Library:
 
     @cached_property
     def _packed(self) -> dict[str, str]:
-        """Stem of an FMU -> its pack."""
+        """FMI version and stem of an FMU, as in `2/gearbox-elastic` -> its pack."""
         packs: Mapping[str, Sequence[str]] = self.content.get("packs", {})
-        return {stem: name for name, stems in packs.items() for stem in stems}
+        return {key: name for name, keys in packs.items() for key in keys}
 
     @cached_property
     def _impossible(self) -> frozenset[str]:
@@ -76,7 +76,7 @@ class Library:
         """Whether the library has a variant's FMU for FMI 2, or knows that there is none."""
         stem = file_stem(str(parse_name(variant)))
         file = self.folder / "fmus" / "fmi2" / f"{stem}.fmu"
-        return stem in self._packed or stem in self._impossible or file.is_file()
+        return f"2/{stem}" in self._packed or stem in self._impossible or file.is_file()
 
     def find(self, variant: str, fmi: int = 2) -> Path | None:
         """Path of a variant's FMU, None if the library has none.
@@ -91,28 +91,29 @@ class Library:
         path = self.folder / "fmus" / f"fmi{fmi}" / f"{stem}.fmu"
         if path.is_file():
             return path
-        if fmi != 2 or stem not in self._packed:
+        key = f"{fmi}/{stem}"
+        if key not in self._packed:
             return None
         kept = cache_folder() / "library" / hashlib.sha256(self._text).hexdigest()[:16]
-        path = kept / f"{stem}.fmu"
+        path = kept / f"fmi{fmi}" / f"{stem}.fmu"
         if path.is_file() and sealed(path, path.read_bytes()):
             return path
-        content = self._unpacked(self._packed[stem], stem)
+        content = self._unpacked(self._packed[key], key)
         with atomic(seal(path)) as temporary:
             temporary.write_text(hashlib.sha256(content).hexdigest(), encoding="ascii")
         with atomic(path) as temporary:
             temporary.write_bytes(content)
         return path
 
-    def _unpacked(self, name: str, stem: str) -> bytes:
+    def _unpacked(self, name: str, key: str) -> bytes:
         path = self.folder / "packs" / name
         try:
             with tarfile.open(path, "r|xz") as archive:
                 files = {
-                    inner: file.read()
+                    member.name.removeprefix(f"{key}/"): file.read()
                     for member in archive
-                    for folder, _, inner in [member.name.partition("/")]
-                    if folder == stem and (file := archive.extractfile(member)) is not None
+                    if member.name.startswith(f"{key}/")
+                    and (file := archive.extractfile(member)) is not None
                 }
         except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
             raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
@@ -121,11 +122,11 @@ class Library:
     def near(self, variant: str) -> list[str]:
         """Packed variants with the same effect at a named balance."""
         name = str(parse_name(variant))
-        base, _, effect = name.rpartition("+")
-        stem = file_stem(f"{name}@")
-        found = [item for item in self._packed if item.startswith(stem) and "+" not in
-                 item[len(stem):]] if effect else []  # fmt: skip
-        return [f"{base}+{effect}@{item[len(stem) :]}" for item in found]
+        if not parse_name(name).effects or "@" in name:
+            return []
+        begin = f"2/{file_stem(f'{name}@')}"
+        ends = [key.removeprefix(begin) for key in self._packed if key.startswith(begin)]
+        return [f"{name}@{end}" for end in ends if "+" not in end]
 
     def check(self, variant: str) -> None:
         """Say which part of a variant's name does not exist, where the library knows that.
