@@ -83,7 +83,7 @@ class Log:
         return self["time"]
 
 
-_READERS = {
+READERS = {
     ".csv": text_table, ".tsv": text_table, ".txt": text_table,
     ".parquet": parquet_table, ".npz": npz_table, ".mat": matlab_table,
 }  # fmt: skip
@@ -100,9 +100,9 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
         near = _beside(path)
         beside = f"; in its folder {listing(near, path.name)}" if near else ""
         raise ScenarioError(f"{path}: there is no such file{beside}")
-    reader = _READERS.get(path.suffix.lower())
+    reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ScenarioError(f"{path}: logs are {', '.join(_READERS)} files")
+        raise ScenarioError(f"{path}: logs are {', '.join(READERS)} files")
     table = reader(path)
     return Log(
         path.name, table.columns, {**table.units, **(units or {})}, gaps=table.gaps,

@@ -1,0 +1,21 @@
+"""Angles that begin anew at a turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...calibrate.checks.finding import Finding
+from ..clock import Clock
+from ..guess import turn_of
+from ..topic import Topic
+
+
+def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
+    """Columns that jump by a turn (`guess.turn_of`)."""
+    for name, values in topic.log.columns.items():
+        if name == clock.column:
+            continue
+        unit, turn, count = turn_of(values)
+        if unit:
+            text = f"begins anew at a turn of {turn:.4g} {unit}, {count} times: unwrap = true"
+            yield Finding("note", "wrapped", topic.name, name, text)

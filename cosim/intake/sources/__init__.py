@@ -1,0 +1,29 @@
+"""Files of logs as topics: one file per kind of source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...data.logs import READERS
+from ...errors import ScenarioError
+from ..topic import Source
+from . import tables
+
+KINDS = {suffix: tables.read for suffix in READERS}
+"""Reader of each end of a file's name."""
+
+
+def open_source(path: Path, topics: tuple[str, ...] = ()) -> Source:
+    """Read a log.
+
+    Args:
+        path: of a file, or of the folder of a ROS 2 bag.
+        topics: only these, all if not given.
+
+    Raises:
+        ScenarioError: missing, of an unknown kind, or unreadable.
+    """
+    reader = KINDS.get(path.suffix.lower())
+    if reader is None:
+        raise ScenarioError(f"{path}: logs are {', '.join(KINDS)} files")
+    return reader(path, topics)
