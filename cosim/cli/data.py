@@ -25,6 +25,8 @@ Files = Annotated[
 Topics = Annotated[
     list[str] | None, typer.Option("--topic", help="Of a bag: only this topic (again for more).")
 ]
+SMOOTH = 0.2
+"""Steps of resolution below which noise is none: rounding alone makes 0.29 of one."""
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -39,7 +41,6 @@ def inspect_command(
 
     Example: `cosim data inspect log.csv --plot log.png`
     """
-    from ..calibrate.checks.finding import lines
     from ..intake.inspect import inspect
     from ..intake.picture import draw
 
@@ -59,8 +60,10 @@ def inspect_command(
     for report in reports:
         _print(console, report)
         for topic in report.topics:
-            for line in lines(topic.findings):
-                console.print(f"  {line}", soft_wrap=True, markup=False, highlight=False)
+            for found in topic.findings:
+                column = f"{found.column}: " if found.column else ""
+                console.print(f"  {found.severity}: {column}{found.text}", soft_wrap=True,
+                              markup=False, highlight=False)  # fmt: skip
     for name in made:
         console.print(f"picture: {name}", soft_wrap=True, markup=False)
 
@@ -89,7 +92,7 @@ def _row(column: ColumnReport) -> list[str]:
     return [
         escape(column.name), unit if column.unit.sure or unit == "?" else f"{unit} (guessed)",
         escape(column.unit.reason), f"{column.low:.5g}", f"{column.high:.5g}",
-        f"{column.resolution:.3g}", f"{column.noise:.3g}" if column.noise else "-",
+        f"{column.resolution:.3g}", f"{column.noise:.3g}" if column.noise > SMOOTH * column.resolution else "-",
         str(column.missing) if column.missing else "-",
     ]  # fmt: skip
 

@@ -38,6 +38,7 @@ def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
             offset = float(a.mean() - gain * b.mean())
             if gain and np.max(np.abs(a - gain * b - offset)) < EXACT * np.ptp(a):
                 same = abs(gain - 1.0) < EXACT and abs(offset) < EXACT * np.ptp(a)
-                how = "a copy of" if same else f"{gain:.6g} times {offset:+.4g} from"
-                yield Finding("note", "copy", topic.name, name, f"is {how} {other}")
+                plus = f" plus {offset:.4g}" if abs(offset) > EXACT * np.ptp(a) else ""
+                how = f"a copy of {other}" if same else f"{gain:.6g} times {other}{plus}"
+                yield Finding("note", "copy", topic.name, name, f"is {how}")
                 break
