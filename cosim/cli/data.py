@@ -89,10 +89,11 @@ def _row(column: ColumnReport) -> list[str]:
     from rich.markup import escape
 
     unit = column.unit.unit or "?"
+    noise = f"{column.noise:.3g}" if column.noise > SMOOTH * column.resolution else "-"
     return [
         escape(column.name), unit if column.unit.sure or unit == "?" else f"{unit} (guessed)",
         escape(column.unit.reason), f"{column.low:.5g}", f"{column.high:.5g}",
-        f"{column.resolution:.3g}", f"{column.noise:.3g}" if column.noise > SMOOTH * column.resolution else "-",
+        f"{column.resolution:.3g}", noise,
         str(column.missing) if column.missing else "-",
     ]  # fmt: skip
 
