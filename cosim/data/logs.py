@@ -45,6 +45,7 @@ class Log:
         origins: what was taken off all values of a column so that the rest is exact.
         notes: what was assumed in reading.
         exact: values that doubles do not carry, as they are: texts, and integers beyond 2^53.
+        own: times and values of columns that are held on a clock of their own.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Log:
     origins: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     exact: Mapping[str, list[Any]] = field(default_factory=dict)
+    own: Mapping[str, tuple[Vector, Vector]] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Vector:
         """A column.
