@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +16,9 @@ from .streams import print_json
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..intake.importing import Imported
     from ..intake.inspect import ColumnReport, FileReport, TopicReport
+    from ..intake.matching import Column, Match, Place
 
 data_app = typer.Typer(help="Logs: what is in them, and how they map to a system.",
                        no_args_is_help=True)  # fmt: skip
@@ -111,3 +115,165 @@ def clock_line(topic: TopicReport) -> str:
         f"{rows} rows, {rate} for {clock.duration:.4g} s (jitter {clock.jitter:.1%}), clock "
         f"{clock.column} in {unit}: {clock.unit.reason}{began}"
     )
+
+
+@data_app.command("import")
+def import_command(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILE...", help="Logs; each is a run, or grouped by their names."),
+    ] = None,
+    system: Annotated[
+        str, typer.Option(help="A system's name, or the path of its .toml file.")
+    ] = "",
+    runs: Annotated[
+        list[str] | None,
+        typer.Option("--run", metavar="NAME=FILE,FILE", help="A run of these files."),
+    ] = None,
+    validation: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A run that is not fitted [the last of several]."),
+    ] = None,
+    maps: Annotated[
+        list[str] | None,
+        typer.Option("--map", metavar="COLUMN=VARIABLE[:UNIT]", help="What a column is."),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--parameter",
+            metavar="NAME[=NOMINAL[:MIN:MAX]]",
+            help="What is estimated [what the logs tell].",
+        ),
+    ] = None,
+    topics: Topics = None,
+    clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("dataset"),
+    as_json: AsJson = False,
+) -> None:
+    """Make a data set of logs: a folder with the logs and a mapping with comments to a system.
+
+    Example: `cosim data import a.csv b.csv --system motor_bench --out my_motor`
+    """
+    from ..installation.builder import default_provider
+    from ..intake.given import parameters_of, runs_of
+    from ..intake.importing import Wishes, import_logs
+    from ..intake.runs import grouped, purposes
+
+    if not system:
+        raise InputError(f"--system is missing; {_systems()}")
+    named = grouped(files or [], runs_of(runs or []))
+    chosen = purposes(list(named), validation or [])
+    if len(named) > 1 and not validation:
+        say(f"note: run {list(named)[-1]} is not fitted but judged (another with --validation)")
+    if len(named) == 1:
+        say("note: there is one run only, so nothing is left to judge what is fitted")
+    wishes = Wishes(system, maps or (), parameters_of(parameters or []), tuple(topics or ()), clock)
+    done = import_logs(
+        named, chosen, wishes, out, default_provider(), _ask if _somebody() else None
+    )
+    for note in done.notes:
+        say(f"note: {note}")
+    if as_json:
+        print_json(_imported(done))
+    else:
+        _print_imported(open_console(), done)
+    bad = [f for f in done.findings if f.severity == "error"]
+    if bad:
+        raise InputError(
+            f"{done.folder}: is written, but `cosim calibrate` will refuse it as it is; mend "
+            f"{done.folder / 'dataset.toml'} as said above"
+        )
+
+
+def _systems() -> str:
+    from ..errors import listing
+    from ..installation import places
+
+    folder = places.scenarios()
+    known = [p.stem for p in sorted((folder / "systems").glob("*.toml"))]
+    known += [p.parent.name for p in sorted(folder.glob("*/system.toml"))]
+    return f"name one, or give the path of a .toml file; {listing(known, limit=40)}"
+
+
+def _somebody() -> bool:
+    """Whether somebody can answer."""
+    return sys.stdin is not None and sys.stdin.isatty()
+
+
+def _ask(place: Place, columns: Sequence[Column]) -> str:
+    """Ask for the column of an input, by number, by name, or a constant."""
+    say(f"\n{place.name} ({place.text or 'input'}, in {place.unit or '?'}) - which column is it?")
+    for number, column in enumerate(columns, 1):
+        say(f"  {number}) {column.source} [{column.unit.unit or '?'}: {column.unit.reason}]")
+    say("  or c=VALUE for a constant")
+    while True:
+        answer = str(typer.prompt("number", err=True)).strip()
+        if answer.startswith("c=") and _is_number(answer[2:]):
+            return answer[2:]
+        if answer.isdigit() and 1 <= int(answer) <= len(columns):
+            return columns[int(answer) - 1].source
+        if answer in [column.source for column in columns]:
+            return answer
+        say(f"{answer!r} is none of them; write a number from 1 to {len(columns)}, or c=0")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _imported(done: Imported) -> dict[str, Any]:
+    """For JSON."""
+    matches = done.matches
+    return {
+        "folder": str(done.folder), "mapping": str(done.folder / "dataset.toml"),
+        "inputs": {n: _match(m) for n, m in matches.inputs.items()},
+        "channels": {n: _match(m) for n, m in matches.channels.items()},
+        "constants": matches.constants,
+        "unused": [c.source for c in done.columns if c.source not in matches.used()],
+        "parameters": list(done.parameters),
+        "runs": {run.name: run.purpose for run in done.runs},
+        "findings": [f.to_dict() for f in done.findings], "notes": list(done.notes),
+    }  # fmt: skip
+
+
+def _match(match: Match) -> dict[str, str]:
+    return {"column": match.column.source, "unit": match.column.unit.unit,
+            "unit_reason": match.column.unit.reason, "reason": match.reason}  # fmt: skip
+
+
+def _print_imported(console: Console, done: Imported) -> None:
+    from rich.markup import escape
+
+    from ..calibrate.checks.finding import lines
+
+    matches = done.matches
+    table = new_table("column", "unit", "is", "variable", "in", "because")
+    for what, found in (("drives", matches.inputs), ("measures", matches.channels)):
+        for name, match in found.items():
+            unit = match.column.unit
+            table.add_row(*map(escape, (
+                match.column.source, unit.unit + ("" if unit.sure else " (guessed)"), what, name,
+                match.place.unit, match.reason,
+            )))  # fmt: skip
+    console.print(table)
+    for name, value in matches.constants.items():
+        console.print(f"{name} is held at {value:g}", markup=False)
+    unused = [c.source for c in done.columns if c.source not in matches.used()]
+    for source in unused:
+        rivals = matches.unsure.get(source)
+        more = f"; may be {' or '.join(rivals)}: --map '{source}={rivals[0]}'" if rivals else ""
+        console.print(f"not used: {source}{more}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"estimated: {', '.join(done.parameters) or 'nothing'}", soft_wrap=True)
+    for run in done.runs:
+        console.print(f"run {run.name}: {run.purpose}", markup=False, highlight=False)
+    for line in lines(done.findings):
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
+    console.print(f"written: {done.folder / 'dataset.toml'}", soft_wrap=True, markup=False)
+    if not any(f.severity == "error" for f in done.findings):
+        console.print(f"next: read it, then  cosim calibrate {done.folder}", soft_wrap=True,
+                      markup=False)  # fmt: skip

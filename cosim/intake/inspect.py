@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,17 +89,21 @@ class FileReport:
         }  # fmt: skip
 
 
-def inspect(path: Path | str, topics: Iterable[str] = ()) -> FileReport:
+def inspect(path: Path | str, topics: Iterable[str] = (), clock: str = "") -> FileReport:
     """What is in a file.
 
     Args:
         path: of the log.
         topics: only these, all if not given.
+        clock: column of times of the topics that have it; found by itself if not given.
 
     Raises:
         ScenarioError: it cannot be read.
     """
     source = open_source(Path(path), tuple(topics))
+    if clock:
+        timed = [replace(t, clock=clock) if clock in t.log.columns else t for t in source.topics]
+        source = replace(source, topics=tuple(timed))
     return FileReport(source, tuple(inspect_topic(topic) for topic in source.topics))
 
 
