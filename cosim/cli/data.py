@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +17,7 @@ from .streams import print_json
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..calibrate.checks.finding import Finding
     from ..intake.importing import Imported
     from ..intake.inspect import ColumnReport, FileReport, TopicReport
     from ..intake.matching import Column, Match, Place
@@ -64,7 +66,7 @@ def inspect_command(
     for report in reports:
         _print(console, report)
         for topic in report.topics:
-            for found in topic.findings:
+            for found in gathered(topic.findings):
                 column = f"{found.column}: " if found.column else ""
                 console.print(f"  {found.severity}: {column}{found.text}", soft_wrap=True,
                               markup=False, highlight=False)  # fmt: skip
@@ -87,6 +89,16 @@ def _print(console: Console, report: FileReport) -> None:
         console.print(table)
     for name, why in report.source.left.items():
         console.print(f"  left out: {name}: {why}", soft_wrap=True, markup=False, highlight=False)
+
+
+def gathered(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings that say the same of several columns as one."""
+    alike: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        alike.setdefault((finding.severity, finding.kind, finding.text), []).append(finding)
+    return [
+        replace(group[0], column=", ".join(f.column for f in group)) for group in alike.values()
+    ]  # fmt: skip
 
 
 def _row(column: ColumnReport) -> list[str]:

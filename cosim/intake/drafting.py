@@ -177,10 +177,14 @@ def _column(
         keys["time"] = f"{column.part}.{clock_column(part, plan.whole)}"
         if drives:
             keys["hold"] = True
+    stated = part.report.topic.log.units.get(column.name) == unit.unit or (
+        not plan.whole and unit.sure and "--map" not in unit.reason
+    )
     if unit.unit:
-        keys["from"] = unit.unit
+        if not stated:
+            keys["from"] = unit.unit
         remarks.append(f"In {unit.unit}: {unit.reason}{'' if unit.sure else ' (a guess)'}.")
-    if match.place.unit and unit.unit:
+    if match.place.unit and unit.unit and not (stated and match.place.unit == unit.unit):
         keys["unit"] = match.place.unit
     if not drives and any(
         turn_of(r.parts[column.part].report.topic.log[column.name])[0] for r in runs

@@ -42,7 +42,10 @@ KNOWN = 0.3
 """Share of its value to which a parameter must be told by the logs to be estimated."""
 WIDE = 3.0
 """Bounds of a parameter are its value over this, and times this."""
-NEARER = 1.01
+APART = 1e-3
+"""Share of what the logs tell of a parameter that must be left beside the others: differences with
+a step of 5e-3 leave 2.5e-5 of two that do the same."""
+NEARER = 2.0
 """What a parameter counts more that belongs to what is measured, where another does the same."""
 BUILT = ("ratio", "teeth", "poles", "counts")
 """Words of parameters that are known from how a machine is built."""
@@ -283,26 +286,26 @@ def told(problem: Problem, tried: Sequence[Parameter]) -> list[str]:
             information[index, index] - cross @ np.linalg.lstsq(block, cross, rcond=1e-12)[0]
         )
 
-    least = 1.0 / KNOWN**2
+    def enough(index: int, others: Sequence[int]) -> bool:
+        rest = conditional(index, others)
+        return rest >= max(1.0 / KNOWN**2, APART * information[index, index])
+
+    def worth(index: int) -> float:
+        near = both.parameters[index].name.partition(".")[0] in measured
+        return conditional(index, kept) * (NEARER if near else 1.0)
+
     while left:
-        worth = {
-            i: conditional(i, kept)
-            * (NEARER if both.parameters[i].name.partition(".")[0] in measured else 1.0)
-            for i in left
-        }
-        best = max(left, key=lambda i: worth[i])
-        if worth[best] < least:
-            break
-        kept.append(best)
+        best = max(left, key=worth)
         left.remove(best)
+        if enough(best, kept):
+            kept.append(best)
     chosen = kept[len(own) :]
-    while chosen:
-        worst = min(
-            chosen, key=lambda i: conditional(i, [k for k in [*range(len(own)), *chosen] if k != i])
-        )
-        if conditional(worst, [k for k in [*range(len(own)), *chosen] if k != worst]) >= least:
-            break
-        chosen.remove(worst)
+
+    def others(index: int) -> list[int]:
+        return [k for k in [*range(len(own)), *chosen] if k != index]
+
+    while lacking := [i for i in chosen if not enough(i, others(i))]:
+        chosen.remove(min(lacking, key=lambda i: conditional(i, others(i))))
     return [both.parameters[i].name for i in chosen]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from ...data.logs import READERS
 from ...errors import ScenarioError
 from ..topic import Source
-from . import tables
+from . import bags, tables
 
 KINDS = {suffix: tables.read for suffix in READERS}
 """Reader of each end of a file's name."""
@@ -23,7 +23,13 @@ def open_source(path: Path, topics: tuple[str, ...] = ()) -> Source:
     Raises:
         ScenarioError: missing, of an unknown kind, or unreadable.
     """
+    if bags.is_bag(path):
+        return bags.read(path, topics)
     reader = KINDS.get(path.suffix.lower())
     if reader is None:
-        raise ScenarioError(f"{path}: logs are {', '.join(KINDS)} files")
+        what = "is a folder without metadata.yaml" if path.is_dir() else "is of no known kind"
+        raise ScenarioError(
+            f"{path}: {what}; logs are {', '.join((*KINDS, *bags.ENDS))} files and the folders of "
+            "ROS 2 bags"
+        )
     return reader(path, topics)
