@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownNameError, listing
 from .parts import CLOCK, Channel, Parameter
+
+if TYPE_CHECKING:
+    from .estimate import Estimate
 
 Vector = NDArray[np.float64]
 
@@ -30,6 +34,21 @@ def check_clock(target: str, channels: Iterable[str], where: str) -> None:
 def clocked(parameters: Iterable[Parameter]) -> set[str]:
     """Channels whose clock a parameter sets."""
     return {n.removeprefix(CLOCK) for p in parameters for n, _ in p.targets if n.startswith(CLOCK)}
+
+
+def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
+    """How late clocks were found to be, by the name of the parameter."""
+    return {
+        p.name: {
+            "value": float(estimate.theta[i]),
+            "ci95": [float(estimate.low[i]), float(estimate.high[i])],
+            "unit": p.unit,
+            "identifiable": bool(estimate.identifiable[i]),
+            "at_bound": p.name in estimate.at_bound,
+        }
+        for i, p in enumerate(estimate.problem.parameters)
+        if clocked([p])
+    }
 
 
 def bounds(parameters: Iterable[Parameter], run: str) -> dict[str, tuple[float, float]]:

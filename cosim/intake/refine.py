@@ -288,7 +288,7 @@ def told(problem: Problem, tried: Sequence[Parameter]) -> list[str]:
 
     def enough(index: int, others: Sequence[int]) -> bool:
         rest = conditional(index, others)
-        return rest >= max(1.0 / KNOWN**2, APART * information[index, index])
+        return bool(rest >= max(1.0 / KNOWN**2, APART * information[index, index]))
 
     def worth(index: int) -> float:
         near = both.parameters[index].name.partition(".")[0] in measured

@@ -7,9 +7,12 @@ from pathlib import Path
 from ...data.logs import READERS
 from ...errors import ScenarioError
 from ..topic import Source
-from . import bags, tables
+from . import bags, tables, ulogs
 
-KINDS = {suffix: tables.read for suffix in READERS}
+KINDS = {
+    **{suffix: tables.read for suffix in READERS},
+    **{suffix: ulogs.read for suffix in ulogs.ENDS},
+}
 """Reader of each end of a file's name."""
 
 
