@@ -194,7 +194,8 @@ def import_command(
     if bad:
         raise InputError(
             f"{done.folder}: is written, but `cosim calibrate` will refuse it as it is; mend "
-            f"{done.folder / 'dataset.toml'} as said above"
+            f"{done.folder / 'dataset.toml'} as said above, or import again with --map, and with "
+            "--parameter NAME=VALUE where the system's values are those of another machine"
         )
 
 
@@ -245,7 +246,7 @@ def _imported(done: Imported) -> dict[str, Any]:
         "folder": str(done.folder), "mapping": str(done.folder / "dataset.toml"),
         "inputs": {n: _match(m) for n, m in matches.inputs.items()},
         "channels": {n: _match(m) for n, m in matches.channels.items()},
-        "constants": matches.constants,
+        "constants": matches.constants, "left_at_start": matches.left,
         "unused": [c.source for c in done.columns if c.source not in matches.used()],
         "parameters": list(done.parameters),
         "runs": {run.name: run.purpose for run in done.runs},
@@ -275,6 +276,11 @@ def _print_imported(console: Console, done: Imported) -> None:
     console.print(table)
     for name, value in matches.constants.items():
         console.print(f"{name} is held at {value:g}", markup=False)
+    for name, value in matches.left.items():
+        console.print(
+            f"{name} stays at {value:g}: no column can be it (--map 'VALUE={name}' for another)",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
     unused = [c.source for c in done.columns if c.source not in matches.used()]
     for source in unused:
         rivals = matches.unsure.get(source)

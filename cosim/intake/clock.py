@@ -14,7 +14,7 @@ from ..errors import UnitError
 from ..spec.units import parse
 from .guess import EPOCHS, Guess, guess_time
 from .topic import Topic
-from .words import words
+from .words import TIME, words
 
 Vector = NDArray[np.float64]
 RISES = 0.95
@@ -120,18 +120,19 @@ def _factor(unit: str) -> float:
 def _column(topic: Topic) -> str:
     """The column that is a clock: by its name, if it rises; else the first, if it rises evenly."""
     log = topic.log
-    named = [name for name in log.columns if "time" in words(name)]
-    named.sort(key=lambda name: words(name).index("time"))
+    named = [name for name in log.columns if TIME in words(name)]
+    named.sort(key=lambda name: words(name).index(TIME))
     for name in named:
-        if _rises(log[name]):
+        if rises(log[name]):
             return name
     first = next(iter(log.columns), "")
-    if first and _rises(log[first]) and _even(log[first]):
+    if first and rises(log[first]) and _even(log[first]):
         return first
     return ""
 
 
-def _rises(values: Vector) -> bool:
+def rises(values: Vector) -> bool:
+    """Whether a column rises as a clock does."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(steps.size and np.mean(steps > 0.0) > RISES and np.median(steps) > 0.0)
 

@@ -203,9 +203,11 @@ def _matched(
 
 def _lacking(matches: Matches, columns: Sequence[Column]) -> str:
     lines = ["inputs of the system that no column drives; give for each a column, or a number:"]
+    taken = {m.column.source: f" (taken for {m.place.name})"
+             for m in (*matches.inputs.values(), *matches.channels.values())}  # fmt: skip
     for place_ in matches.open:
-        left = [c for c in candidates(place_, columns) if c.source not in matches.used()]
-        fit = ", ".join(c.source for c in left[:6]) or "none"
+        fit = ", ".join(c.source + taken.get(c.source, "") for c in candidates(place_, columns)[:6])
+        fit = fit or "none"
         lines.append(
             f"  --map 'COLUMN={place_.name}'  ({place_.text or 'input'}, in "
             f"{place_.unit or '?'}; columns that fit by their unit: {fit}), or "

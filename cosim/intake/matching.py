@@ -9,7 +9,7 @@ from ..errors import UnitError
 from ..spec.units import parse
 from ..system.system import System
 from .guess import Guess
-from .words import COMMAND, pieces, words
+from .words import commands, pieces, words
 
 NAME, INSTANCE, TEXT = 1.0, 0.5, 0.3
 """Weight of a word in a variable's name, in its instance's name, and in its description."""
@@ -17,6 +17,8 @@ MEASURED = 0.1
 """What a variable gains that is said to be measured: a log holds what a sensor says."""
 MARGIN = 0.05
 """By which the best one must be better than the second."""
+SELDOM = 0.6
+"""What is left of what speaks for a column being an input, if it looks measured."""
 TOO_MUCH = 0.01
 """What each word of a variable's name costs that the column does not have."""
 
@@ -31,6 +33,7 @@ class Place:
         role: `input` or `output`.
         text: its description.
         words: that speak for it, with their weights.
+        start: value that an input has if nothing drives it.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Place:
     role: str
     text: str
     words: Mapping[str, float]
+    start: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ class Matches:
     Attributes:
         inputs, channels: matches by full name of the variable.
         constants: inputs that are held, by name.
+        left: inputs that are left at their start value, since no column can be them.
         open: inputs that nothing drives yet.
         unsure: columns that may be several outputs, with the best of them.
     """
@@ -87,6 +92,7 @@ class Matches:
     inputs: dict[str, Match] = field(default_factory=dict)
     channels: dict[str, Match] = field(default_factory=dict)
     constants: dict[str, float] = field(default_factory=dict)
+    left: dict[str, float] = field(default_factory=dict)
     open: list[Place] = field(default_factory=list)
     unsure: dict[str, list[str]] = field(default_factory=dict)
 
@@ -115,7 +121,8 @@ def places_of(system: System) -> list[Place]:
                     weights[word] = max(weights.get(word, 0.0), NAME)
             for word in words(declared.text):
                 weights.setdefault(word, TEXT)
-            found.append(Place(name, declared.symbol, role, declared.text, weights))
+            start = float((declared.start or (0.0,))[0] or 0.0)
+            found.append(Place(name, declared.symbol, role, declared.text, weights, start))
     return found
 
 
@@ -134,7 +141,8 @@ def score(column: Column, place: Place) -> float:
     if not column.moves or not fits(column.unit.unit, place):
         return 0.0
     said = _said(column)
-    if (COMMAND in said or column.command) and place.role == "output":
+    ordered = column.command or commands(column.name)
+    if ordered and place.role == "output":
         return 0.0
     if "measured" in said and place.role == "input":
         return 0.0
@@ -143,8 +151,21 @@ def score(column: Column, place: Place) -> float:
         return 0.0
     if place.role == "output" and "measured" in place.words:
         total += MEASURED
+    if place.role == "input" and not ordered and _moves(column, place):
+        total *= SELDOM
     missing = sum(w >= NAME and word not in said for word, w in place.words.items())
     return total - TOO_MUCH * missing
+
+
+def _moves(column: Column, place: Place) -> bool:
+    """Whether a column is a place, an angle or their speed: these are measured, if not ordered."""
+    unit = column.unit.unit or place.unit
+    try:
+        return parse(unit).exponents in [
+            parse(one).exponents for one in ("m", "rad", "m/s", "rad/s")
+        ]
+    except UnitError:
+        return False
 
 
 def _said(column: Column) -> list[str]:
@@ -161,6 +182,7 @@ def guess(columns: Sequence[Column], places: Sequence[Place], matches: Matches) 
     First what one name tells better than all others; then, of what is left, inputs of whose unit
     there is one column only, and outputs likewise.
     """
+    outputs = [p for p in places if p.role == "output"]
     for role in ("input", "output"):
         into = matches.inputs if role == "input" else matches.channels
         free = [p for p in places if p.role == role and p.name not in into
@@ -172,6 +194,8 @@ def guess(columns: Sequence[Column], places: Sequence[Place], matches: Matches) 
             if not order or rated[column.source, order[0].name] <= 0.0:
                 continue
             best = rated[column.source, order[0].name]
+            if role == "input" and best < max(score(column, p) for p in outputs):
+                continue
             rivals = [p.name for p in order if rated[column.source, p.name] > best - MARGIN]
             others = [c for c in left if c is not column
                       and rated[c.source, order[0].name] > best - MARGIN]  # fmt: skip
@@ -182,8 +206,15 @@ def guess(columns: Sequence[Column], places: Sequence[Place], matches: Matches) 
     _by_unit(columns, places, matches)
     for source in matches.used():
         matches.unsure.pop(source, None)
-    matches.open = [p for p in places if p.role == "input" and p.name not in matches.inputs
-                    and p.name not in matches.constants]  # fmt: skip
+    matches.open.clear()
+    unused = [c for c in columns if c.source not in matches.used()]
+    for place in places:
+        if place.role != "input" or place.name in (*matches.inputs, *matches.constants):
+            continue
+        if matches.inputs and not candidates(place, unused):
+            matches.left[place.name] = place.start
+        else:
+            matches.open.append(place)
 
 
 def _by_unit(columns: Sequence[Column], places: Sequence[Place], matches: Matches) -> None:
@@ -191,9 +222,10 @@ def _by_unit(columns: Sequence[Column], places: Sequence[Place], matches: Matche
     free = [p for p in places if p.role == "input" and p.name not in matches.inputs
             and p.name not in matches.constants]  # fmt: skip
     left = [c for c in columns if c.source not in matches.used() and c.moves and c.unit.unit]
-    commands = [c for c in left if c.command] or left
+    ordered = [c for c in left if c.command or commands(c.name)]
     for place in free:
-        own = [c for c in commands if place.unit and fits(c.unit.unit, place)]
+        may = ordered or [c for c in left if not _moves(c, place)]
+        own = [c for c in may if place.unit and fits(c.unit.unit, place)]
         rivals = [p for p in free if p.unit and own and fits(own[0].unit.unit, p)]
         if len(own) == 1 and len(rivals) == 1:
             matches.inputs[place.name] = Match(

@@ -23,7 +23,9 @@ _ALIKE = (
 )  # fmt: skip
 """Words of one meaning, the first of each stands for all."""
 MEANING = {word: group[0] for group in _ALIKE for word in group}
-COMMAND = "command"
+COMMAND, TIME = "command", "time"
+ORDERS = ("pwm", "duty", "throttle", "setpoint")
+"""Words of what is ordered, besides those that mean `COMMAND`."""
 
 
 def pieces(name: str) -> list[str]:
@@ -35,3 +37,9 @@ def words(name: str) -> list[str]:
     """Words of a name in small letters, apart at capitals too, as their meanings."""
     found = [word.lower() for part in pieces(name) for word in _CAMEL.findall(part)]
     return [MEANING.get(word, word) for word in found]
+
+
+def commands(name: str) -> bool:
+    """Whether a name says that it is ordered, not measured."""
+    plain = [word.lower() for part in pieces(name) for word in _CAMEL.findall(part)]
+    return COMMAND in words(name) or any(word in ORDERS for word in plain)

@@ -1,11 +1,18 @@
-"""Plain tables: text, Parquet, npz and MATLAB files are one topic each."""
+"""Plain tables: text, Parquet, npz and MATLAB files are a topic each, or one per clock in them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from ...data.logs import read_log
+import numpy as np
+
+from ...data.logs import Log, read_log
+from ..clock import rises
 from ..topic import Source, Topic
+from ..words import TIME, pieces, words
 
 NAMES = {".csv": "CSV", ".tsv": "text", ".txt": "text", ".parquet": "Parquet", ".npz": "npz",
          ".mat": "MATLAB"}  # fmt: skip
@@ -14,8 +21,69 @@ NAMES = {".csv": "CSV", ".tsv": "text", ".txt": "text", ".parquet": "Parquet", "
 def read(path: Path, topics: tuple[str, ...]) -> Source:
     """Read a table; it is one topic, whatever topics are wanted.
 
+    Several clocks in it that are known in different rows (logs that were merged) are a topic each,
+    with the columns that are named as the clock is, or lack the same rows.
+
     Raises:
         ScenarioError: it is missing, damaged or too large.
     """
     kind = NAMES.get(path.suffix.lower(), "table")
-    return Source(path, kind, (Topic(path.stem, kind, read_log(path)),))
+    log = read_log(path)
+    shares = _shares(log)
+    if len(shares) < 2:
+        return Source(path, kind, (Topic(path.stem, kind, log),))
+    made = [
+        Topic(_name(path, clock), kind, _part(log, clock, names), clock=clock,
+              notes=(f"the table has {len(shares)} clocks; these columns are on {clock}",))
+        for clock, names in shares.items()
+    ]  # fmt: skip
+    return Source(path, kind, tuple(made), plain=False)
+
+
+def _name(path: Path, clock: str) -> str:
+    stem = _stem(clock).strip("_.")
+    return stem or path.stem
+
+
+def _stem(clock: str) -> str:
+    """What stands before the word for time in the name of a clock."""
+    at = max(clock.lower().rfind(part.lower()) for part in pieces(clock) if TIME in words(part))
+    return clock[:at]
+
+
+def _shares(log: Log) -> dict[str, list[str]]:
+    """Columns by clock, one entry if there is one clock only."""
+    named = [n for n, v in log.columns.items() if TIME in words(n) and rises(v)]
+    masks = {name: np.isfinite(values) for name, values in log.columns.items()}
+    clocks: list[str] = []
+    for name in named:  # of those that are known in the same rows the first one counts
+        if not any(_same(masks[name], masks[other]) for other in clocks):
+            clocks.append(name)
+    if len(clocks) < 2:
+        return {}
+    shares: dict[str, list[str]] = {clock: [] for clock in clocks}
+    for name in log.columns:
+        if name in clocks:
+            continue
+        own = [c for c in clocks if _stem(c) and name.startswith(_stem(c))]
+        own = own or [c for c in clocks if _same(masks[c], masks[name])]
+        shares[(own or clocks)[0]].append(name)
+    return {clock: names for clock, names in shares.items() if names}
+
+
+def _same(one: Any, other: Any) -> bool:
+    return bool(one.shape == other.shape and np.array_equal(one, other))
+
+
+def _part(log: Log, clock: str, names: list[str]) -> Log:
+    """Some columns with their clock, in the rows that it has."""
+    good = np.isfinite(log[clock])
+    kept = [clock, *names]
+
+    def mine(table: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: item for name, item in table.items() if name in kept}
+
+    return replace(
+        log, columns={name: log[name][good] for name in kept}, units=mine(log.units),
+        origins=mine(log.origins), gaps={}, texts={}, exact={},
+    )  # fmt: skip
