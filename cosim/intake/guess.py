@@ -130,15 +130,15 @@ def _by_size(said: Sequence[str], good: Vector) -> Guess:
         return Guess("", "an acceleration: in m/s2 or in units of gravity")
     if "speed" in said:
         return Guess("", f"a speed, and {size}: rad/s, rpm, m/s?")
+    if said and said[-1] in ("x", "y", "z"):
+        unit = "m" if largest <= POSITION else "mm"
+        return Guess(unit, f"a position, and {size}")
     if any(word in said for word in ANGLES):
         if largest <= 1.02 * np.pi:
             return Guess("rad", f"an angle, and {size}: within half a turn in radians")
         if largest > 50.0 and largest <= 362.0:
             return Guess("deg", f"an angle, and {size}")
         return Guess("", f"an angle, and {size}: rad or deg?")
-    if said and said[-1] in ("x", "y", "z"):
-        unit = "m" if largest <= POSITION else "mm"
-        return Guess(unit, f"a position, and {size}")
     return Guess("", "neither name nor size tell")
 
 

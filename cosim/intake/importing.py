@@ -121,9 +121,12 @@ def import_logs(
         "what each key means."
     )
     draft = draft_of(runs, matches, stored, said, head)
-    path = folder / NAME
-    notes = _refined(draft, path, provider, plan.late, wishes)
-    write_text(path, draft.text())
+    unfinished = folder / f"unfinished_{NAME}"
+    try:
+        notes = _refined(draft, unfinished, provider, plan.late, wishes)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    write_text(folder / NAME, draft.text())
     problem = read_problem(folder, provider)
     findings = examine(Simulator(problem))
     estimated = [str(entry.keys["name"]) for entry in draft.parameters]
@@ -238,7 +241,7 @@ def _refined(
 
     def problem() -> Problem:
         write_text(path, draft.text())
-        return short(read_problem(path.parent, provider))
+        return short(read_problem(path.parent, provider, mapping=path))
 
     first = problem()
     inputs = [signal for run in first.runs for signal in run.inputs.values()]
