@@ -52,7 +52,7 @@ def drive(seed: int, *, late: float = 0.0, duration: float = 12.0) -> Drive:
     speeds = np.repeat(chance.uniform(1.0, 8.0, (count // held + 1, 2)), held, axis=0)[:count]
     left, right = speeds.T
     v, w = RADIUS * (left + right) / 2, RADIUS * (right - left) / TRACK
-    yaw = 0.4 + np.append(0.0, np.cumsum(w * PERIOD))
+    yaw = 3.0 + np.append(0.0, np.cumsum(w * PERIOD))
     # exact along arcs: the chord has the middle direction
     chord = v * PERIOD * np.sinc(w * PERIOD / 2 / np.pi)
     x = 1.5 + np.append(0.0, np.cumsum(chord * np.cos(yaw[:-1] + w * PERIOD / 2)))

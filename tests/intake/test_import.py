@@ -56,7 +56,7 @@ def test_two_files_a_run_with_a_late_camera(logs: Path, tmp_path: Path) -> None:
         "base.w_l": "cmd.left_rpm", "base.w_r": "cmd.right_rpm",
     }  # fmt: skip
     text = " ".join((tmp_path / "set" / "dataset.toml").read_text().replace("\n#", "").split())
-    assert "# How late the clock of pose is against that of cmd" in text
+    assert "How late the clock of pose is against that of cmd" in text
     assert "In rpm: its name ends with it." in text and "begins anew at a turn" in text
     problem = read_problem(tmp_path / "set")
     assert problem.sigma == pytest.approx((0.002, 0.002, 0.004), rel=0.25)  # 300 samples, order 8

@@ -129,6 +129,22 @@ def _columns(own: _Collected) -> tuple[dict[str, Vector], list[str]]:
     return messages.turned(table, own.units)
 
 
+def _ordered(
+    times: list[int], columns: dict[str, Vector], notes: list[str]
+) -> tuple[list[int], dict[str, Vector]]:
+    """Rows in the order of their times, the first of several at one time."""
+    stamps = np.array(times, dtype=np.int64)
+    _, first = np.unique(stamps, return_index=True)
+    again = stamps.size - first.size
+    mixed = int(np.count_nonzero(np.diff(stamps) < 0))
+    if again or mixed:
+        notes.append(
+            f"{again} messages with a stamp that was there already are left out, {mixed} out of "
+            "order are put where they belong"
+        )
+    return stamps[first].tolist(), {name: values[first] for name, values in columns.items()}
+
+
 def _topic(name: str, own: _Collected, columns: dict[str, Vector], notes: list[str]) -> Topic:
     stamps, received = np.array(own.stamps, dtype=np.int64), np.array(own.received, dtype=np.int64)
     if stamps.size and bool(np.all(stamps > 0)):
@@ -140,8 +156,9 @@ def _topic(name: str, own: _Collected, columns: dict[str, Vector], notes: list[s
         )
     else:
         times = own.received
-        what = "has no header" if not stamps.any() else "has headers without a time"
+        what = "has no header" if np.all(stamps < 0) else "has headers without a time"
         notes.append(f"{what}: times are those at which messages were recorded")
+    times, columns = _ordered(times, columns, notes)
     clock, origin = integers(times)
     log = Log(
         name, {"time": clock, **columns},

@@ -27,6 +27,7 @@ HEAVY = {
 """Types that hold no signals: not even opened."""
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 JOINTS = "sensor_msgs/msg/JointState"
+_NO_SIGNALS = ("header", "__msgtype__", "layout", "structure_needs_at_least_one_member")
 QUATERNION = "geometry_msgs/msg/Quaternion"
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _PLAIN = {"pose", "position", "orientation", "twist", "transform", "translation", "rotation",
@@ -44,9 +45,9 @@ Row = dict[str, float]
 
 
 def stamp(message: Any) -> int:
-    """Time in the header of a message [ns since 1970], 0 if it has none."""
+    """Time in the header of a message [ns since 1970], -1 if it has no header."""
     header = getattr(message, "header", None)
-    return nanoseconds(header.stamp) if header is not None else 0
+    return nanoseconds(header.stamp) if header is not None else -1
 
 
 def nanoseconds(time: Any) -> int:
@@ -95,7 +96,7 @@ def _take(value: Any, path: tuple[str, ...], row: Row, units: dict[str, str]) ->
                 row[_name((*path, part))] = float(number)
     elif kind:
         for field in value.__dataclass_fields__:
-            if field in ("header", "__msgtype__", "layout") or "covariance" in field:
+            if field in _NO_SIGNALS or "covariance" in field:
                 continue
             _take(getattr(value, field), (*path, field), row, units)
     elif isinstance(value, (bool, int, float, np.generic)) and not isinstance(value, np.str_):
