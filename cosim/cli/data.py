@@ -65,11 +65,6 @@ def inspect_command(
     console = open_console()
     for report in reports:
         _print(console, report)
-        for topic in report.topics:
-            for found in gathered(topic.findings):
-                column = f"{found.column}: " if found.column else ""
-                console.print(f"  {found.severity}: {column}{found.text}", soft_wrap=True,
-                              markup=False, highlight=False)  # fmt: skip
     for name in made:
         console.print(f"picture: {name}", soft_wrap=True, markup=False)
 
@@ -87,6 +82,10 @@ def _print(console: Console, report: FileReport) -> None:
         for column in topic.columns:
             table.add_row(*_row(column))
         console.print(table)
+        for found in gathered(topic.findings):
+            where = f"{found.column}: " if found.column else ""
+            console.print(f"  {found.severity}: {where}{found.text}", soft_wrap=True,
+                          markup=False, highlight=False)  # fmt: skip
     for name, why in report.source.left.items():
         console.print(f"  left out: {name}: {why}", soft_wrap=True, markup=False, highlight=False)
 

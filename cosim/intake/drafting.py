@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..spec.units import conversion, parse
 from .draft import ColumnEntry, Draft, Entry
 from .files import clock_column, known_clock, readable
-from .guess import turn_of
+from .guess import is_angle, turn_of
 from .inspect import ColumnReport
 from .matching import Column, Match, Matches
 from .runs import Part, Run, plain
@@ -186,8 +186,10 @@ def _column(
         remarks.append(f"In {unit.unit}: {unit.reason}{'' if unit.sure else ' (a guess)'}.")
     if match.place.unit and unit.unit and not (stated and match.place.unit == unit.unit):
         keys["unit"] = match.place.unit
-    if not drives and any(
-        turn_of(r.parts[column.part].report.topic.log[column.name])[0] for r in runs
+    if (
+        not drives
+        and is_angle(match.place.unit)
+        and any(turn_of(r.parts[column.part].report.topic.log[column.name])[0] for r in runs)
     ):
         keys["unwrap"] = True
         remarks.append("It begins anew at a turn.")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import UnitError
+from ..spec.units import parse
 from .words import pieces, words
 
 Vector = NDArray[np.float64]
@@ -82,7 +84,8 @@ def turn_of(values: Vector) -> tuple[str, float, int]:
     """Unit of an angle that begins anew at a turn, the turn, and how often; ("", 0, 0) if not.
 
     It jumps by a turn (to `NEAR`) from one sample to the next, while half of its changes are below
-    a hundredth of that, and spans no more than a turn.
+    a hundredth of that (a twentieth, of those that are any: a command may stand and jump), and
+    spans no more than a turn.
     """
     good = values[np.isfinite(values)]
     steps = np.abs(np.diff(good))
@@ -90,9 +93,18 @@ def turn_of(values: Vector) -> tuple[str, float, int]:
         return "", 0.0, 0
     for unit, turn in TURNS:
         count = int(np.count_nonzero(np.abs(steps / turn - 1.0) < NEAR))
-        if count and np.median(steps) < 0.01 * turn and np.ptp(good) < 1.05 * turn:
+        calm = count and np.median(steps) < 0.01 * turn and np.ptp(good) < 1.05 * turn
+        if calm and np.median(steps[steps > 0.0]) < 0.05 * turn:
             return unit, turn, count
     return "", 0.0, 0
+
+
+def is_angle(unit: str) -> bool:
+    """Whether a unit is one of angles; an unknown one may be."""
+    try:
+        return not unit or parse(unit).exponents == parse("rad").exponents
+    except UnitError:
+        return False
 
 
 def guess_unit(name: str, values: Vector, said: str = "") -> Guess:

@@ -52,7 +52,8 @@ def test_jumps_by_a_turn_tell_an_angle(unit: str, turn: float) -> None:
     assert turn_of(wrapped) == (unit, turn, 3)
     assert guess_unit("a", wrapped).unit == unit
     # what counts on, steps of another size, and noise of that size are none
-    for other in (angle, np.where(wrapped > 0, 0.5 * turn, 0.0),
+    jumps = np.repeat([-3.0, 3.0, -2.0, 2.9], 500) * turn / 6.0
+    for other in (angle, jumps, np.where(wrapped > 0, 0.5 * turn, 0.0),
                   np.random.default_rng(1).uniform(-turn / 2, turn / 2, 2000)):  # fmt: skip
         assert turn_of(other) == ("", 0.0, 0)
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from benchmarks.own_robot import RADIUS, SYSTEM, TRACK, drive, write_csv
 from cosim.calibrate import read_problem
 from cosim.calibrate.clocks import offsets
 from cosim.calibrate.fit import fit
@@ -23,7 +24,6 @@ from cosim.files import read_toml
 from cosim.installation.builder import default_provider
 from cosim.intake.importing import Imported, Wishes, import_logs
 from cosim.intake.runs import grouped, purposes
-from tests.robot_logs import RADIUS, SYSTEM, TRACK, drive, write_csv
 
 LATE = 0.23
 """[s] No multiple of the camera's or the commands' interval."""
