@@ -40,7 +40,7 @@ AROUND = 20.0
 """Deviations within which a start value is sought, besides what a late clock moves it by."""
 KNOWN = 0.3
 """Share of its value to which a parameter must be told by the logs to be estimated."""
-WIDE = 3.0
+WIDE = 5.0
 """Bounds of a parameter are its value over this, and times this."""
 APART = 1e-3
 """Share of what the logs tell of a parameter that must be left beside the others: differences with

@@ -22,7 +22,7 @@ def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
             yield Finding("note", "constant", topic.name, name, f"is {good[0]:g} throughout")
         elif period := held(good, float(np.std(good))):
             text = (
-                f"changes every {period} samples only: its sensor is slower than the clock, or "
-                "values were repeated"
+                f"changes every {period} samples only: a command that is held, a sensor that is "
+                "slower than the clock, or values that were repeated"
             )
             yield Finding("note", "held", topic.name, name, text)
