@@ -157,6 +157,9 @@ def import_command(
             help="What is estimated [what the logs tell].",
         ),
     ] = None,
+    window: Annotated[
+        float, typer.Option(help="Cut runs into pieces of this length [s], each with its start.")
+    ] = 0.0,
     topics: Topics = None,
     clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("dataset"),
@@ -179,7 +182,9 @@ def import_command(
         say(f"note: run {list(named)[-1]} is not fitted but judged (another with --validation)")
     if len(named) == 1:
         say("note: there is one run only, so nothing is left to judge what is fitted")
-    wishes = Wishes(system, maps or (), parameters_of(parameters or []), tuple(topics or ()), clock)
+    wishes = Wishes(
+        system, maps or (), parameters_of(parameters or []), tuple(topics or ()), clock, window
+    )
     done = import_logs(
         named, chosen, wishes, out, default_provider(), _ask if _somebody() else None
     )

@@ -31,7 +31,8 @@ class Clock:
         column: that holds them, "" if there is none.
         unit: and why.
         times: since the first sample [s], NaN where there is none; empty without a clock.
-        begin: the first time since 1970 [s], None if it does not count from there.
+        first: the first time, as the clock counts [s].
+        epoch: whether it counts from 1970.
         interval: usual one [s].
         jitter: deviation of the intervals over the usual one, gaps left out.
         gaps: (time [s], length [s]) of intervals that are longer than `GAP` usual ones.
@@ -41,12 +42,18 @@ class Clock:
     column: str
     unit: Guess
     times: Vector
-    begin: float | None = None
+    first: float = 0.0
+    epoch: bool = False
     interval: float = 0.0
     jitter: float = 0.0
     gaps: tuple[tuple[float, float], ...] = ()
     same: int = 0
     back: int = 0
+
+    @property
+    def begin(self) -> float | None:
+        """The first time since 1970 [s], None if it does not count from there."""
+        return self.first if self.epoch else None
 
     @property
     def duration(self) -> float:
@@ -91,19 +98,18 @@ def find_clock(topic: Topic) -> Clock:
         return Clock(column, unit, np.zeros(0))
     first = times[good][0]
     since = first + origin * factor
-    epoch = next((since for name, least, _ in EPOCHS
-                  if name == unit.unit and since / factor >= least), None)  # fmt: skip
+    epoch = any(name == unit.unit and since / factor >= least for name, least, _ in EPOCHS)
     times = times - first
     steps = np.diff(times[good])
     if not steps.size:
-        return Clock(column, unit, times, epoch)
+        return Clock(column, unit, times, since, epoch)
     forward = steps[steps > 0.0]
     usual = interval(np.append(0.0, np.cumsum(forward))) if forward.size else 0.0
     whole = steps[(steps > 0.0) & (steps <= GAP * usual)]
     at = times[good][:-1]
     gaps = tuple((float(a), float(s)) for a, s in zip(at, steps, strict=True) if s > GAP * usual)
     return Clock(
-        column, unit, times, epoch, usual,
+        column, unit, times, since, epoch, usual,
         float(np.std(whole) / usual) if whole.size and usual > 0.0 else 0.0,
         gaps, int(np.count_nonzero(steps == 0.0)), int(np.count_nonzero(steps < 0.0)),
     )  # fmt: skip

@@ -35,12 +35,14 @@ class Layout:
         main: key of the part whose clock counts.
         command: keys of the parts that hold inputs.
         late: [s] bound on the lateness of other clocks.
+        window: [s] of the pieces that runs are cut into, 0 for whole runs.
     """
 
     whole: bool
     main: str
     command: tuple[str, ...]
     late: float
+    window: float = 0.0
 
 
 def columns_of(runs: Sequence[Run]) -> list[Column]:
@@ -66,7 +68,7 @@ def _report(run: Run, key: str, name: str) -> ColumnReport | None:
     return next((c for c in columns if c.name == name), None)
 
 
-def layout(runs: Sequence[Run], matches: Matches) -> Layout:
+def layout(runs: Sequence[Run], matches: Matches, window: float = 0.0) -> Layout:
     """How the parts are read: the clock of the part that measures most is the main one.
 
     Raises:
@@ -82,10 +84,11 @@ def layout(runs: Sequence[Run], matches: Matches) -> Layout:
         )
     main = max(count, key=lambda key: (count[key], _rate(runs[0].parts[key])))
     shortest = min(run.parts[main].report.clock.duration for run in runs)
+    shortest = min(shortest, window or shortest)
     used = {m.column.part for m in (*matches.inputs.values(), *matches.channels.values())}
     whole = all(readable([run.parts[key] for key in used]) for run in runs)
     inputs = tuple(dict.fromkeys(m.column.part for m in matches.inputs.values()))
-    return Layout(whole, main, inputs, min(LATE, SHARE * shortest))
+    return Layout(whole, main, inputs, min(LATE, SHARE * shortest), window)
 
 
 def _rate(part: Part) -> float:
@@ -94,11 +97,11 @@ def _rate(part: Part) -> float:
 
 
 def draft_of(
-    runs: Sequence[Run], matches: Matches, files: Mapping[str, Mapping[str, str]], system: str,
+    runs: Sequence[Run], matches: Matches, files: Mapping[str, Mapping[str, str]],
+    plan: Layout, system: str,
     head: str,
 ) -> Draft:  # fmt: skip
     """The draft, without what is told by simulating: start values, step, parameters."""
-    plan = layout(runs, matches)
     first = runs[0].parts
     clock = clock_column(first[plan.main], plan.whole)
     draft = Draft(
@@ -249,6 +252,8 @@ def _run(run: Run, files: Mapping[str, str], plan: Layout) -> Entry:
     if span is not None:
         keys["samples"] = list(span)
         remark = "Only the samples between the first and the last command."
+    if plan.window:
+        keys["window"] = plan.window
     return Entry(keys, remark)
 
 
@@ -262,7 +267,7 @@ def covered(run: Run, plan: Layout) -> tuple[int, int] | None:
             continue
         own = _absolute(run.parts[key])
         own = own[np.isfinite(own)]
-        if not own.size or main.clock.begin is None or run.parts[key].report.clock.begin is None:
+        if not own.size or main.clock.epoch != run.parts[key].report.clock.epoch:
             continue
         first = max(first, int(np.searchsorted(times, own[0])))
         clock = run.parts[key].report.clock
@@ -279,4 +284,4 @@ def covered(run: Run, plan: Layout) -> tuple[int, int] | None:
 
 def _absolute(part: Part) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     clock = part.report.clock
-    return clock.times + (clock.begin or 0.0)
+    return clock.times + clock.first

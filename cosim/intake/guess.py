@@ -38,7 +38,9 @@ PERIODS = (1e-4, 2.0)
 TURNS = (("rad", 2.0 * np.pi), ("deg", 360.0))
 NEAR = 0.2
 """Share of a turn by which a jump may miss it."""
-ANGLES = ("yaw", "angle", "roll", "pitch", "bearing", "azimuth", "steering", "orientation")
+ANGLES = ("yaw", "angle", "ang", "theta", "heading", "hdg", "phi", "psi", "roll", "pitch",
+          "bearing", "azimuth", "steering", "orientation")  # fmt: skip
+"""Words of angles; others of their meaning (`pos`, `q`) may be of a place, too."""
 LARGE = {"voltage": ("V", 1000.0, "mV"), "current": ("A", 500.0, "mA")}
 """Unit of a quantity up to a size, and the unit beyond it."""
 POSITION = 200.0
@@ -125,10 +127,10 @@ def guess_unit(name: str, values: Vector, said: str = "") -> Guess:
         return Guess("", "it holds no numbers")
     if turned:
         return Guess(turned, f"it jumps by {turn:.4g} {count} times: a turn")
-    return _by_size(words(name), good)
+    return _by_size(words(name), {p.lower() for p in pieces(name)}, good)
 
 
-def _by_size(said: Sequence[str], good: Vector) -> Guess:
+def _by_size(said: Sequence[str], raw: set[str], good: Vector) -> Guess:
     """Unit by what the words of a name measure, and by size."""
     largest = float(np.max(np.abs(good)))
     size = f"its largest value is {largest:.4g}"
@@ -145,6 +147,8 @@ def _by_size(said: Sequence[str], good: Vector) -> Guess:
     if said and said[-1] in ("x", "y", "z"):
         unit = "m" if largest <= POSITION else "mm"
         return Guess(unit, f"a position, and {size}")
+    if "angle" in said and not any(word in raw for word in ANGLES):
+        return Guess("", f"a position, and {size}: of an angle or of a place?")
     if any(word in said for word in ANGLES):
         if largest <= 1.02 * np.pi:
             return Guess("rad", f"an angle, and {size}: within half a turn in radians")

@@ -42,6 +42,7 @@ class Wishes:
         parameters: as of `--parameter`.
         topics: only these.
         clock: column of times, where it is not found.
+        window: [s] of the pieces that runs are cut into, 0 for whole runs.
     """
 
     system: str
@@ -49,6 +50,7 @@ class Wishes:
     parameters: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     topics: Sequence[str] = ()
     clock: str = ""
+    window: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def import_logs(
     columns = columns_of(runs)
     matches = _matched(columns, variables, wishes, ask)
     runs = _used(runs, matches)
-    plan = layout(runs, matches)
+    plan = layout(runs, matches, wishes.window)
     make_folder(folder)
     stored = {run.name: place(run, folder, plan.whole) for run in runs}
     said = _system_entry(file, folder, wishes.system)
@@ -120,7 +122,7 @@ def import_logs(
         f"the system {file.name}. It is yours: correct what you know better. docs/datasets.md says "
         "what each key means."
     )
-    draft = draft_of(runs, matches, stored, said, head)
+    draft = draft_of(runs, matches, stored, plan, said, head)
     unfinished = folder / f"unfinished_{NAME}"
     try:
         notes = _refined(draft, unfinished, provider, plan.late, wishes)

@@ -30,6 +30,9 @@ DIVISIONS = (1, 2, 4, 5, 8, 10, 20, 40, 50, 100)
 ENOUGH, FINE = 0.1, 0.03
 """Change by a finer step, over the noise, below which a step is fine enough; the second one adds
 less than a nat to 2000 samples, which nobody can take for physics."""
+HELD = 20.0
+"""Steps in an interval of commands with a clock of their own, at most: commands that come between
+two steps are late by half a step, so errors fall with the step only, and slowly."""
 PART = 0.37
 """Of a sample, by which a clock is late when steps are tried: no simple fraction."""
 FIRST = 5
@@ -114,7 +117,9 @@ def choose_step(problem: Problem, shortest: float) -> tuple[float, float | None]
                 known[division] = None
         return known[division]
 
-    allowed = [n for n in DIVISIONS if period / n <= 0.5 * shortest or n == DIVISIONS[-1]]
+    least = shortest / HELD if clocks else 0.0
+    allowed = [n for n in DIVISIONS if least <= period / n <= 0.5 * shortest]
+    allowed = allowed or [DIVISIONS[-1]]
     for division, finer in itertools.pairwise(allowed):
         coarse, fine = at(division), at(finer)
         if coarse is None or fine is None:

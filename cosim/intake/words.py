@@ -35,8 +35,12 @@ def pieces(name: str) -> list[str]:
 
 def words(name: str) -> list[str]:
     """Words of a name in small letters, apart at capitals too, as their meanings."""
-    found = [word.lower() for part in pieces(name) for word in _CAMEL.findall(part)]
-    return [MEANING.get(word, word) for word in found]
+    found = [(word.lower(), part) for part in pieces(name) for word in _CAMEL.findall(part)]
+    # a letter of `u32` is none of a quantity; that of `i1` is
+    return [
+        MEANING.get(word, word) if len(word) > 1 or len(part) <= 2 or part.isalpha() else word
+        for word, part in found
+    ]
 
 
 def commands(name: str) -> bool:

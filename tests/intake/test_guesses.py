@@ -35,7 +35,8 @@ def test_the_end_of_a_name_is_a_unit(name: str, unit: str) -> None:
         ("yaw", 3.1 * RAMP, "rad"), ("yaw", 179.0 * RAMP, "deg"), ("yaw", 20.0 * RAMP, ""),
         ("pos_x", 3.0 * RAMP, "m"), ("pos_x", 3000.0 * RAMP, "mm"), ("speed", 3.0 * RAMP, ""),
         ("accel_z", 9.81 + 0.1 * RAMP, "m/s2"), ("accel_z", 1.0 + 0.01 * RAMP, ""),
-        ("whatever", RAMP, ""),
+        ("whatever", RAMP, ""), ("q", RAMP, ""), ("theta", RAMP, "rad"), ("tick_u32", RAMP, ""),
+        ("u", RAMP, "V"), ("i1", RAMP, "A"),
     ],
 )  # fmt: skip
 def test_sizes_tell_a_unit_or_that_they_do_not(name: str, values: np.ndarray, unit: str) -> None:

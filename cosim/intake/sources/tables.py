@@ -41,14 +41,18 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
 
 
 def _name(path: Path, clock: str) -> str:
-    stem = _stem(clock).strip("_.")
-    return stem or path.stem
+    return "_".join(_rest(clock)) or path.stem
 
 
-def _stem(clock: str) -> str:
-    """What stands before the word for time in the name of a clock."""
-    at = max(clock.lower().rfind(part.lower()) for part in pieces(clock) if TIME in words(part))
-    return clock[:at]
+def _rest(name: str) -> list[str]:
+    """Pieces of a clock's name besides the word for time: `p` of `p_t`, `cmd` of `t_cmd`."""
+    return [part for part in pieces(name) if TIME not in words(part)]
+
+
+def _named_alike(clock: str, column: str) -> bool:
+    """Whether a column's name begins or ends as that of a clock does."""
+    rest, parts = _rest(clock), pieces(column)
+    return bool(rest) and rest in (parts[: len(rest)], parts[-len(rest) :])
 
 
 def _shares(log: Log) -> dict[str, list[str]]:
@@ -65,7 +69,7 @@ def _shares(log: Log) -> dict[str, list[str]]:
     for name in log.columns:
         if name in clocks:
             continue
-        own = [c for c in clocks if _stem(c) and name.startswith(_stem(c))]
+        own = [c for c in clocks if _named_alike(c, name)]
         own = own or [c for c in clocks if _same(masks[c], masks[name])]
         shares[(own or clocks)[0]].append(name)
     return {clock: names for clock, names in shares.items() if names}
