@@ -45,7 +45,7 @@ def read_matlab73(path: Path) -> dict[str, NDArray[Any]]:
                 name: array for name, item in _datasets(file, "", DEPTH)
                 if (array := _array(path, name, item, room)) is not None
             }  # fmt: skip
-    except (ScenarioError, MemoryError):
+    except ScenarioError:
         raise
     except Exception as error:  # of a parser that does not expect damaged files
         text = str(error).splitlines() or [type(error).__name__]

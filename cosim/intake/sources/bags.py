@@ -64,7 +64,7 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
                 own.stamps.append(messages.stamp(part))
                 own.rows.append(messages.numbers(part, kind, own.units))
             _check_size(path, found)
-    except (ScenarioError, MemoryError):
+    except ScenarioError:
         raise
     except Exception as error:  # of the library and of those below it: files can be anything
         text = str(error).splitlines() or [type(error).__name__]

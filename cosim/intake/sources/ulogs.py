@@ -56,8 +56,6 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
     try:
         found = ULog(str(path)).data_list
         parts = {_name(item): item for item in found}
-    except MemoryError:
-        raise
     except Exception as error:  # of a parser that does not expect damaged files
         text = str(error).splitlines() or [type(error).__name__]
         raise ScenarioError(f"{path}: is no whole log of PX4 ({text[0][:200]})") from error
