@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -52,7 +53,11 @@ def inspect_command(
 
     if plot is not None and plot.suffix.lower() not in PICTURES:
         raise InputError(f"--plot {plot}: pictures are {', '.join(PICTURES)} files")
-    reports = [inspect(path, topics or ()) for path in files]
+    reports = []
+    with working() as told:
+        for path in files:
+            told(f"reading {path}")
+            reports.append(inspect(path, topics or ()))
     made = []
     if plot is not None:
         path, left = draw(reports, plot)
@@ -185,9 +190,9 @@ def import_command(
     wishes = Wishes(
         system, maps or (), parameters_of(parameters or []), tuple(topics or ()), clock, window
     )
-    done = import_logs(
-        named, chosen, wishes, out, default_provider(), _ask if _somebody() else None
-    )
+    ask = _Terminal() if _somebody() else None
+    with working(quiet=ask is not None) as told:
+        done = import_logs(named, chosen, wishes, out, default_provider(), ask, told)
     for note in done.notes:
         say(f"note: {note}")
     if as_json:
@@ -201,6 +206,19 @@ def import_command(
             f"{done.folder / 'dataset.toml'} as said above, or import again with --map, and with "
             "--parameter NAME=VALUE where the system's values are those of another machine"
         )
+
+
+@contextmanager
+def working(quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Shows at a terminal what is being done, until it is; or, quiet, leaves it to questions."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda text: None
+        return
+    with console.status("") as status:
+        yield lambda text: status.update(text)
 
 
 def _systems() -> str:
@@ -218,21 +236,52 @@ def _somebody() -> bool:
     return sys.stdin is not None and sys.stdin.isatty()
 
 
-def _ask(place: Place, columns: Sequence[Column]) -> str:
-    """Ask for the column of an input, by number, by name, or a constant."""
-    say(f"\n{place.name} ({place.text or 'input'}, in {place.unit or '?'}) - which column is it?")
-    for number, column in enumerate(columns, 1):
-        say(f"  {number}) {column.source} [{column.unit.unit or '?'}: {column.unit.reason}]")
-    say("  or c=VALUE for a constant")
-    while True:
-        answer = str(typer.prompt("number", err=True)).strip()
-        if answer.startswith("c=") and _is_number(answer[2:]):
-            return answer[2:]
-        if answer.isdigit() and 1 <= int(answer) <= len(columns):
-            return columns[int(answer) - 1].source
-        if answer in [column.source for column in columns]:
-            return answer
-        say(f"{answer!r} is none of them; write a number from 1 to {len(columns)}, or c=0")
+class _Terminal:
+    """Asks at the terminal."""
+
+    def column(self, place: Place, columns: Sequence[Column]) -> str:
+        """A column by its number or name, or a constant."""
+        say(
+            f"\n{place.name} ({place.text or 'input'}, in {place.unit or '?'}): which column is it?"
+        )
+        for number, column in enumerate(columns, 1):
+            say(f"  {number}) {column.source} [{column.unit.unit or '?'}: {column.unit.reason}]")
+        say("  or c=VALUE for a constant")
+        while True:
+            answer = str(typer.prompt("number", err=True)).strip()
+            if answer.startswith("c=") and _is_number(answer[2:]):
+                return answer[2:]
+            if answer.isdigit() and 1 <= int(answer) <= len(columns):
+                return columns[int(answer) - 1].source
+            if answer in [column.source for column in columns]:
+                return answer
+            say(f"{answer!r} is none of them; write a number from 1 to {len(columns)}, or c=0")
+
+    def variable(self, source: str, names: Sequence[str]) -> str:
+        """A variable by its number, or none."""
+        say(f"\n{source}: which of these was measured?")
+        for number, name in enumerate(names, 1):
+            say(f"  {number}) {name}")
+        say("  or 0 for none of them")
+        while True:
+            answer = str(typer.prompt("number", err=True)).strip()
+            if answer.isdigit() and int(answer) <= len(names):
+                return names[int(answer) - 1] if int(answer) else ""
+            say(f"{answer!r} is none of them; write a number from 0 to {len(names)}")
+
+    def unit(self, match: Match) -> str:
+        """A unit that fits the variable."""
+        from ..intake.guess import known_unit
+        from ..intake.matching import fits
+
+        column, place = match.column, match.place
+        say(f"\n{column.source} is {place.name}, in {place.unit}: what is its unit? "
+            f"({column.unit.reason})")  # fmt: skip
+        while True:
+            answer = str(typer.prompt("unit", err=True)).strip()
+            if known_unit(answer) and fits(answer, place):
+                return answer
+            say(f"{answer!r} is no unit of what is in {place.unit}; write e.g. {place.unit}")
 
 
 def _is_number(text: str) -> bool:

@@ -101,6 +101,15 @@ def turn_of(values: Vector) -> tuple[str, float, int]:
     return "", 0.0, 0
 
 
+def known_unit(text: str) -> bool:
+    """Whether a text is a unit."""
+    try:
+        parse(text)
+    except UnitError:
+        return False
+    return bool(text)
+
+
 def is_angle(unit: str) -> bool:
     """Whether a unit is one of angles; an unknown one may be."""
     try:

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 from ..calibrate.checks.examine import examine
 from ..calibrate.checks.finding import Finding
@@ -22,14 +23,33 @@ from .draft import Draft
 from .drafting import columns_of, draft_of, layout
 from .files import place
 from .given import take
-from .inspect import inspect
-from .matching import Column, Matches, Place, candidates, guess, places_of
+from .guess import Guess
+from .inspect import FileReport, inspect
+from .matching import Column, Match, Matches, Place, candidates, guess, places_of
 from .refine import add_parameters, add_starts, choose_step, short
 from .runs import Run, check_alike, parts_of
 
-Ask = Callable[[Place, Sequence[Column]], str]
-"""Asks for the column of an input: answers with what stands before `=` in `--map`, or nothing."""
 NAME = "dataset.toml"
+
+
+class Asker(Protocol):
+    """Somebody who answers."""
+
+    def column(self, place: Place, columns: Sequence[Column]) -> str:
+        """The column that drives an input, as `--map` names it, or a number."""
+        ...
+
+    def variable(self, source: str, names: Sequence[str]) -> str:
+        """The variable that a column is, "" for none of them."""
+        ...
+
+    def unit(self, match: Match) -> str:
+        """The unit of a column."""
+        ...
+
+
+def _silent(text: str) -> None:
+    """Nobody looks."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +102,8 @@ def import_logs(
     wishes: Wishes,
     folder: Path,
     provider: Provider,
-    ask: Ask | None = None,
+    ask: Asker | None = None,
+    told: Callable[[str], None] = _silent,
 ) -> Imported:
     """Write a data set.
 
@@ -92,7 +113,8 @@ def import_logs(
         wishes: what the user says.
         folder: to write.
         provider: where variants come from.
-        ask: asks for what is missing; an error lists it if not given.
+        ask: is asked for what is missing; an error lists it if not given.
+        told: is told what is being done.
 
     Raises:
         InputError: what is missing or does not fit, with the flag to give.
@@ -103,10 +125,11 @@ def import_logs(
         )
     file = _system(wishes.system)
     system = file.build(provider)
-    looked = {
-        name: [inspect(path, wishes.topics, wishes.clock) for path in paths]
-        for name, paths in files.items()
-    }
+    looked: dict[str, list[FileReport]] = {}
+    for name, paths in files.items():
+        for path in paths:
+            told(f"reading {path}")
+            looked.setdefault(name, []).append(inspect(path, wishes.topics, wishes.clock))
     runs = [Run(name, purposes[name], parts_of(name, found)) for name, found in looked.items()]
     check_alike(runs)
     variables = places_of(system)
@@ -125,10 +148,11 @@ def import_logs(
     draft = draft_of(runs, matches, stored, plan, said, head)
     unfinished = folder / f"unfinished_{NAME}"
     try:
-        notes = _refined(draft, unfinished, provider, plan.late, wishes)
+        notes = _refined(draft, unfinished, provider, plan.late, wishes, told)
     finally:
         unfinished.unlink(missing_ok=True)
     write_text(folder / NAME, draft.text())
+    told("checking the data set")
     problem = read_problem(folder, provider)
     findings = examine(Simulator(problem))
     estimated = [str(entry.keys["name"]) for entry in draft.parameters]
@@ -178,25 +202,18 @@ def _system_entry(file: SystemFile, folder: Path, name: str) -> str:
 
 
 def _matched(
-    columns: Sequence[Column], variables: Sequence[Place], wishes: Wishes, ask: Ask | None
+    columns: Sequence[Column], variables: Sequence[Place], wishes: Wishes, ask: Asker | None
 ) -> Matches:
     """Columns as variables: as given, by guess, and as answered."""
     matches = take(wishes.maps, columns, variables)
     guess(columns, variables, matches)
-    answers = []
-    for place_ in list(matches.open) if ask is not None else ():
-        assert ask is not None
-        left = [c for c in candidates(place_, columns) if c.source not in matches.used()]
-        if answer := ask(place_, left):
-            answers.append(f"{answer}={place_.name}")
-    if answers:
-        matches = take([*wishes.maps, *answers], columns, variables)
-        guess(columns, variables, matches)
+    if ask is not None:
+        matches = _asked(matches, columns, variables, wishes, ask)
     if matches.open:
         raise InputError(_lacking(matches, columns))
-    without = [m for m in (*matches.inputs.values(), *matches.channels.values())
-               if not m.column.unit.unit and m.place.unit not in ("", "1")]  # fmt: skip
-    if without:
+    if not matches.channels:
+        raise InputError(_nothing_measured(matches))
+    if without := _without_unit(matches):
         lines = [
             f"  --map '{m.column.source}={m.place.name}:UNIT'  ({m.column.unit.reason}; "
             f"{m.place.name} is in {m.place.unit})"
@@ -204,6 +221,47 @@ def _matched(
         ]
         raise InputError("units that nothing tells; give them:\n" + "\n".join(lines))
     return matches
+
+
+def _asked(
+    matches: Matches, columns: Sequence[Column], variables: Sequence[Place], wishes: Wishes,
+    ask: Asker,
+) -> Matches:  # fmt: skip
+    """What was guessed, with what somebody answers about the rest."""
+    answers = []
+    for place_ in matches.open:
+        left = [c for c in candidates(place_, columns) if c.source not in matches.used()]
+        if answer := ask.column(place_, left):
+            answers.append(f"{answer}={place_.name}")
+    for source, names in matches.unsure.items():
+        free = [n for n in names if not any(a.endswith(f"={n}") for a in answers)]
+        if free and (answer := ask.variable(source, free)):
+            answers.append(f"{source}={answer}")
+    if answers:
+        matches = take([*wishes.maps, *answers], columns, variables)
+        guess(columns, variables, matches)
+    for match in _without_unit(matches):
+        unit = Guess(ask.unit(match), "answered", sure=True)
+        into = matches.inputs if match.place.role == "input" else matches.channels
+        into[match.place.name] = replace(match, column=replace(match.column, unit=unit))
+    return matches
+
+
+def _without_unit(matches: Matches) -> list[Match]:
+    """Matches of columns whose unit is unknown, to variables that have one."""
+    return [m for m in (*matches.inputs.values(), *matches.channels.values())
+            if not m.column.unit.unit and m.place.unit not in ("", "1")]  # fmt: skip
+
+
+def _nothing_measured(matches: Matches) -> str:
+    lines = [
+        "no column is matched to an output of the system, so nothing would be compared; give "
+        "--map 'COLUMN=instance.output'"
+    ]
+    for source, names in matches.unsure.items():
+        lines.append(f"  --map '{source}={names[0]}'  (or {', '.join(names[1:])})"
+                     if names[1:] else f"  --map '{source}={names[0]}'")  # fmt: skip
+    return "\n".join(lines)
 
 
 def _lacking(matches: Matches, columns: Sequence[Column]) -> str:
@@ -236,8 +294,9 @@ def _used(runs: Sequence[Run], matches: Matches) -> list[Run]:
 
 
 def _refined(
-    draft: Draft, path: Path, provider: Provider, late: float, wishes: Wishes
-) -> list[str]:
+    draft: Draft, path: Path, provider: Provider, late: float, wishes: Wishes,
+    told: Callable[[str], None],
+) -> list[str]:  # fmt: skip
     """Put into a draft what simulating tells; what is worth a word."""
     notes = []
 
@@ -248,6 +307,7 @@ def _refined(
     first = problem()
     inputs = [signal for run in first.runs for signal in run.inputs.values()]
     shortest = min((_interval(signal) for signal in inputs), default=draft.period)
+    told("trying communication steps")
     draft.step, change = choose_step(first, max(shortest, draft.period * 0.02))
     if draft.nuisances:  # late clocks ask for what is between the samples
         draft.period = draft.step
@@ -260,7 +320,9 @@ def _refined(
         draft.step_comment = (
             f"[s] A finer step changes {change:.2g} of the noise. Recorded is every `period`."
         )
+    told("trying start values")
     add_starts(draft, problem(), late)
+    told("trying which parameters the logs tell")
     add_parameters(draft, problem(), wishes.parameters)
     return notes
 

@@ -201,7 +201,7 @@ def guess(columns: Sequence[Column], places: Sequence[Place], matches: Matches) 
                       and rated[c.source, order[0].name] > best - MARGIN]  # fmt: skip
             if len(rivals) == 1 and not others:
                 into[order[0].name] = Match(column, order[0], "name and unit fit")
-            elif role == "output" and len(rivals) > 1:
+            elif role == "output":
                 matches.unsure[column.source] = rivals
     _by_unit(columns, places, matches)
     for source in matches.used():

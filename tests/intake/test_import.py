@@ -7,6 +7,7 @@ import os
 import pty
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from cosim.errors import CosimError, InputError, UnknownNameError
 from cosim.files import read_toml
 from cosim.installation.builder import default_provider
 from cosim.intake.importing import Imported, Wishes, import_logs
+from cosim.intake.matching import Column, Match, Place
 from cosim.intake.runs import grouped, purposes
 
 LATE = 0.23
@@ -120,8 +122,7 @@ def test_a_merged_table_with_two_clocks_is_taken_apart(tmp_path: Path) -> None:
         lines.append(",".join(row + ([f"{v:.6f}" for v in pose] if pose else [""] * 4)))
     (tmp_path / "a.csv").write_text("\n".join(lines))
     (tmp_path / "robot.toml").write_text(SYSTEM)
-    done = imported(tmp_path, tmp_path / "set", pattern="a.csv",
-                    ask=lambda place, columns: columns[0].source)  # fmt: skip
+    done = imported(tmp_path, tmp_path / "set", pattern="a.csv")
     assert done.matches.inputs["base.w_l"].column.source == "c.c_left_rpm"
     assert done.matches.channels["base.phi"].column.source == "p.p_yaw_rad"
     assert "clock:p_x" in (tmp_path / "set" / "dataset.toml").read_text()
@@ -153,6 +154,42 @@ def test_a_unit_that_nothing_tells_is_asked_for(logs: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match=r"--map 'cmd.left=base.w_l:UNIT'"):
         imported(tmp_path, tmp_path / "set", *maps)
     done = imported(tmp_path, tmp_path / "set", *[f"{m}:rpm" for m in maps])
+    assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
+
+
+class Answers:
+    """Somebody who knows."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def column(self, place: Place, columns: Sequence[Column]) -> str:
+        self.asked.append(place.name)
+        return columns[0].source
+
+    def variable(self, source: str, names: Sequence[str]) -> str:
+        self.asked.append(source)
+        return names[0] if source == "pose.yaw_deg" else ""
+
+    def unit(self, match: Match) -> str:
+        self.asked.append(match.column.source)
+        return "rpm"
+
+
+def test_somebody_is_asked_what_is_open_only(logs: Path, tmp_path: Path) -> None:
+    commands, poses = (tmp_path / f"one_{end}.csv" for end in ("cmd", "pose"))
+    text = (logs / "one_cmd.csv").read_text()
+    commands.write_text(text.replace("left_rpm", "wheel_1").replace("right_rpm", "right"))
+    head, *rows = (logs / "one_pose.csv").read_text().splitlines()
+    rows = [f"{row},{row.rpartition(',')[2]}" for row in rows]
+    poses.write_text("\n".join([f"{head},yaw_deg", *rows]))
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    answers = Answers()
+    done = imported(tmp_path, tmp_path / "set", ask=answers)
+    assert answers.asked == [
+        "base.w_l", "pose.heading_deg", "pose.yaw_deg", "cmd.wheel_1", "cmd.right",
+    ]  # fmt: skip
+    assert done.matches.channels["base.phi"].column.source == "pose.yaw_deg"
     assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
 
 

@@ -68,7 +68,9 @@ def test_what_may_be_two_things_is_not_guessed() -> None:
     assert (drives, measures) == ({}, {})
     assert set(matches.unsure["speed"]) == {"motor.w", "load.w"}
     # two columns for one variable
-    assert matched([column("heading_deg", "deg"), column("yaw_rad", "rad")])[1] == {}
+    _, measures, matches = matched([column("heading_deg", "deg"), column("yaw_rad", "rad")])
+    assert measures == {}
+    assert matches.unsure == {"heading_deg": ["base.phi"], "yaw_rad": ["base.phi"]}
 
 
 def test_units_that_do_not_fit_and_columns_that_stand_still_are_nothing() -> None:
