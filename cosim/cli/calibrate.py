@@ -161,7 +161,8 @@ def clock_lines(clocks: dict[str, dict[str, Any]]) -> list[str]:
         note += ", at its bound" if item["at_bound"] else ""
         side = "late" if item["value"] >= 0.0 else "early"
         size = f"{abs(item['value']):.4g} {item['unit']}"
-        found.append(f"{name}: {size} {side} ({low:.4g} to {high:.4g}{note})")
+        same = "; a delay of all commands looks the same" if item["value"] > 0.0 else ""
+        found.append(f"{name}: {size} {side} ({low:.4g} to {high:.4g}{note}){same}")
     return found
 
 
