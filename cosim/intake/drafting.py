@@ -22,6 +22,8 @@ LATE, SHARE = 1.0, 0.1
 run that this may be."""
 SHORT_TAIL = 5.0
 """Intervals of a command topic by which a run may go on after its last command."""
+MEASURED = ("measured", "odom", "odometry", "estimate", "estimated", "filtered", "imu")
+"""Words in the names of topics of twists that are no commands."""
 GUESSED = 1e-3
 """Noise of a column that has none, over its range."""
 
@@ -51,7 +53,7 @@ def columns_of(runs: Sequence[Run]) -> list[Column]:
     first = runs[0]
     for key, part in first.parts.items():
         spoken = [*words(key), *words(part.report.topic.name), *words(part.report.topic.kind)]
-        said = COMMAND in spoken or "twist" in spoken
+        said = COMMAND in spoken or ("twist" in spoken and not set(MEASURED) & set(spoken))
         for column in part.report.columns:
             reports = [_report(run, key, column.name) for run in runs]
             if any(report is None for report in reports):

@@ -14,7 +14,7 @@ from ..calibrate.columns import EPOCHS
 from ..files import atomic, make_folder, writing
 from ..spec.units import parse
 from .clock import Clock
-from .runs import Part, Run
+from .runs import Part, Run, plain
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -64,11 +64,13 @@ def place(run: Run, folder: Path, whole: bool) -> dict[str, str]:
     for key, part in run.parts.items():
         if whole:
             target = folder / LOGS / part.path.name
+            if target.exists() and target.resolve() != part.path.resolve():  # of another folder
+                target = folder / LOGS / f"{plain(run.name)}_{part.path.name}"
             if part.path.resolve() != target.resolve():
                 with writing(target):
                     shutil.copyfile(part.path, target)
         else:
-            name = f"{run.name}_{key}" if key else run.name
+            name = plain(f"{run.name}_{key}" if key else run.name)
             target = folder / LOGS / f"{name}.parquet"
             write_part(part, target)
         found[key] = target.relative_to(folder).as_posix()

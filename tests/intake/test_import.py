@@ -193,6 +193,21 @@ def test_somebody_is_asked_what_is_open_only(logs: Path, tmp_path: Path) -> None
     assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
 
 
+def test_logs_of_one_name_do_not_overwrite_each_other(logs: Path, tmp_path: Path) -> None:
+    files = {}
+    for run in ("one", "two"):
+        (tmp_path / run).mkdir()
+        for end in ("cmd", "pose"):
+            content = (logs / f"{run}_{end}.csv").read_bytes()
+            (tmp_path / run / f"{end}.csv").write_bytes(content)
+        files[run] = [tmp_path / run / "cmd.csv", tmp_path / run / "pose.csv"]
+    chosen = dict.fromkeys(files, "identification")
+    wishes = Wishes(str(logs / "robot.toml"), (), {"base.r": ()})
+    import_logs(files, chosen, wishes, tmp_path / "set", default_provider())
+    one, two = read_problem(tmp_path / "set").runs
+    assert one.data.shape != two.data.shape or np.nanmax(np.abs(one.data - two.data)) > 0.1
+
+
 def test_a_folder_that_has_a_mapping_is_not_overwritten(logs: Path, tmp_path: Path) -> None:
     (tmp_path / "dataset.toml").write_text("")
     with pytest.raises(InputError, match="is there already; choose another folder with --out"):
