@@ -193,6 +193,18 @@ def test_somebody_is_asked_what_is_open_only(logs: Path, tmp_path: Path) -> None
     assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
 
 
+def test_runs_are_cut_into_windows_with_starts_of_their_own(logs: Path, tmp_path: Path) -> None:
+    done = imported(logs, tmp_path / "set", window=4.0, parameters={"base.r": ()})
+    assert len(done.runs) == 3
+    problem = read_problem(tmp_path / "set")
+    assert [run.name for run in problem.runs][:3] == ["one 0", "one 1", "three 0"]
+    starts = [p.name for p in problem.parameters if p.name.startswith("start of px")]
+    assert starts == [f"start of px@{run.name}" for run in problem.runs]
+    # a clock is late by a tenth of a window at most
+    clock = next(p for p in problem.parameters if p.name == "clock of pose")
+    assert (clock.minimum, clock.maximum) == pytest.approx((-0.4, 0.4), rel=1e-9)
+
+
 def test_logs_of_one_name_do_not_overwrite_each_other(logs: Path, tmp_path: Path) -> None:
     files = {}
     for run in ("one", "two"):
