@@ -224,8 +224,8 @@ def _clock_nuisance(key: str, channels: Sequence[str], plan: Layout) -> Entry:
     text = (
         f"How late the clock of {key or 'the log'} is against that of {reference}: another "
         "computer, another driver, the time a camera takes. Estimated for all runs together. A "
-        "delay of all commands looks the same, and is in it: to look for one, give the offset that "
-        "you know as nominal, how well you know it as prior (a deviation in s), and narrow bounds."
+        "delay of all commands looks the same, and is in it: who knows how late the clock is takes "
+        "that off, and the rest is the delay."
     )
     return Entry(
         {"name": f"clock of {key}", "unit": "s", "nominal": 0.0, "min": -plan.late,
