@@ -34,6 +34,10 @@ Topics = Annotated[
 ]
 SMOOTH = 0.2
 """Steps of resolution below which noise is none: rounding alone makes 0.29 of one."""
+Received = Annotated[
+    bool,
+    typer.Option("--received", help="Of a bag: times of recording instead of header stamps."),
+]
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -41,6 +45,7 @@ PICTURES = (".png", ".svg", ".pdf")
 def inspect_command(
     files: Files,
     topics: Topics = None,
+    received: Received = False,
     plot: Annotated[Path | None, typer.Option(help="Draw it: a .png, .svg or .pdf file.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -57,7 +62,7 @@ def inspect_command(
     with working() as told:
         for path in files:
             told(f"reading {path}")
-            reports.append(inspect(path, topics or ()))
+            reports.append(inspect(path, topics or (), received=received))
     made = []
     if plot is not None:
         path, left = draw(reports, plot)
@@ -166,6 +171,7 @@ def import_command(
         float, typer.Option(help="Cut runs into pieces of this length [s], each with its start.")
     ] = 0.0,
     topics: Topics = None,
+    received: Received = False,
     clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("dataset"),
     as_json: AsJson = False,
@@ -188,7 +194,13 @@ def import_command(
     if len(named) == 1:
         say("note: there is one run only, so nothing is left to judge what is fitted")
     wishes = Wishes(
-        system, maps or (), parameters_of(parameters or []), tuple(topics or ()), clock, window
+        system,
+        maps or (),
+        parameters_of(parameters or []),
+        tuple(topics or ()),
+        clock,
+        window,
+        received,
     )
     ask = _Terminal() if _somebody() else None
     with working(quiet=ask is not None) as told:

@@ -62,6 +62,7 @@ class Wishes:
         parameters: as of `--parameter`.
         topics: only these.
         clock: column of times, where it is not found.
+        received: of bags, take the times of recording instead of the stamps in headers.
         window: [s] of the pieces that runs are cut into, 0 for whole runs.
     """
 
@@ -71,6 +72,7 @@ class Wishes:
     topics: Sequence[str] = ()
     clock: str = ""
     window: float = 0.0
+    received: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,9 @@ def import_logs(
     for name, paths in files.items():
         for path in paths:
             told(f"reading {path}")
-            looked.setdefault(name, []).append(inspect(path, wishes.topics, wishes.clock))
+            looked.setdefault(name, []).append(
+                inspect(path, wishes.topics, wishes.clock, wishes.received)
+            )
     runs = [Run(name, purposes[name], parts_of(name, found)) for name, found in looked.items()]
     check_alike(runs)
     variables = places_of(system)
@@ -290,6 +294,15 @@ def _used(runs: Sequence[Run], matches: Matches) -> list[Run]:
                     f"{part.path}: {key or 'it'} has no clock: no column rises evenly; name one "
                     "with --clock COLUMN"
                 )
+        clocks = {key: part.report.clock for key, part in run.parts.items()}
+        if len({clock.epoch for clock in clocks.values()}) > 1:
+            since = [key for key, clock in clocks.items() if clock.epoch]
+            other = [key for key, clock in clocks.items() if not clock.epoch]
+            raise InputError(
+                f"run {run.name}: the clock of {', '.join(since)} counts from 1970 and that of "
+                f"{', '.join(other)} does not, so they cannot be compared; for bags take the times "
+                "of recording with --received, else mend the logs"
+            )
     return runs
 
 

@@ -89,18 +89,21 @@ class FileReport:
         }  # fmt: skip
 
 
-def inspect(path: Path | str, topics: Iterable[str] = (), clock: str = "") -> FileReport:
+def inspect(
+    path: Path | str, topics: Iterable[str] = (), clock: str = "", received: bool = False
+) -> FileReport:
     """What is in a file.
 
     Args:
         path: of the log.
         topics: only these, all if not given.
+        received: of a bag, take the times of recording instead of the stamps in headers.
         clock: column of times of the topics that have it; found by itself if not given.
 
     Raises:
         ScenarioError: it cannot be read.
     """
-    source = open_source(Path(path), tuple(topics))
+    source = open_source(Path(path), tuple(topics), received)
     if clock:
         timed = [replace(t, clock=clock) if clock in t.log.columns else t for t in source.topics]
         source = replace(source, topics=tuple(timed))

@@ -161,6 +161,43 @@ def test_header_stamps_count_and_without_them_the_times_of_recording(tmp_path: P
     assert "has no header" in notes["/plain"]
 
 
+def test_times_of_recording_can_be_wished(tmp_path: Path) -> None:
+    kind = T["geometry_msgs/msg/TwistStamped"]
+    path = write(tmp_path / "bag", [(t + 10**9, "/a", kind(header(t), twist(1, 0))) for t in TIMES])
+    for received, begin in ((False, 0.0), (True, 1.0)):
+        clock = inspect(path, received=received).topics[0].clock
+        assert (clock.begin or 0.0) - 1_764_040_000 == pytest.approx(begin, abs=1e-6)
+
+
+def test_simulated_time_beside_times_of_recording_is_refused(tmp_path: Path) -> None:
+    """It begins at 0, and commands without a header have none."""
+    kind = T["geometry_msgs/msg/PoseStamped"]
+    sent: list[Message] = [(t, "/cmd_vel", twist(0.1 * (i % 7), 0.1 * (i % 5)))
+                           for i, t in enumerate(TIMES)]  # fmt: skip
+    sent += [(t, "/pose", kind(header(t - TIMES[0]), pose(0.1 * i, 0.1, 0.01 * i)))
+             for i, t in enumerate(TIMES)]  # fmt: skip
+    bag = write(tmp_path / "bag", sent)
+    assert inspect(bag, ["/pose"]).topics[0].clock.begin is None
+    wishes = Wishes("mrclam_create")
+    with pytest.raises(InputError, match=r"cmd_vel counts from 1970 and that of pose does .*--rec"):
+        import_logs({"a": [bag]}, {"a": "identification"}, wishes, tmp_path / "set",
+                    default_provider())  # fmt: skip
+
+
+def test_joints_may_come_and_go_and_topics_be_short(tmp_path: Path) -> None:
+    kind = T["sensor_msgs/msg/JointState"]
+    sent: list[Message] = [(TIMES[0], "/once", twist(1.0, 0.0))]
+    for i, time in enumerate(TIMES):
+        names = ["a", "b"] if i % 2 else ["b"]
+        state = kind(header(time), names, np.full(len(names), float(i)), np.zeros(0), np.zeros(0))
+        sent.append((time, "/joints", state))
+    found = {t.topic.name: t for t in inspect(write(tmp_path / "bag", sent)).topics}
+    log = found["/joints"].topic.log
+    assert np.array_equal(np.isnan(log["position.a"]), np.arange(60) % 2 == 0)
+    assert np.array_equal(log["position.b"], np.arange(60.0))
+    assert found["/once"].clock.interval == 0.0
+
+
 def test_what_comes_twice_or_out_of_order_is_put_right_and_said(tmp_path: Path) -> None:
     kind = T["geometry_msgs/msg/PoseStamped"]
     times = [*TIMES[:20], TIMES[19], TIMES[21], TIMES[20], *TIMES[22:]]

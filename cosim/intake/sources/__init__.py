@@ -16,18 +16,19 @@ KINDS = {
 """Reader of each end of a file's name."""
 
 
-def open_source(path: Path, topics: tuple[str, ...] = ()) -> Source:
+def open_source(path: Path, topics: tuple[str, ...] = (), received: bool = False) -> Source:
     """Read a log.
 
     Args:
         path: of a file, or of the folder of a ROS 2 bag.
         topics: only these, all if not given.
+        received: of a bag, take the times of recording instead of the stamps in headers.
 
     Raises:
         ScenarioError: missing, of an unknown kind, or unreadable.
     """
     if bags.is_bag(path):
-        return bags.read(path, topics)
+        return bags.read(path, topics, received)
     reader = KINDS.get(path.suffix.lower())
     if reader is None:
         what = "is a folder without metadata.yaml" if path.is_dir() else "is of no known kind"

@@ -18,6 +18,8 @@ from ..topic import Source, Topic
 from . import messages
 
 Vector = NDArray[np.float64]
+STAMPED = 0.9
+"""Share of headers that must have a time for these to count: simulated time begins at 0."""
 ENDS = (".bag", ".mcap", ".db3")
 
 
@@ -38,8 +40,13 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in ENDS or (path / "metadata.yaml").is_file()
 
 
-def read(path: Path, topics: tuple[str, ...]) -> Source:
+def read(path: Path, topics: tuple[str, ...], recorded: bool = False) -> Source:
     """Read a bag; each topic that holds numbers becomes one, transforms one per pair of frames.
+
+    Args:
+        path: of the file or the folder.
+        topics: only these, all if not given.
+        recorded: take the times of recording instead of the stamps in headers.
 
     Raises:
         InputError: the library is not installed.
@@ -76,7 +83,7 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
     for name, own in found.items():
         columns, notes = _columns(own)
         if columns:
-            made.append(_topic(name, own, columns, notes))
+            made.append(_topic(name, own, columns, notes, recorded))
         else:
             left[name] = f"{own.kind} holds no numbers"
     return Source(path, "ROS bag", tuple(made), plain=False, left=left)
@@ -145,9 +152,14 @@ def _ordered(
     return stamps[first].tolist(), {name: values[first] for name, values in columns.items()}
 
 
-def _topic(name: str, own: _Collected, columns: dict[str, Vector], notes: list[str]) -> Topic:
+def _topic(
+    name: str, own: _Collected, columns: dict[str, Vector], notes: list[str], recorded: bool
+) -> Topic:
     stamps, received = np.array(own.stamps, dtype=np.int64), np.array(own.received, dtype=np.int64)
-    if stamps.size and bool(np.all(stamps > 0)):
+    if recorded:
+        times = own.received
+        notes.append("times are those at which messages were recorded, as wished")
+    elif stamps.size and float(np.mean(stamps > 0)) > STAMPED:
         later = (received - stamps) * 1e-9
         times = own.stamps
         notes.append(
