@@ -448,6 +448,8 @@ class Joined(MappedLogs):
         gain, offset, unit = self._conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))
+        last = np.append(np.diff(times) > 0.0, True)  # of a burst of commands the last one counts
+        times, values = times[last], values[last]
         how = str(entry.get("interpolation", "hold"))
         if how == "slope":  # of the interval that begins
             values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
