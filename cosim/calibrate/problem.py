@@ -299,7 +299,7 @@ class Problem:
                     added.append(
                         free_parameter(
                             variable, full, full, strength=variable.name in strengths,
-                            hints=hints.get(variable.name, NO_HINTS).within(name),
+                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                         )
                     )  # fmt: skip
         return changed.changed(parameters=[*self.parameters, *added])
