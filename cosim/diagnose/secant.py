@@ -39,11 +39,8 @@ only cost time."""
 RUNAWAY = 1e15
 """Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
 PATIENCE = 10.0
-"""Times as long as without the effect: a fidelity with more states takes a few times as long, and
-what takes longer is an instability that a solver tries to resolve."""
-EASY = 0.01
-"""Processor time over simulated time that is always granted: a system without states takes next to
-none, so any law with a state of its own would be given up."""
+"""Times as much work as without the effect: a fidelity with more states takes a few times as much,
+and what takes more is an instability that a solver tries to resolve."""
 SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
 """Values of a second parameter between which all others are mixed, by its kind."""
 FARTHEST = 100.0
@@ -467,11 +464,8 @@ def _mismatch(item: Signature) -> float:
 
 
 def patience(base: Simulator) -> dict[str, float]:
-    """Processor time that the runs may take with an effect, from what they took without."""
-    return {
-        run: max(PATIENCE * cost, EASY * float(np.ptp(base.problem.run(run).times)))
-        for run, cost in base.costs.items()
-    }
+    """Work that the runs may take with an effect, from what they took without."""
+    return {run: PATIENCE * cost for run, cost in base.costs.items()}
 
 
 def model_values(simulator: Simulator, theta: Vector, stack: SampleStack) -> Vector:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...fmu.library import WORK
 from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
@@ -48,7 +49,10 @@ class _Call(ct.Structure):
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64), ("modes", _I64))
+    _fields_ = (
+        ("component", _P), ("step", _P), ("work", _P), ("reached", _D), ("warned", _I64),
+        ("modes", _I64),
+    )  # fmt: skip
 
 
 class _Instruction(ct.Structure):
@@ -90,8 +94,9 @@ class _Derivatives(ct.Structure):
 class _Run(ct.Structure):
     _fields_ = (
         ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
-        ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
-        ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
+        ("n_instructions", _I64), ("n_members", _I64), ("times", _P), ("step", _D), ("end", _D),
+        ("external", _P), ("external_slot", _P), ("n_external", _I64), ("copies", _P),
+        ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("bond_turnover", _P), ("n_terms", _I64), ("carried", _I64),
         ("index", _I64), ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
@@ -243,6 +248,7 @@ class Kernel:
                 spans[op, index] = (first, len(calls))
         self.run = _Run(
             members=self._structures(_Member, (_member(instance) for instance in instances)),
+            n_members=len(instances),
             calls=self._structures(_Call, calls),
             values=self._array(bound.values),
             times=self._array(bound.times),
@@ -376,7 +382,7 @@ class Kernel:
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
     def advance_within(self, last: int, limit: float, most: float) -> int:
-        """The same within some processor time [s], while no recorded value is larger than `most`.
+        """The same within some work (see `Session.run`), while no recorded value is above `most`.
 
         It does not return in between: each time, a thread would wait for the interpreter lock.
         """
@@ -430,7 +436,9 @@ class Kernel:
 
 
 def _member(instance: Instance) -> _Member:
-    return _Member(instance.address, instance.functions[f"fmi{instance.binding.version}DoStep"])
+    functions = instance.functions
+    step = functions[f"fmi{instance.binding.version}DoStep"]
+    return _Member(instance.address, step, functions.get(WORK, 0))
 
 
 def _instructions(
