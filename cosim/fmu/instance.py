@@ -36,7 +36,7 @@ from .calls import announce
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
-from .library import WORK, bind
+from .library import bind
 from .messages import STATUS, forget, new_key, status_name, take
 from .surroundings import MODES, kept, modes
 from .values import check_values
@@ -141,12 +141,6 @@ class Instance:
     def function(self, name: str) -> Any:
         """A C function as a ctypes object; its first argument is `address`."""
         return self._functions[name]
-
-    @property
-    def work(self) -> int:
-        """Steps that its solver has made so far; 0 of an FMU that does not count them."""
-        count = self._functions.get(WORK)
-        return int(count(self.address)) if count is not None else 0
 
     def failure(self, what: str, status: int) -> FmuCallError:
         """The error for a call that returned `status`, with what the FMU logged."""

@@ -23,6 +23,7 @@ from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
 from ..fmu.exchange import Block
+from ..fmu.library import WORK
 from ..fmu.values import check_values
 from ..system.inputs import Driver
 from . import kernel
@@ -80,6 +81,8 @@ class Session:
             self._run = self._execution.run
             self._stepper = self._execution.prepare()
             self._blocks = {name: self._block(name) for name in self.targets}
+            counting = [i for i in self._run.instances if WORK in i.functions]
+            self._counters = [(i.function(WORK), i.address) for i in counting]
         except BaseException:
             self._stack.close()
             raise
@@ -106,7 +109,7 @@ class Session:
         Args:
             values: by full name, or one per target.
             limit: work that it may take: communication steps times instances, and steps of
-                solvers where FMUs count them (`Instance.work`). Time would depend on the machine.
+                solvers where FMUs count them (`library.WORK`). Time would depend on the machine.
 
         Returns:
             times, and one row per time with a column per name in `names` (a copy).
@@ -175,7 +178,8 @@ class Session:
                 )
 
     def _steps_of_solvers(self) -> int:
-        return sum(instance.work for instance in self._run.instances)
+        """Made so far by those that count them."""
+        return sum(int(count(address)) for count, address in self._counters)
 
     def _largest(self) -> tuple[str, float]:
         """Name and size of the largest value recorded last."""
