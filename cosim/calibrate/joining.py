@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..data.logs import Log
 from ..data.segments import relative_pose
 from ..data.signals import Table
-from ..errors import ScenarioError, UnitError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
+from ..master.master import Master
 from ..spec.units import Unit
 from ..system.provider import Provider
 from ..system.toml import SystemFile
@@ -73,6 +74,12 @@ class Joined(MappedLogs):
         table = self.table
         model = Model.of(file, provider)
         self.system = model.plain({})
+        self.algorithm = str(table.get("algorithm", "jacobi"))
+        self.options = dict(table.get("options", {}))
+        search = self.search()
+        for options in (self.options, {**self.options, **search.options}):
+            with within(str(self.path)):  # what the master refuses is said before data are read
+                Master(self.system, self.algorithm, search.step, options=options).compile([], [])
         constants: dict[str, float] = {}
         for name, value in flatten(table.get("parameters", {})).items():
             if isinstance(value, list):
@@ -105,9 +112,10 @@ class Joined(MappedLogs):
             present,
             [self.run(name, present) for name in self.logs],
             float(table["step"]),
-            self.search(),
+            search,
             constants=constants,
-            algorithm=str(table.get("algorithm", "jacobi")),
+            algorithm=self.algorithm,
+            options=self.options,
             period=float(table["period"]) if "period" in table else None,
             ticks=bool(table.get("ticks", False)),
             relative=[tuple(names) for names in self.table.get("relative", [])],
