@@ -19,6 +19,14 @@ from .plan import Stepper, decoded
 from .startup import find_past
 
 EXECUTORS = ("auto", "c", "python")
+Maker = Callable[[Outline, ExitStack], Interpreter]
+_usual: Maker = Interpreter
+
+
+def usual(maker: Maker) -> None:
+    """Have all further executions of this process made in another way (see `board`)."""
+    global _usual
+    _usual = maker
 
 
 class Interpreted:
@@ -50,7 +58,7 @@ class Execution:
     Args:
         outline: what is run.
         stack: ends the FMUs' instances.
-        interpreter: what makes the instances and does the operations.
+        interpreter: what makes the instances and does the operations; see `usual`.
 
     Attributes:
         run: the instances and their values.
@@ -64,7 +72,7 @@ class Execution:
         self,
         outline: Outline,
         stack: ExitStack,
-        interpreter: Callable[[Outline, ExitStack], Interpreter] = Interpreter,
+        interpreter: Maker | None = None,
     ) -> None:
         if outline.executor not in EXECUTORS:
             raise ValueRangeError(
@@ -72,7 +80,7 @@ class Execution:
                 f"{EXECUTORS[-1]}"
             )
         self.outline = outline
-        self.run = interpreter(outline, stack)
+        self.run = (interpreter or _usual)(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
         self.lost: list[str] = []

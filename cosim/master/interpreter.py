@@ -37,6 +37,9 @@ class Shared(Protocol):
     ) -> None:
         """Operation and instance of each call of the compiled executor."""
 
+    def enter(self) -> None:
+        """Note the thread that goes on with the run."""
+
 
 class Interpreter:
     """The FMUs of a run, the values that they exchange, and what each operation does to them.

@@ -373,6 +373,7 @@ class Kernel:
 
     def advance(self, last: int) -> int:
         """Communication steps up to `last`; 0, or the status that ended it."""
+        self._enter()
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
     def advance_within(self, last: int, limit: float, most: float) -> int:
@@ -380,7 +381,12 @@ class Kernel:
 
         It does not return in between: each time, a thread would wait for the interpreter lock.
         """
+        self._enter()
         return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
+
+    def _enter(self) -> None:
+        if self._bound.witness is not None:
+            self._bound.witness.enter()
 
     def restart(self) -> None:
         """Begin again at the first communication point."""
