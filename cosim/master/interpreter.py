@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -12,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
+from ..fmu.attributes import INTEGERS
+from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from .extrapolation import derivatives_at_begin, mean_of_step
@@ -86,6 +89,8 @@ class Interpreter:
             ):
                 span = slice(*spans[index].tolist())
                 variables = [member.description.variables[name] for name in names[index]]
+                if blocks is self.inputs:
+                    variables = [self._exact(member.name, variable) for variable in variables]
                 blocks.append(Block(instance, variables, self.values[span], self.objects[span]))
         origins = {c.target: c.source for c in self.system.connections}
         origins.update({name: signal.text for name, signal in outline.signals.items()})
@@ -107,6 +112,23 @@ class Interpreter:
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
         self.started = False
+
+    @cached_property
+    def _integers(self) -> set[str]:
+        """Inputs that get integers as they are."""
+        return {
+            wire.target
+            for wire in self.system.connections
+            if (wire.gain, wire.offset) == (1.0, 0.0)
+            and self.system.declaration(wire.source).type in INTEGERS
+        }
+
+    def _exact(self, instance: str, variable: Variable) -> Variable:
+        """An input, which refuses what it does not carry if only integers come."""
+        if variable.type != "Float32":
+            return variable
+        whole = {f"{instance}.{name}" for name in variable.elements()} <= self._integers
+        return replace(variable, type="Float32Whole") if whole else variable
 
     @cached_property
     def instants(self) -> list[float]:

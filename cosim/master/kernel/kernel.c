@@ -49,6 +49,7 @@ static int convert(const Call *c, double *values, int into) {
     CONVERT(8, int64_t, SIGNED(64, *v), rint(*v)) /* enumerations of FMI 3 */
     CONVERT(9, bool, TRUTH(*v), rint(*v))
     CONVERT(10, int32_t, TRUTH(*v), rint(*v)) /* booleans of FMI 2 */
+    CONVERT(11, float, (double)(float)*v == *v || isnan(*v), *v) /* given integers */
   }
   return 0;
 }
