@@ -165,9 +165,12 @@ class Execution:
 
         Args:
             request: of an FMU that ended it. Where all FMUs stand at one time then, their values
-                are recorded in any case.
+                are recorded in any case; otherwise those of the last time at which they did.
         """
         run = self.run
+        if request is not None and not request.complete:
+            run.keep_last(present=False)
+            return
         last = request is not None and request.complete
         if run.row > run.index // self.outline.every and not (
             last and run.index % self.outline.every
@@ -176,7 +179,7 @@ class Execution:
         for op, a, b in decoded(self.outline.plan.final):
             run.do(op, a, b)
         if last:
-            run.keep_last()
+            run.keep_last(present=True)
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""

@@ -58,6 +58,7 @@ class Interpreter:
         rows, row: recorded values, and how many rows there are.
         passes: whether values travel as objects.
         beside: communication point of the last row if it is none of every n-th, else None.
+        noted: communication point whose values stand behind the last row.
         bond_energy, bond_turnover: energy that each bond invented, and that went over it [J].
         newtons: one per algebraic loop.
         history, past: of extrapolated inputs, and how many values it has before the first step.
@@ -101,6 +102,7 @@ class Interpreter:
         self.rows = np.empty((outline.capacity, len(outline.observed)))
         self.row = self.index = 0
         self.beside: int | None = None
+        self.noted = -1
         self.bond_energy = np.zeros(len(self.layout.bonds))
         self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
@@ -247,18 +249,40 @@ class Interpreter:
         self.derivatives.curve[index] = curve * mean.gain
 
     def record(self) -> None:
-        """Keep observed values if it is their turn; note outputs for the energy of bonds."""
+        """Keep observed values if it is their turn; note outputs for the energy of bonds.
+
+        Otherwise they stand behind the last row, and are one if the run ends within the next step.
+        """
         layout, values = self.layout, self.values
         self.previous = values[layout.bond_output].tolist()
+        row = values[layout.record_source] * layout.record_gain + layout.record_offset
         if self.index % self.every == 0:
-            self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+            self.keep(row)
+            return
+        self.rows[self.row] = row
+        self.noted = self.index
+        if self.passes:
+            self.passing.note(self.objects)
 
-    def keep_last(self) -> None:
-        """Keep the present values although it is not their turn."""
+    def keep_last(self, *, present: bool) -> None:
+        """Keep a last row although it is not its turn.
+
+        Args:
+            present: with the present values; otherwise with those of the last communication point,
+                from which some FMUs have gone on.
+        """
         layout = self.layout
-        if self.index % self.every:
+        if not self.index % self.every:
+            return
+        if present:
             self.keep(self.values[layout.record_source] * layout.record_gain + layout.record_offset)
-            self.beside = self.index
+        elif self.noted == self.index:
+            self.row += 1
+            if self.passes:
+                self.passing.keep_noted()
+        else:
+            return
+        self.beside = self.index
 
     def recorded_times(self) -> Vector:
         """Times of the rows [s]."""

@@ -145,8 +145,6 @@ static int record(Run *run) {
   const double *values = run->values;
   if (!run->carried || run->index == 0)
     for (int64_t i = 0; i < run->n_terms; i++) run->terms[i].previous = values[run->terms[i].output];
-  if (run->index != run->next_record) return 0;
-  run->next_record += run->every;
   double *row = run->rows + run->row * run->n_record;
   int finite = 1;
   for (int64_t i = 0; i < run->n_record; i++) {
@@ -154,6 +152,9 @@ static int record(Run *run) {
     row[i] = values[c->source] * c->gain + c->offset;
     finite &= isfinite(row[i]) != 0;
   }
+  /* between its turns a row is written, but not counted: it is the last one if the run ends here */
+  if (run->index != run->next_record) return 0;
+  run->next_record += run->every;
   if (!finite) return NOT_FINITE;
   run->row++;
   return 0;
