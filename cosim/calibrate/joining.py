@@ -15,6 +15,7 @@ from ..data.signals import Table
 from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
 from ..master.master import Master
+from ..reading.schema import shown
 from ..spec.units import Unit
 from ..system.provider import Provider
 from ..system.toml import SystemFile
@@ -47,9 +48,9 @@ def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
     value = values[match["key"]]
     try:
         return float(value[int(match["index"])] if match["index"] else value)
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, OverflowError):
         raise ScenarioError(
-            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{where}: entry {key!r} is no number, it reads {shown(value)}; name an element as "
             f"{match['key']}[0]"
         ) from None
 
@@ -270,6 +271,11 @@ class Joined(MappedLogs):
                 where = f"{self.path}: {key} {entry.get('name')}"
                 targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
+                if isinstance(entry["nominal"], str) and not entry.get("per_run"):
+                    raise ScenarioError(
+                        f"{where}: nominal {entry['nominal']!r} is another one in each run; "
+                        "write per_run = true, or a number"
+                    )
                 for run in runs:
                     nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
                     span = float(entry.get("span", 0.0))
