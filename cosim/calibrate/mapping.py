@@ -8,13 +8,14 @@ in the model. It is looked for in the data set's folder, above it, and among the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..data.logs import DataSet, read_data_set, runs_of
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import InputError, ScenarioError, UnknownNameError, listing
 from ..files import read_toml
 from ..installation import builder, places
 from ..system.provider import Provider
@@ -106,7 +107,20 @@ def read_problem(
         partial(read_problem, folder, provider, mapping=path.parent / name, only=only)
         for name in table.get("further", [])
     ]
-    return Joined(path, table, data, only or {}).problem(file, provider).changed(further=further)
+    with _named(path, folder):
+        problem = Joined(path, table, data, only or {}).problem(file, provider)
+    return problem.changed(further=further)
+
+
+@contextmanager
+def _named(path: Path, folder: Path) -> Iterator[None]:
+    """Errors that name no file of the data set are about the mapping."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error) or str(folder) in str(error):
+            raise
+        raise type(error)(f"{path}: {error}") from error
 
 
 def read_mapping(path: Path) -> dict[str, Any]:

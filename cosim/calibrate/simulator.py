@@ -75,7 +75,9 @@ class Simulator:
     def session(self, run: MeasuredRun) -> Session:
         """A new prepared run."""
         problem = self.problem
-        master = Master(problem.plain(), problem.algorithm, problem.step, options=problem.options)
+        master = Master(
+            problem.plain(), problem.algorithm, problem.step, options=problem.chosen_options
+        )
         interval = problem.period or float(np.median(np.diff(run.times)))
         every = max(round(interval / problem.step), 1)
         size = every * problem.step

@@ -13,7 +13,7 @@ import contextlib
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +28,7 @@ from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .fmus import fmus_app
+from .guard import applies, guarded
 from .linearize import linearize_command
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
@@ -260,9 +261,21 @@ def leaving_nothing() -> Iterator[None]:
 
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
+    if applies(sys.argv[1:]):
+        _said(lambda: guarded(lambda: _said(_run)))
+    else:
+        _said(_run)
+
+
+def _run() -> None:
+    with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+        app()
+
+
+def _said(work: Callable[[], None]) -> None:
+    """Do some work; what goes wrong is said."""
     try:
-        with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
-            app()
+        work()
     except CosimError as error:
         say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from ..calibrate.problem import Problem
     from ..calibrate.sensitivity import Correlation
 
+FAR = 2.0
+"""Residual over the noise from which a model evidently lacks something: good ones leave 1, and
+logs whose noise is guessed up to half as much again."""
+
 
 def calibrate_command(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
@@ -42,10 +46,10 @@ def calibrate_command(
 
     Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
     """
+    from ..calibrate.calibration import calibrated
     from ..calibrate.checks.examine import examine
     from ..calibrate.checks.finding import passed
     from ..calibrate.checks.late import check_late
-    from ..calibrate.fit import fit
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
@@ -54,10 +58,14 @@ def calibrate_command(
     problem = read_problem(dataset, mapping=mapping, system=system)
     simulator = Simulator(problem, workers=workers)
     findings = _usable(problem, examine(simulator))
-    estimate = fit(simulator)
+    estimate, exchange = calibrated(simulator)
+    if not exchange.small:
+        typer.echo(f"warning: {exchange}", err=True)
     findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
     correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
     content = calibration_table(estimate, correlation, findings)
+    content["exchange"] = exchange.to_dict()
+    content["evaluations"] = simulator.evaluations + exchange.evaluations
     content["wall_s"] = time.perf_counter() - started
     folder = make_folder(out or Path("out") / problem.name)
     content["files"] = [str(folder / "calibration.json")]
@@ -131,7 +139,6 @@ def calibration_table(
             "correlation_limit": correlation.limit if correlation else None,
         },
         "findings": [finding.to_dict() for finding in findings],
-        "evaluations": estimate.simulator.evaluations,
     }  # fmt: skip
 
 
@@ -175,5 +182,14 @@ def _print(content: dict[str, Any]) -> None:
             *("-" if value is None else f"{value:.4g}" for value in cells),
         )  # fmt: skip
     console.print(table)
+    console.print(content["exchange"]["text"], soft_wrap=True)
+    far = {n: (v["identification"] or 0.0) / v["noise_rms"] for n, v in content["channels"].items()}
+    name = max(far, key=lambda n: far[n])
+    if far[name] > FAR:
+        console.print(
+            f"the model leaves {far[name]:.3g} times the noise in {name}: it lacks something that "
+            "values and intervals make up for; `cosim diagnose` looks for it",
+            soft_wrap=True,
+        )
     for path in content["files"]:
         console.print(path, soft_wrap=True)

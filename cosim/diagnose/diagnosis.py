@@ -16,13 +16,13 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError
 from ..files import atomic
 from ..system.provider import locate
 from .bursts import bursts, times
-from .deferred import step_error
 from .exchange import reconsidered
 from .experiment import propose
 from .further import Further, judged

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.deferred import corrected
 from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
@@ -15,7 +16,6 @@ from ..calibrate.simulator import Simulator
 from ..system.provider import locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
-from .deferred import corrected
 from .established import needed, settle
 from .exchange import challenged, nearly, reconsidered, restarted
 from .fitter import ITERATIONS, Say

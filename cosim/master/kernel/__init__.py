@@ -35,7 +35,7 @@ SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
-    "Boolean", "Boolean2",
+    "Boolean", "Boolean2", "Float32Whole",
 )  # fmt: skip
 _TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
 
@@ -155,11 +155,11 @@ def standing(memory: NDArray[np.uint8]) -> Standing:
     run = _Run.from_buffer(memory.data)
     begins = [run.calls or 0, run.members or 0, run.derivatives or 0]
     found = [-1, -1, -1]
-    if run.at:
+    if at := run.at:  # read once: the other process goes on
         # arrays are apart: the one that begins last before the address holds it
-        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= run.at else -1)
+        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= at else -1)
         size = ct.sizeof((_Call, _Member, _Derivatives)[near])
-        found[near] = (run.at - begins[near]) // size
+        found[near] = (at - begins[near]) // size
     return Standing(int(run.index), int(run.row), *found)
 
 
@@ -379,6 +379,7 @@ class Kernel:
 
     def advance(self, last: int) -> int:
         """Communication steps up to `last`; 0, or the status that ended it."""
+        self._enter()
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
     def advance_within(self, last: int, limit: float, most: float) -> int:
@@ -386,7 +387,12 @@ class Kernel:
 
         It does not return in between: each time, a thread would wait for the interpreter lock.
         """
+        self._enter()
         return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
+
+    def _enter(self) -> None:
+        if self._bound.witness is not None:
+            self._bound.witness.enter()
 
     def restart(self) -> None:
         """Begin again at the first communication point."""

@@ -46,6 +46,7 @@ static int convert(const Call *c, double *values, int into) {
     CONVERT(8, int64_t, SIGNED(64, *v), rint(*v)) /* enumerations of FMI 3 */
     CONVERT(9, bool, TRUTH(*v), rint(*v))
     CONVERT(10, int32_t, TRUTH(*v), rint(*v)) /* booleans of FMI 2 */
+    CONVERT(11, float, (double)(float)*v == *v || isnan(*v), *v) /* given integers */
   }
   return 0;
 }
@@ -141,16 +142,14 @@ static int record(Run *run) {
   const double *values = run->values;
   if (!run->carried || run->index == 0)
     for (int64_t i = 0; i < run->n_terms; i++) run->terms[i].previous = values[run->terms[i].output];
+  double *const row = run->rows + run->row * run->n_record;
+  const Copy *c = run->records, *const end = c + run->n_record;
+  /* between its turns a row is written, but not counted: it is the last one if the run ends here */
+  for (double *to = row; c < end; c++) *to++ = values[c->source] * c->gain + c->offset;
   if (run->index != run->next_record) return 0;
   run->next_record += run->every;
-  double *row = run->rows + run->row * run->n_record;
-  int finite = 1;
-  for (int64_t i = 0; i < run->n_record; i++) {
-    const Copy *c = run->records + i;
-    row[i] = values[c->source] * c->gain + c->offset;
-    finite &= isfinite(row[i]) != 0;
-  }
-  if (!finite) return NOT_FINITE;
+  for (const double *v = row; v < row + run->n_record; v++)
+    if (!isfinite(*v)) return NOT_FINITE;
   run->row++;
   return 0;
 }

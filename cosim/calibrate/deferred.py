@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.problem import Problem
-from ..calibrate.simulator import Simulator
+from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 
