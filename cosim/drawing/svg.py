@@ -8,7 +8,7 @@ other, are thick. An open circle is an input that nothing drives.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -46,9 +46,15 @@ _RULES = {
     ".tip.bond": "stroke: none; fill: #1c6e8c",
     ".tip.bond.back": "stroke: none; fill: #59a5c0",
     ".tip.loop": "stroke: none; fill: #c81e1e",
+    ".halo": "fill: #fde3d3; stroke: #b3400a; stroke-width: 2.4",
+    ".badge": "fill: #b3400a; stroke: #ffffff; stroke-width: 1.5",
+    ".count": "font-size: 12px; font-weight: 700; fill: #ffffff; text-anchor: middle",
 }
 # rules reach a whole page if the drawing is part of one, so they are bound to its class
 STYLE = "".join(f".cosim-system {name} {{ {rule} }}\n" for name, rule in _RULES.items())
+
+
+_NO_MARKS: Mapping[str, Sequence[str]] = {}
 
 
 @dataclass(frozen=True)
@@ -69,9 +75,14 @@ class _DrawnWire:
     text: str
 
 
-def svg(system: Drawable) -> str:
-    """A system as SVG."""
-    return "\n".join(_Drawing(system).lines()) + "\n"
+def svg(system: Drawable, marks: Mapping[str, Sequence[str]] | None = None) -> str:
+    """A system as SVG.
+
+    Args:
+        system: what is drawn.
+        marks: box -> short texts (a number, a letter) in badges on it; boxes with some stand out.
+    """
+    return "\n".join(_Drawing(system, marks or {}).lines()) + "\n"
 
 
 def to_svg(system: Drawable, path: Path | str) -> Path:
@@ -148,8 +159,8 @@ def _width(text: str, size: float) -> float:
 
 
 class _Drawing:
-    def __init__(self, system: Drawable) -> None:
-        self.system, self.found = system, _lines(system)
+    def __init__(self, system: Drawable, marks: Mapping[str, Sequence[str]] = _NO_MARKS) -> None:
+        self.system, self.found, self.marks = system, _lines(system), marks
         self.open: dict[str, list[str]] = {name: [] for name in system.members}
         for name in system.open_inputs():
             instance, _, variable = name.partition(".")
@@ -301,6 +312,12 @@ class _Drawing:
         yield "<g>"
         if member.description.text:
             yield f"<title>{escape(member.description.text)}</title>"
+        marks = self.marks.get(name, ())
+        if marks:
+            yield (
+                f'<rect class="halo" x="{x - 5:.1f}" y="{y - 5:.1f}" width="{w + 10:.0f}" '
+                f'height="{h + 10:.0f}" rx="8"/>'
+            )
         yield f'<rect class="box" x="{x:.1f}" y="{y:.1f}" width="{w:.0f}" height="{h:.0f}" rx="5"/>'
         yield (
             f'<path class="head" d="M{x + 0.6:.1f} {y + HEAD:.1f}v{5.6 - HEAD:.1f}q0 -5 5 -5'
@@ -321,6 +338,10 @@ class _Drawing:
             yield f'<path class="wire stub" d="M{x - 9.0:.1f} {at:.1f}H{x:.1f}"/>'
             yield _circle("free", x - 11.5, at)
             yield _text("port open", x + PAD, at + 3.6, label)
+        for number, mark in enumerate(marks):
+            middle = x + w - 6.0 - 22.0 * number
+            yield f'<circle class="badge" cx="{middle:.1f}" cy="{y - 5:.1f}" r="10.5"/>'
+            yield _text("count", middle, y - 0.8, mark)
         yield "</g>"
 
 

@@ -20,7 +20,9 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
-from cosim.report.page import _interval, _starts, page
+from cosim.report import sections
+from cosim.report.facts import interval
+from cosim.report.page import page
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
@@ -122,12 +124,13 @@ def test_start_values_that_were_estimated_are_reported(sets: dict[str, Path]) ->
     after: Any = SimpleNamespace(problem=own.hold({late[0].name: 0.125}).changed(late=late[:1]))
     found = Diagnosis(problem, "effect_found", "", after=after).start_values()
     assert found == {problem.runs[0].name: {"theta_0": 0.125}}
-    assert "theta_0" in _starts(found) and "0.125" in _starts(found)
-    assert _starts({}) == ""
+    shown = sections.starts(found)
+    assert "theta_0" in shown and "0.125" in shown
+    assert sections.starts({}) == ""
 
 
 def test_what_the_data_leave_open_is_said() -> None:
     known = {"value": 0.5, "ci95": [0.2, 0.8], "unit": "W", "identifiable": True}
     for entry, word in ((known, False), ({**known, "identifiable": False}, True)):
         assert ("open" in _value("P_0", entry)) is word
-        assert ("open" in _interval(entry)) is word
+        assert ("open" in interval(entry)) is word
