@@ -13,6 +13,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -20,6 +21,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+PLACED = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(text), fcntl.F_DUPFD, 10) for text in sys.argv[1:3]]
+os.dup2(ends[0], 3), os.dup2(ends[1], 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+"""Puts the pipes where the browser looks for them, 3 and 4, and becomes the browser."""
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "chromium-headless-shell")
 LIMIT = 60.0
 """Longest wait for an answer [s]; a loaded machine takes some seconds to start a browser."""
@@ -77,9 +85,9 @@ class Browser:
         what, content = found.get("method"), found.get("params", {})
         if what == "Runtime.exceptionThrown":
             self.errors.append(json.dumps(content["exceptionDetails"]))
-        elif what == "Log.entryAdded" and content["entry"]["level"] in ("error", "warning"):
+        elif what == "Log.entryAdded" and content["entry"]["level"] == "error":
             self.errors.append(content["entry"]["text"])
-        elif what == "Runtime.consoleAPICalled" and content["type"] in ("error", "warning"):
+        elif what == "Runtime.consoleAPICalled" and content["type"] == "error":
             self.errors.append(json.dumps(content["args"]))
         elif what == "Network.requestWillBeSent":
             self.requests.append(content["request"]["url"])
@@ -125,8 +133,7 @@ def browser(executable: str) -> Iterator[Browser]:
     from_it, to_write = os.pipe()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         process = subprocess.Popen(
-            # the shell puts the pipes where the browser looks for them: 3 and 4
-            ["/bin/sh", "-c", f'exec "$0" "$@" 3<&{to_read} 4>&{to_write}', executable,
+            [sys.executable, "-c", PLACED, str(to_read), str(to_write), executable,
              "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars",
              "--disable-dev-shm-usage", "--remote-debugging-pipe", f"--user-data-dir={profile}",
              "about:blank"],

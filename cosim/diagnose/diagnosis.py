@@ -117,7 +117,11 @@ class Diagnosis:
             "effects": self.effects(),
             "model": made_of(self.problem, self.after),
             "alternatives": [
-                {"effects": [c.label for c in f.effects], "score": self._score(f)}
+                {
+                    "effects": [c.label for c in f.effects],
+                    "score": self._score(f),
+                    "text": f.effects[-1].text,
+                }
                 for f in self.rivals
             ],
             "localisation": [place.to_dict() for place in self.located],

@@ -196,7 +196,9 @@ class _Drawing:
         layout, system = self.layout, self.system
         top = BORDER + (44.0 if system.text else 30.0)
         stub = 16.0 if any(self.open.values()) else 0.0
-        inside = [line for way in layout.ways for line in self._way(way, False)]
+        marked = [name for name in system.members if self.marks.get(name)]
+        inside = [line for name in marked for line in self._halo(name)]
+        inside += [line for way in layout.ways for line in self._way(way, False)]
         inside += [
             line for way in layout.ways for line in self._way(way, True)
         ]  # bonds over signals
@@ -304,6 +306,15 @@ class _Drawing:
         points = f"{x:.1f},{y:.1f} {tail:.1f},{y - size:.1f} {tail:.1f},{y + size:.1f}"
         yield f'<polygon class="{f"tip {kind}".strip()}" points="{points}"/>'
 
+    def _halo(self, name: str) -> Iterator[str]:
+        """What makes a marked box stand out, below the wires."""
+        item = self.layout.items[name]
+        x, y = self.layout.box(item)
+        yield (
+            f'<rect class="halo" x="{x - 5:.1f}" y="{y - 5:.1f}" width="{item.width + 10:.0f}" '
+            f'height="{item.height + 10:.0f}" rx="8"/>'
+        )
+
     # -- boxes -------------------------------------------------------------------------------------
 
     def _box(self, name: str) -> Iterator[str]:
@@ -312,12 +323,6 @@ class _Drawing:
         yield "<g>"
         if member.description.text:
             yield f"<title>{escape(member.description.text)}</title>"
-        marks = self.marks.get(name, ())
-        if marks:
-            yield (
-                f'<rect class="halo" x="{x - 5:.1f}" y="{y - 5:.1f}" width="{w + 10:.0f}" '
-                f'height="{h + 10:.0f}" rx="8"/>'
-            )
         yield f'<rect class="box" x="{x:.1f}" y="{y:.1f}" width="{w:.0f}" height="{h:.0f}" rx="5"/>'
         yield (
             f'<path class="head" d="M{x + 0.6:.1f} {y + HEAD:.1f}v{5.6 - HEAD:.1f}q0 -5 5 -5'
@@ -338,7 +343,7 @@ class _Drawing:
             yield f'<path class="wire stub" d="M{x - 9.0:.1f} {at:.1f}H{x:.1f}"/>'
             yield _circle("free", x - 11.5, at)
             yield _text("port open", x + PAD, at + 3.6, label)
-        for number, mark in enumerate(marks):
+        for number, mark in enumerate(self.marks.get(name, ())):
             middle = x + w - 6.0 - 22.0 * number
             yield f'<circle class="badge" cx="{middle:.1f}" cy="{y - 5:.1f}" r="10.5"/>'
             yield _text("count", middle, y - 0.8, mark)

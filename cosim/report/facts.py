@@ -111,13 +111,13 @@ class Facts:
         return list(self.table["effects"])
 
     @property
-    def rivals(self) -> list[tuple[str, str]]:
-        """(effect, place) of other explanations that do as well, the last effect of each."""
-        found = []
+    def rivals(self) -> list[Mapping[str, str]]:
+        """Other explanations that do as well: the last effect of each."""
+        found = {}
         for item in self.table["alternatives"]:
             effect, _, place = item["effects"][-1].partition(" at ")
-            found.append((effect, place))
-        return list(dict.fromkeys(found))
+            found[effect, place] = {"effect": effect, "place": place, "text": item["text"]}
+        return list(found.values())
 
     @cached_property
     def purpose(self) -> str:
@@ -161,13 +161,16 @@ class Facts:
         """What makes the data useless."""
         return [f for f in self.table.get("findings", []) if f["severity"] == "error"]
 
-    def faulty_instances(self) -> dict[str, str]:
-        """Instance -> channel with a fault that is measured there."""
-        found: dict[str, str] = {}
-        for finding in self.errors:
-            for name, signal in self.signals.items():
-                if name in finding["column"].replace(",", " ").split():
-                    found.setdefault(signal.partition(".")[0], name)
+    def concerned(self, finding: Mapping[str, str]) -> list[str]:
+        """Channels that a finding on the data names."""
+        named = finding["column"].replace(",", " ").split()
+        return [name for name in self.signals if name in named]
+
+    def faulty_instances(self) -> dict[str, list[str]]:
+        """Instance -> channels with a fault that are measured there."""
+        found: dict[str, list[str]] = {}
+        for name in dict.fromkeys(n for f in self.errors for n in self.concerned(f)):
+            found.setdefault(self.signals[name].partition(".")[0], []).append(name)
         return found
 
     def main_parameter(self, effect: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..display.document import document
-from ..display.html import Html, join, tag
+from ..display.html import Html, join, tag, words
 from ..drawing.svg import svg
 from ..files import write_text
 from . import optional, sections
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ..diagnose import Diagnosis
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+HEIGHT = 210
+"""Of the first plot's upper panel [px]."""
 LEAST_WIDTH = 0.62
 """Of the drawing's own width, below which it scrolls instead of getting smaller."""
 
@@ -65,8 +67,8 @@ def rendered(material: Material) -> str:
     ]
     first = tag(
         "div",
-        tag("div", _cards(story, facts), _drawing(material, facts), class_="cards"),
-        tag("section", _main_plot(material, signals, facts), class_="main"),
+        tag("div", _cards(story, facts), class_="cards"),
+        tag("section", _main_plot(material, signals, facts), _drawing(material, facts)),
         class_="first",
     )
     table = material.table
@@ -123,15 +125,16 @@ def _marks(facts: Facts) -> tuple[dict[str, list[str]], list[tuple[str, Html]]]:
         entries.append(
             (str(n + 1), effect["component"], label(effect["effect"], effect["place"]))
         )  # fmt: skip
-    for n, (rival, place) in enumerate(facts.rivals):
-        text = join("or ", label(rival, place))
-        entries.append((LETTERS[n % len(LETTERS)], place.partition(".")[0], text))
+    for n, rival in enumerate(facts.rivals):
+        text = join("or ", label(rival["effect"], rival["place"]))
+        entries.append((LETTERS[n % len(LETTERS)], rival["place"].partition(".")[0], text))
     where = likely_place(facts) if facts.verdict == "unexplained" else None
     if where is not None:
         text = join("most likely place: ", tag("code", f"{where['component']}.{where['port']}"))
         entries.append(("?", where["component"], text))
-    for name, channel in facts.faulty_instances().items():
-        entries.append(("!", name, join("measured there: ", tag("b", channel))))
+    for name, channels in facts.faulty_instances().items():
+        text = join("faulty, measured there: ", words([tag("b", c) for c in channels]))
+        entries.append(("!", name, text))
     marks: dict[str, list[str]] = {}
     for mark, instance, _ in entries:
         marks.setdefault(instance, []).append(mark)
@@ -145,8 +148,7 @@ def _drawing(material: Material, facts: Facts) -> Html:
     marks, legend = _marks(facts)
     drawn = svg(material.system, marks)
     width = float(drawn.partition('width="')[2].partition('"')[0])
-    return tag(
-        "section",
+    return join(
         tag("h2", "Where in the system"),
         tag("div", Html(drawn), class_="drawing", tabindex="0",
             style=f"--least:{LEAST_WIDTH * width:.0f}px"),
@@ -159,32 +161,28 @@ def _drawing(material: Material, facts: Facts) -> Html:
 def _main_plot(material: Material, signals: Signals, facts: Facts) -> Html:
     """Measured and modelled, and what is left, where it tells most."""
     names = [channel.name for channel in material.channels]
-    errors = [f["column"] for f in facts.errors if f["column"] in names]
-    name = facts.worst or (errors[0] if errors else names[0] if names else "")
-    if not name:
+    faulty = [(name, f["run"]) for f in facts.errors for name in facts.concerned(f)]
+    chosen = telling(material, facts.worst, facts.purpose)
+    if facts.worst:
+        shown = [facts.worst]
+    elif faulty:
+        shown = list(dict.fromkeys(name for name, _ in faulty))[:2]
+        chosen = next((run for run in material.runs if run.name == faulty[0][1]), chosen)
+    else:
+        shown = names[:1]
+    if not shown or chosen is None:
         return Html("")
-    wrong = [f["run"] for f in facts.errors if f["column"] == name]
-    chosen = telling(material, facts.worst, facts.purpose)
-    if wrong:
-        chosen = next((run for run in material.runs if run.name in wrong), chosen)
-    column = names.index(name)
-    title = (
-        f"Before → after: {name}" if facts.effects else f"Measured and modelled: {name}"
-        if facts.worst else f"Measured: {name}"
+    what = (
+        "Before → after" if facts.effects else "Measured and modelled" if facts.worst
+        else "Measured"
     )  # fmt: skip
-    plots = [signals.shown(column, ordered(material.runs, chosen), "first", 260)]
-    note = tag(
-        "p", "Drag to zoom, double-click to see all, hover or tap to read values.", class_="note"
-    )
-    return join(tag("h2", title), note, *plots, _next_plots(material, signals, facts, column))
-
-
-def _next_plots(material: Material, signals: Signals, facts: Facts, column: int) -> Html:
-    """The next channels beside the cards, where the worst is not all."""
-    others = [n for n in _by_excess(material) if n != column][: OPEN - 2]
-    chosen = telling(material, facts.worst, facts.purpose)
     runs = ordered(material.runs, chosen)
-    return join(*(signals.shown(n, runs, "first", 130) for n in others))
+    return join(
+        tag("h2", f"{what}: {' and '.join(shown)}"),
+        tag("p", "Drag to zoom, double-click to see all, hover or tap to read values.",
+            class_="note"),
+        *(signals.shown(names.index(name), runs, "first", HEIGHT // len(shown)) for name in shown),
+    )  # fmt: skip
 
 
 def _by_excess(material: Material) -> list[int]:
@@ -214,8 +212,9 @@ def _signals(material: Material, signals: Signals, facts: Facts) -> Html:
     )  # fmt: skip
     return sections.section(
         "signals", "All signals",
-        tag("p", "Measured and modelled values, below them what is left; all plots follow the one "
-            f"that is zoomed. {how}"),
+        tag("p", "Measured and modelled values, below them what is left. " if facts.worst
+            else "Measured values; nothing was simulated. ",
+            f"All plots follow the one that is zoomed. {how}"),
         tag("div", *plots[:OPEN], class_="grid"),
         tag("details", tag("summary", f"{len(rest)} more channels"),
             tag("div", *rest, class_="grid")) if rest else "",

@@ -56,9 +56,12 @@ def findings(facts: Facts) -> Html:
          f["run"] or "all", f["column"] or "–", Cell(f["text"], kind="text")]
         for f in found
     ]  # fmt: skip
+    said = tuple(f"{severity}: " for severity in ("error", "warning", "note"))
+    others = [text for text in facts.table["warnings"] if not text.startswith(said)]
     return section(
-        "findings", "Remarks on the data",
+        "findings", "Remarks",
         table(["", "run", "column", "what, and the way out"], rows, "remarks on the data"),
+        *(tag("p", text, class_="over") for text in others),
     )  # fmt: skip
 
 

@@ -109,6 +109,17 @@ def _before_after(facts: Facts) -> Html:
     )  # fmt: skip
 
 
+def same_traces(effect: Mapping[str, Any]) -> Html:
+    """What leaves the same traces as an effect: itself elsewhere, or laws that are one with it."""
+    if not effect["other_places"]:
+        return Html("")
+    others = words([tag("code", place) for place in effect["other_places"]], "or")
+    return join(
+        "The same effect at another place, or a law that contains it, leaves the same traces as ",
+        label(effect["effect"], effect["place"]), ": these runs cannot tell it from ", others, ".",
+    )  # fmt: skip
+
+
 def _left(facts: Facts) -> Html:
     if not facts.left:
         return Html("")
@@ -164,13 +175,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     )  # fmt: skip
     meaning = [_meant(effect["effect"], effect["text"]) for effect in effects]
     meaning.append(_before_after(facts))
-    for effect in effects:
-        if effect["other_places"]:
-            others = words([tag("code", place) for place in effect["other_places"]], "or")
-            meaning.append(
-                join("These runs cannot tell ", label(effect["effect"], effect["place"]),
-                     " from the same at ", others, ".")
-            )  # fmt: skip
+    meaning += [same_traces(effect) for effect in effects]
     meaning.append(_left(facts))
     steps = [_check(effect["effect"], effect["place"]) for effect in effects]
     steps.append(
@@ -185,9 +190,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
 def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     effects = facts.effects
     first = words([named(effect) for effect in effects])
-    others = [
-        join(label(effect, ""), ", at ", place_in_words(place)) for effect, place in facts.rivals
-    ]
+    others = [named(rival) for rival in facts.rivals]
     headline = join(
         "The machine has something that the model lacks, and these runs fit more than one "
         "explanation: ", first, "; or ", words(others, "or"), ".",
@@ -196,10 +199,11 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         join("Either of them would leave the same traces in these runs. A wrong one may predict "
              "other motions badly, so measure before you repair.")
     ]  # fmt: skip
+    causes = [*effects, *facts.rivals]
     meaning += [
-        join(label(e["effect"], e["place"]), ": ", _meant(e["effect"], e["text"])) for e in effects
+        join(label(e["effect"], e["place"]), ": ", _meant(e["effect"], e["text"])) for e in causes
     ]
-    meaning += [join(label(e, place), ": ", _meant(e, e)) for e, place in facts.rivals]
+    meaning += [same_traces(effect) for effect in effects]
     meaning += [_before_after(facts), _left(facts)]
     steps = []
     proposal = facts.at("proposed_experiment")
@@ -212,8 +216,7 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  facts.number("proposed_experiment", "distance"), " σ apart after calibration.")
         )  # fmt: skip
         steps.append(_again("with these runs added to the data set"))
-    seen = [(e["effect"], e["place"]) for e in effects] + facts.rivals
-    steps += [_check(effect, place) for effect, place in seen]
+    steps += [_check(e["effect"], e["place"]) for e in causes]
     steps += _add(facts)
     return headline, _some(meaning), steps
 
@@ -352,7 +355,7 @@ def _bad_data(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     errors = facts.errors
     first = _found_in(errors[0]) if errors else Html(sentence(str(facts.at("reason"))))
     more = f" There are {len(errors)} faults in all." if len(errors) > 1 else ""
-    headline = join("These logs cannot be used: ", first, ".", more)
+    headline = join("These logs cannot be used. ", first, ".", more)
     meaning = [
         join("Nothing was calibrated and no effect was looked for: with such data, a search would "
              "find a cause in the machine for what is a fault of the logs.")
@@ -374,14 +377,11 @@ def _bad_data(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
 
 
 def _found_in(finding: Mapping[str, str]) -> Html:
-    where = " of ".join(
-        part for part in (
-            f"column {finding['column']}" if finding["column"] else "",
-            f"run {finding['run']}" if finding["run"] else "",
-        ) if part
-    )  # fmt: skip
-    said = sentence(finding["text"])
-    return join(f"in {where}, " if where else "", said)
+    """A finding with its place."""
+    run = f"Run {finding['run']}" if finding["run"] else ""
+    where = ", ".join(part for part in (run, finding["column"]) if part)
+    said = sentence(finding["text"].partition("; ")[0])
+    return join(f"{where[:1].upper()}{where[1:]}: " if where else "", said)
 
 
 def _some(items: list[Html]) -> list[Html]:

@@ -24,6 +24,8 @@ from cosim.report import sections
 from cosim.report.facts import interval
 from cosim.report.page import page
 from tests.problems import simulator
+from tests.report import stories
+from tests.report.marked import Marked, expected
 
 pytestmark = pytest.mark.slow
 
@@ -100,8 +102,26 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
     text = page(result)
     for part in ("battery_sag at motor.winding", "Where the disturbance enters", "motor.winding"):
         assert part in text
+    for fact, shown in Marked(text).facts.items():
+        assert set(shown) == {expected(table, fact)}
+    assert table["model"]["variants"] == {"motor": "dc_motor.lab_bench/sampled+battery_sag@winding"}
+    assert table["model"]["values"].keys() > {"motor.R_a", "motor.winding.battery_sag.r_b"}
+    assert shape(table) == shape(stories.table("effect_found"))
     (left,) = result.files
     assert "battery_sag" in left.name and left.is_file()
+
+
+def shape(table: dict[str, Any]) -> list[set[str]]:
+    """Keys of a diagnosis and of what is in it."""
+    parts = [
+        table, table["effects"][0], table["localisation"][0], table["model"],
+        table["localisation"][0]["curves"][0], table["channels"]["speed"],
+        table["parameters"]["R_a"], table["parameters"]["R_a"]["before"],
+        table["structure"]["after validation"][0],
+        *(item["parameters"][name] for item in table["effects"][:1]
+          for name in list(item["parameters"])[:1]),
+    ]  # fmt: skip
+    return [set(part) for part in parts]
 
 
 def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, Path]) -> None:

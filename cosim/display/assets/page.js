@@ -32,30 +32,43 @@ bubble.hidden = true;
 bubble.setAttribute("role", "tooltip");
 bubble.id = "bubble";
 document.body.append(bubble);
-for (const item of document.querySelectorAll("[title]:not(svg *)")) {
+let explained = null; // what the bubble belongs to
+
+function place() {
+  const box = explained.getBoundingClientRect();
+  const x = Math.min(Math.max(box.left, 8), innerWidth - bubble.offsetWidth - 8);
+  const below = box.bottom + bubble.offsetHeight + 10 < innerHeight;
+  bubble.style.left = `${Math.max(x, 8)}px`;
+  bubble.style.top = `${below ? box.bottom + 6 : box.top - bubble.offsetHeight - 6}px`;
+}
+
+function hide() {
+  explained?.removeAttribute("aria-describedby");
+  explained = null;
+  bubble.hidden = true;
+}
+
+for (const item of document.querySelectorAll("[title]")) {
   if (item.closest("svg") || item.closest(".plot")) continue;
   const text = item.title;
   item.removeAttribute("title");
   item.dataset.tip = text;
   if (!item.matches("button, a, summary, input, select")) item.tabIndex = 0;
   const show = () => {
+    hide();
+    explained = item;
     bubble.textContent = text;
     bubble.hidden = false;
     item.setAttribute("aria-describedby", "bubble");
-    const box = item.getBoundingClientRect();
-    const x = Math.min(Math.max(box.left, 8), innerWidth - bubble.offsetWidth - 8);
-    const below = box.bottom + bubble.offsetHeight + 10 < innerHeight;
-    bubble.style.left = `${Math.max(x, 8)}px`;
-    bubble.style.top = `${below ? box.bottom + 6 : box.top - bubble.offsetHeight - 6}px`;
+    place();
   };
-  const hide = () => { bubble.hidden = true; item.removeAttribute("aria-describedby"); };
   item.addEventListener("mouseenter", show);
   item.addEventListener("focus", show);
   item.addEventListener("mouseleave", hide);
   item.addEventListener("blur", hide);
 }
-addEventListener("keydown", (event) => { if (event.key === "Escape") bubble.hidden = true; });
-addEventListener("scroll", () => { bubble.hidden = true; }, true);
+addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
+addEventListener("scroll", () => { if (explained) place(); }, true);
 
 for (const button of document.querySelectorAll("button.copy")) {
   button.addEventListener("click", async () => {

@@ -5,6 +5,7 @@
 const store = JSON.parse(document.getElementById("signal-data")?.textContent || "{}");
 const decoded = new Map();
 const groups = new Map();
+const GAP = 22; // above a panel, for its title [px]
 
 // A series of the store: numbers as they are, an even axis `{first, step, count}`, or 16 bits per
 // number in base64 between the smallest and the largest, `{low, step, data}` (-32768: a gap).
@@ -249,7 +250,7 @@ class Plot {
     if (!this.width) return;
     const ratio = Math.max(window.devicePixelRatio || 1, 2);
     const heights = this.panels.map((panel) => panel.height || 170);
-    const height = heights.reduce((a, b) => a + b + 12, 0) + 34;
+    const height = heights.reduce((a, b) => a + b + GAP, 0) + 30;
     this.canvas.width = this.width * ratio;
     this.canvas.height = height * ratio;
     this.canvas.style.height = `${height}px`;
@@ -261,10 +262,10 @@ class Plot {
     pen.scale(ratio, ratio);
     pen.clearRect(0, 0, this.width, height);
     pen.font = `11px ${style.fontFamily}`;
-    let top = 8;
+    let top = GAP - 4;
     for (const [index, panel] of this.panels.entries()) {
       this.drawPanel(pen, panel, top, heights[index], index === this.panels.length - 1);
-      top += heights[index] + 12;
+      top += heights[index] + GAP;
     }
     pen.fillStyle = this.ink("soft");
     pen.textAlign = "center";
@@ -335,11 +336,8 @@ class Plot {
     for (const line of this.visible(panel)) this.drawLine(pen, line, down);
     pen.restore();
     pen.textAlign = "left";
-    pen.lineWidth = 3;
-    pen.strokeStyle = this.ink("paper");
     pen.fillStyle = this.ink("ink");
-    pen.strokeText(panel.title, this.left + 6, top + 13);
-    pen.fillText(panel.title, this.left + 6, top + 13);
+    pen.fillText(panel.title, this.left, top - 5);
     panel.down = down;
   }
 
@@ -383,7 +381,7 @@ class Plot {
     if (drag && drag.to !== null) {
       const [a, b] = [this.across(drag.from), this.across(drag.to)];
       pen.fillStyle = this.ink("select");
-      pen.fillRect(Math.min(a, b), 8, Math.abs(b - a), bottom - 20);
+      pen.fillRect(Math.min(a, b), 8, Math.abs(b - a), bottom - GAP - 8);
     }
     const at = this.group.cursor;
     this.reader.hidden = at === null || at < this.range[0] || at > this.range[1];
@@ -393,7 +391,7 @@ class Plot {
     pen.lineWidth = 1;
     pen.beginPath();
     pen.moveTo(x, 8);
-    pen.lineTo(x, bottom - 12);
+    pen.lineTo(x, bottom - GAP);
     pen.stroke();
     const rows = [`${this.config.cursor || this.config.axis}: ${shown(at)}`];
     for (const panel of this.panels) {
