@@ -18,7 +18,7 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
         problem: as declared.
         fitted: the model, None where there is none.
     """
-    table: dict[str, Any] = {"scenario": _scenario(problem), "variants": {}, "values": {}}
+    table: dict[str, Any] = {"scenario": scenario_of(problem), "variants": {}, "values": {}}
     if fitted is None:
         return table
     declared, model = problem.instances, problem.model
@@ -34,7 +34,7 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
     return table
 
 
-def _scenario(problem: Problem) -> str:
+def scenario_of(problem: Problem) -> str:
     """The scenario beside the mapping, "" if there is none."""
     path = problem.source.path.parent / "scenario.toml"
     if not path.is_file():

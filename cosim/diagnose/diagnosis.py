@@ -86,6 +86,11 @@ class Diagnosis:
     warnings: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
+    def _repr_html_(self) -> str:
+        from .notebook import shown
+
+        return shown(self.to_dict(), self.problem, self.residuals)
+
     def rms(self, which: str, purpose: str) -> dict[str, float | None]:
         """Channel -> RMS residual in its unit over the runs of a purpose."""
         rows = [
@@ -117,11 +122,7 @@ class Diagnosis:
             "effects": self.effects(),
             "model": made_of(self.problem, self.after),
             "alternatives": [
-                {
-                    "effects": [c.label for c in f.effects],
-                    "score": self._score(f),
-                    "text": f.effects[-1].text,
-                }
+                {"effects": [c.label for c in f.effects], "score": self._score(f)}
                 for f in self.rivals
             ],
             "localisation": [place.to_dict() for place in self.located],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -41,3 +42,20 @@ def document(title: str, *parts: object, signals: Store | None = None) -> str:
         Html(f"<style>{asset('page.css')}</style>"),
     )
     return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>{body}</body></html>\n'
+
+
+def section(name: str, title: str, *parts: object) -> Html:
+    """A section that can be jumped to; "" without content."""
+    body = join(*parts)
+    return tag("section", tag("h2", title), body, id=name) if body else Html("")
+
+
+def links(sections: Iterable[str]) -> Html:
+    """Links to the sections that are there."""
+    found = []
+    for part in sections:
+        name = part.partition('id="')[2].partition('"')[0]
+        title = part.partition("<h2>")[2].partition("</h2>")[0]
+        if name and title:
+            found.append(tag("a", Html(title), href=f"#{name}"))
+    return tag("nav", *found, class_="jump", aria_label="sections")

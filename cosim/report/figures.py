@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..display.html import Html, unit
+from ..display.document import section
+from ..display.html import Html, tag, unit
 from ..display.plot import Curve, Panel, plot
 from ..display.series import PER_VALUE, Store, stretch
 from .material import Material, ShownRun
@@ -16,6 +17,8 @@ ROOM = 1_300_000
 """Characters that the signals of a report may take."""
 WHOLE = 0.45
 """Part of them that the run which is shown first may take with every sample."""
+HEIGHT = 210
+"""Of the first plot's upper panel [px]."""
 OPEN = 4
 """Channels whose plots are open from the start."""
 KINDS = ("before", "after")
@@ -150,3 +153,48 @@ def unknown_curve(store: Store, name: str, place: str, of: str, curve: Mapping[s
         ],
         axis=against + (" [s]" if curve["driver"] == "time" else ""), group=name,
     )  # fmt: skip
+
+
+def by_excess(material: Material) -> list[int]:
+    """Channels, those that the declared model misses most first."""
+
+    def size(column: int) -> float:
+        return max((run.excess(column) for run in material.runs), default=0.0)
+
+    return sorted(range(len(material.channels)), key=lambda column: -size(column))
+
+
+def all_signals(material: Material, signals: Signals, runs: Sequence[ShownRun]) -> Html:
+    """Plots of all channels with a choice of runs."""
+    if not runs:
+        return Html("")
+    plots = [signals.shown(column, runs, "all") for column in by_excess(material)]
+    rest = plots[OPEN:]
+    sizes = sorted(set(signals.thinned.values()))
+    thinned = " to ".join(str(size) for size in dict.fromkeys(sizes[:1] + sizes[-1:]))
+    how = (
+        f"Of some runs, {thinned} samples are drawn as one bar from the smallest to the largest, "
+        "so that no peak is lost."
+        if thinned
+        else "Every sample is drawn."
+    )
+    modelled = any(run.residuals for run in material.runs)
+    return section(
+        "signals",
+        "All signals",
+        tag(
+            "p",
+            "Measured and modelled values, below them what is left. "
+            if modelled
+            else "Measured values; nothing was simulated. ",
+            f"All plots follow the one that is zoomed. {how}",
+        ),
+        tag("div", *plots[:OPEN], class_="grid"),
+        tag(
+            "details",
+            tag("summary", f"{len(rest)} more channels"),
+            tag("div", *rest, class_="grid"),
+        )
+        if rest
+        else "",
+    )

@@ -7,33 +7,43 @@ from typing import Any
 
 import numpy as np
 
+from ..diagnose.story.facts import Facts
 from ..diagnose.whiteness import CALIBRATED
-from ..display.html import Cell, Html, number, table, tag, unit
+from ..display.document import section
+from ..display.html import Cell, Html, number, quantity, table, tag, unit, words
 from ..display.plot import Curve, Panel, plot
 from ..display.series import Store
-from .facts import Facts
-from .sections import section
 
 
 def hints(facts: Facts) -> Html:
     """Laws that come nearest to what has no name, with what they would take; "" without any."""
     rows = []
     for item in facts.table.get("hints") or []:
+        names = [tag("code", f"{law['effect']} at {law['place']}") for law in item["effects"]]
+        takes = [
+            f"{name} = {quantity(value['value'], value['unit'])}"
+            for law in item["effects"]
+            for name, value in law["parameters"].items()
+        ]
+        left = item.get("left")
         rows.append(
-            [tag("code", item.get("label") or item.get("effect", "")),
-             _share(item.get("explained")),
-             Cell(str(item.get("takes") or item.get("text") or "–"), kind="text")]
+            [words(names), _share(item["explained"], item.get("first_order", False)),
+             Cell(", ".join(takes) or "–", kind="text"),
+             Cell(f"{left['channel']} at {left['times_noise']:.2f}×" if left else "–",
+                  left["times_noise"] if left else None, "text"),
+             Cell("; ".join(item["why"]), kind="text")]
         )  # fmt: skip
     return section(
         "hints", "Nearest laws",
         tag("p", "None of these explains the data; what they would take says how far they are "
             "from it."),
-        table(["law", "explains", "what it would take"], rows, "nearest laws"),
+        table(["law", "would explain", "with", "leaves (over noise)", "why it is no name"], rows,
+              "nearest laws"),
     ) if rows else Html("")  # fmt: skip
 
 
-def _share(value: float | None) -> Cell:
-    return Cell("–") if value is None else Cell(f"{100 * value:.1f} %", value)
+def _share(value: float, rough: bool) -> Cell:
+    return Cell(f"{100 * value:.1f} %" + (", to first order" if rough else ""), value)
 
 
 def law(facts: Facts, store: Store) -> Html:

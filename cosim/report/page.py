@@ -9,22 +9,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..display.document import document
+from ..diagnose.story.facts import Facts
+from ..diagnose.story.verdicts import Story, label, likely_place, told
+from ..display.document import document, links
 from ..display.html import Html, join, tag, words
 from ..drawing.svg import svg
 from ..files import write_text
 from . import optional, sections
-from .facts import Facts
-from .figures import OPEN, Signals, ordered, telling
+from .figures import HEIGHT, Signals, all_signals, ordered, telling
 from .material import Material, collected
-from .verdicts import Story, label, likely_place, told
 
 if TYPE_CHECKING:
     from ..diagnose import Diagnosis
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-HEIGHT = 210
-"""Of the first plot's upper panel [px]."""
 LEAST_WIDTH = 0.62
 """Of the drawing's own width, below which it scrolls instead of getting smaller."""
 
@@ -56,7 +54,7 @@ def rendered(material: Material) -> str:
         optional.law(facts, signals.store),
         sections.effects(facts, material.symbols),
         sections.errors(facts, material),
-        _signals(material, signals, facts),
+        all_signals(material, signals, runs),
         sections.parameters(facts, material.symbols),
         sections.located(facts, signals.store),
         sections.candidates(material),
@@ -82,7 +80,7 @@ def rendered(material: Material) -> str:
             class_="top"),
         tag("div", tag("div", story.label, class_="label"),
             tag("p", story.headline, class_="sentence"), class_=f"verdict {facts.verdict}"),
-        first, _jump(details), *details, signals=signals.store,
+        first, links(details), *details, signals=signals.store,
     )  # fmt: skip
 
 
@@ -183,50 +181,3 @@ def _main_plot(material: Material, signals: Signals, facts: Facts) -> Html:
             class_="note"),
         *(signals.shown(names.index(name), runs, "first", HEIGHT // len(shown)) for name in shown),
     )  # fmt: skip
-
-
-def _by_excess(material: Material) -> list[int]:
-    """Channels, those that the declared model misses most first."""
-
-    def size(column: int) -> float:
-        return max((run.excess(column) for run in material.runs), default=0.0)
-
-    return sorted(range(len(material.channels)), key=lambda column: -size(column))
-
-
-def _signals(material: Material, signals: Signals, facts: Facts) -> Html:
-    """Plots of all channels with a choice of runs."""
-    chosen = telling(material, facts.worst, facts.purpose)
-    runs = ordered(material.runs, chosen)
-    if not runs:
-        return Html("")
-    plots = [signals.shown(column, runs, "all") for column in _by_excess(material)]
-    rest = plots[OPEN:]
-    sizes = sorted(set(signals.thinned.values()))
-    thinned = " to ".join(str(size) for size in dict.fromkeys(sizes[:1] + sizes[-1:]))
-    how = (
-        f"Of most runs, {thinned} samples are drawn as one bar from the smallest to the largest, "
-        "so that no peak is lost; "
-        "the run that is shown first has every sample."
-        if thinned else "Every sample is drawn."
-    )  # fmt: skip
-    return sections.section(
-        "signals", "All signals",
-        tag("p", "Measured and modelled values, below them what is left. " if facts.worst
-            else "Measured values; nothing was simulated. ",
-            f"All plots follow the one that is zoomed. {how}"),
-        tag("div", *plots[:OPEN], class_="grid"),
-        tag("details", tag("summary", f"{len(rest)} more channels"),
-            tag("div", *rest, class_="grid")) if rest else "",
-    )  # fmt: skip
-
-
-def _jump(details: list[Html | str]) -> Html:
-    """Links to the sections that are there."""
-    links = []
-    for part in details:
-        name = part.partition('id="')[2].partition('"')[0]
-        title = part.partition("<h2>")[2].partition("</h2>")[0]
-        if name and title:
-            links.append(tag("a", Html(title), href=f"#{name}"))
-    return tag("nav", *links, class_="jump", aria_label="sections")

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..diagnose.bursts import written
+from ..diagnose.story.facts import Facts, named_unit
+from ..diagnose.story.verdicts import label
 from ..diagnose.whiteness import CALIBRATED
+from ..display.document import section
 from ..display.html import Cell, Html, explained, join, number, table, tag
 from ..display.series import Store
-from .facts import Facts, named_unit
 from .figures import unknown_curve, used
 from .material import Material
-from .verdicts import label
 
 PLACES, CURVES = 8, 2
 """Places that are listed, and those whose curves are drawn."""
@@ -26,8 +27,8 @@ WORDS = {
     "z": "In standard deviations of what chance would give.",
     "p (Holm)": "Probability of such a score by chance, corrected for the number of candidates.",
     "absorbed": "Share of the effect's trace that other parameters could take over.",
-    "95 % interval": "Where the true value lies with 95 % probability; open: the data say no more "
-    "than the declared bounds.",
+    "95 % interval": "Where the true value lies with 95 % probability; open: it rests on the "
+    "declared bounds, the data alone do not determine it.",
     "score": "What the effect would explain, to first order, of what calibration cannot.",
     "refit": "Log likelihood that is gained when the model is fitted again with the effect.",
     "unused": "Runs that were not used for fitting: they judge.",
@@ -41,12 +42,6 @@ def _head(*names: str) -> list[object]:
     return [(name, WORDS[name]) if name in WORDS else name for name in names]
 
 
-def section(name: str, title: str, *parts: object) -> Html:
-    """A section that can be jumped to; "" without content."""
-    body = join(*parts)
-    return tag("section", tag("h2", title), body, id=name) if body else Html("")
-
-
 def findings(facts: Facts) -> Html:
     """What was found in the data."""
     found = facts.table.get("findings", [])
@@ -57,7 +52,7 @@ def findings(facts: Facts) -> Html:
         for f in found
     ]  # fmt: skip
     said = tuple(f"{severity}: " for severity in ("error", "warning", "note"))
-    others = [text for text in facts.table["warnings"] if not text.startswith(said)]
+    others = [text for text in facts.table.get("warnings", ()) if not text.startswith(said)]
     return section(
         "findings", "Remarks",
         table(["", "run", "column", "what, and the way out"], rows, "remarks on the data"),

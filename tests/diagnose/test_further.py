@@ -17,10 +17,10 @@ from cosim.cli.diagnose import _spread
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis, _look_further
 from cosim.diagnose.further import carried, judged
+from cosim.diagnose.story.facts import Facts
 from cosim.errors import ScenarioError, VariantError
 from cosim.installation import places
 from cosim.report import sections
-from cosim.report.facts import Facts
 from tests.problems import simulator
 
 COULOMB = Candidate("load", "inertial_load", "coulomb", "flange")

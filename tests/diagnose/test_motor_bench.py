@@ -20,8 +20,8 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
+from cosim.diagnose.story.facts import interval
 from cosim.report import sections
-from cosim.report.facts import interval
 from cosim.report.page import page
 from tests.problems import simulator
 from tests.report import stories
@@ -104,6 +104,10 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
         assert part in text
     for fact, shown in Marked(text).facts.items():
         assert set(shown) == {expected(table, fact)}
+    view = Marked(result._repr_html_())
+    assert "Supply voltage that falls" in view.text or "supply voltage that falls" in view.text
+    assert all(set(shown) == {expected(table, fact)} for fact, shown in view.facts.items())
+    assert "R_a" in Marked(base.estimate._repr_html_()).text
     assert table["model"]["variants"] == {"motor": "dc_motor.lab_bench/sampled+battery_sag@winding"}
     assert table["model"]["values"].keys() > {"motor.R_a", "motor.winding.battery_sag.r_b"}
     assert shape(table) == shape(stories.table("effect_found"))

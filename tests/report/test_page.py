@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from cosim.diagnose.story.facts import Facts, inside, place_in_words
+from cosim.diagnose.story.verdicts import ADVICE, LABELS, run_line, told
 from cosim.report import page as pages
-from cosim.report.facts import Facts, inside, place_in_words
 from cosim.report.page import rendered
-from cosim.report.verdicts import ADVICE, LABELS, run_line, told
 from sources.variant import effects
 from tests.report.marked import Marked, expected
 from tests.report.stories import VERDICTS, material, table
@@ -111,7 +111,12 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
     plain = rendered(shown)
     assert 'id="hints"' not in plain and 'id="law"' not in plain
     more = dict(shown.table)
-    more["hints"] = [{"label": "stribeck at load.flange", "explained": 0.61, "takes": "v_s < 0"}]
+    value = {"value": -1.5, "ci95": [-2.0, -1.0], "unit": "N.m", "identifiable": True}
+    law = {"effect": "stribeck", "component": "load", "port": "flange", "place": "load.flange",
+           "parameters": {"tau_s": value}}  # fmt: skip
+    left = {"channel": "speed", "purpose": "validation", "times_noise": 2.5}
+    more["hints"] = [{"effects": [law], "explained": 0.61, "left": left, "first_order": False,
+                      "why": ["its strength has the wrong sign"]}]  # fmt: skip
     more["law_from_data"] = {
         "place": "load.flange", "unit": "N.m",
         "curve": {"driver": "velocity", "at": [-1.0, 0.0, 1.0], "value": [0.4, 0.0, -0.4],
@@ -119,7 +124,14 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
         "channels": {"speed": {"noise_rms": 0.155, "before": 0.5, "after": 0.16}},
     }  # fmt: skip
     text = Marked(rendered(replace(shown, table=more))).text
-    for part in ("Nearest laws", "v_s < 0", "61.0 %", "A law from the data", "0.16 (1.03×)"):
+    for part in (
+        "Nearest laws",
+        "tau_s = -1.5 N·m",
+        "61.0 %",
+        "speed at 2.50×",
+        "A law from the data",
+        "0.16 (1.03×)",
+    ):
         assert part in text
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..diagnose.whiteness import CALIBRATED
-from ..display.html import Cell, Html, number, quantity, tag, text, unit
+from ...display.html import Cell, Html, number, quantity, tag, text, unit
+from ..whiteness import CALIBRATED
 
 
 def place_in_words(place: str) -> str:
@@ -116,7 +116,8 @@ class Facts:
         found = {}
         for item in self.table["alternatives"]:
             effect, _, place = item["effects"][-1].partition(" at ")
-            found[effect, place] = {"effect": effect, "place": place, "text": item["text"]}
+            text = item.get("text", effect.replace("_", " "))
+            found[effect, place] = {"effect": effect, "place": place, "text": text}
         return list(found.values())
 
     @cached_property

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..calibrate.checks.finding import LASTING
-from ..display.html import Html, command, join, quantity, tag, words
+from ...calibrate.checks.finding import LASTING
+from ...display.html import Html, command, join, quantity, tag, words
 from .facts import Facts, inside, place_in_words, sentence
 
 ADVICE = Path(__file__).parent / "advice.toml"
@@ -252,8 +252,7 @@ def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         names = words([tag("code", name) for name in open_ones])
         steps.append(
             join(tag("b", "Measure"), " ", names, " otherwise, or add runs that move more: these "
-                 "runs say no more of ", "it" if len(open_ones) == 1 else "them",
-                 " than the declared bounds.")
+                 "runs alone do not determine ", "it." if len(open_ones) == 1 else "them.")
         )  # fmt: skip
     steps.append(
         join(tag("b", "If you still suspect something"), ": measure runs that would show it "
