@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
 from ..display.chart import COLOURS, Line, lines
-from ..display.html import Html, tag, unit
+from ..display.html import Html, table, tag, unit
 from ..display.notebook import view
 from .story.facts import Facts
 from .story.verdicts import told
@@ -18,15 +18,15 @@ from .story.verdicts import told
 Residuals = Mapping[tuple[str, str], NDArray[np.float64]]
 
 
-def shown(table: Mapping[str, Any], problem: Problem, residuals: Residuals) -> str:
+def shown(content: Mapping[str, Any], problem: Problem, residuals: Residuals) -> str:
     """Verdict, meaning, next steps, errors, and the residual of the channel that is missed most.
 
     Args:
-        table: as of `cosim diagnose --json`.
+        content: as of `cosim diagnose --json`.
         problem: that was diagnosed.
         residuals: (`before`/`after`, run) -> residuals over sigma.
     """
-    facts = Facts(table)
+    facts = Facts(content)
     story = told(facts)
     kinds = ("before", "after") if facts.effects else ("before",)
     rows: list[list[object]] = [
