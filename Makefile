@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test quick check fmus docs fuzz bench wheel clean
+.PHONY: demo test quick check fmus docs site fuzz bench wheel clean
 
 demo: $(STAMP)
 	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
@@ -28,6 +28,13 @@ fmus: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
+
+site: $(VENV)/.site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
+$(VENV)/.site: $(STAMP)
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	touch $(VENV)/.site
 
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz --seconds 3600
