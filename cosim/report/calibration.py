@@ -115,7 +115,7 @@ def rendered(
         "div",
         tag("div", _meaning(facts), _next(facts, values, scenario, good), class_="cards"),
         tag("section", tag("h2", f"Measured and modelled: {worst}"), tag("p", "Drag to zoom, "
-            "double-click to see all, hover or tap to read values.", class_="note"), plot),
+            "double-click to see all, hover or tap to read values.", class_="note hint"), plot),
         class_="first",
     )  # fmt: skip
     kind = "nothing_missing" if good else "unexplained"

@@ -178,6 +178,6 @@ def _main_plot(material: Material, signals: Signals, facts: Facts) -> Html:
     return join(
         tag("h2", f"{what}: {' and '.join(shown)}"),
         tag("p", "Drag to zoom, double-click to see all, hover or tap to read values.",
-            class_="note"),
+            class_="note hint"),
         *(signals.shown(names.index(name), runs, "first", HEIGHT // len(shown)) for name in shown),
     )  # fmt: skip

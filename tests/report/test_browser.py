@@ -165,6 +165,8 @@ def test_paper_shows_what_is_folded_and_has_no_buttons(
     shown.open(pages["effect_found"])
     assert len(shown.call("Page.printToPDF")["data"]) > 50_000
     shown.call("Emulation.setEmulatedMedia", media="print")
-    assert shown.run("getComputedStyle(document.querySelector('button.copy')).display") == "none"
+    display = "getComputedStyle(document.querySelector('{}')).display"
+    assert shown.run(display.format("button.copy")) == "none"
+    assert shown.run(display.format("th button")) != "none" != shown.run(display.format(".key"))
     shown.call("Emulation.setEmulatedMedia", media="")
     assert shown.run("document.querySelector('details').open") is False  # as it was before
