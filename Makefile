@@ -29,12 +29,8 @@ docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
 
-site: $(VENV)/.site
+site: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
-
-$(VENV)/.site: $(STAMP)
-	$(BIN)/python -m pip install --quiet --editable ".[docs]"
-	touch $(VENV)/.site
 
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz --seconds 3600
@@ -51,7 +47,7 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check,docs]"
 	touch $(STAMP)
 
 clean:

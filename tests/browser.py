@@ -28,7 +28,7 @@ os.dup2(ends[0], 3), os.dup2(ends[1], 4)
 os.execv(sys.argv[3], sys.argv[3:])
 """
 """Puts the pipes where the browser looks for them, 3 and 4, and becomes the browser."""
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "chromium-headless-shell")
+NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "chrome")
 LIMIT = 60.0
 """Longest wait for an answer [s]; a loaded machine takes some seconds to start a browser."""
 

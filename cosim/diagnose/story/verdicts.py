@@ -151,7 +151,10 @@ def _add(facts: Facts) -> list[Html]:
         tag("code", "fmus/"), " beside this page.",
     ]  # fmt: skip
     if line:
-        parts += [" Or try it at once, with all calibrated values:", command(line)]
+        parts += [
+            " Or run the scenario ", tag("code", model["scenario"]), " with it and all calibrated "
+            "values (it compares with its own logs):", command(line),
+        ]  # fmt: skip
     return [join(*parts)]
 
 
