@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test quick check fmus docs fuzz bench wheel clean
+.PHONY: demo test quick check fmus docs site fuzz bench wheel clean
 
 demo: $(STAMP)
 	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
@@ -29,6 +29,9 @@ docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
 
+site: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz --seconds 3600
 
@@ -44,7 +47,7 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check,docs]"
 	touch $(STAMP)
 
 clean:

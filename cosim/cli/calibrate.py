@@ -15,10 +15,15 @@ from ..files import make_folder, write_text
 from .streams import print_json
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..calibrate.checks.finding import Finding
     from ..calibrate.estimate import Estimate
     from ..calibrate.problem import Problem
     from ..calibrate.sensitivity import Correlation
+
+    Residuals = list[tuple[str, NDArray[np.float64]]]
 
 FAR = 2.0
 """Residual over the noise from which a model evidently lacks something: good ones leave 1, and
@@ -53,6 +58,7 @@ def calibrate_command(
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
+    from ..report.calibration import write_calibration_page
 
     started = time.perf_counter()
     problem = read_problem(dataset, mapping=mapping, system=system)
@@ -63,16 +69,19 @@ def calibrate_command(
         typer.echo(f"warning: {exchange}", err=True)
     findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
     correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
-    content = calibration_table(estimate, correlation, findings)
+    unused = validation_residuals(estimate)
+    content = calibration_table(estimate, unused, correlation, findings)
     content["exchange"] = exchange.to_dict()
     content["evaluations"] = simulator.evaluations + exchange.evaluations
     content["wall_s"] = time.perf_counter() - started
     folder = make_folder(out or Path("out") / problem.name)
-    content["files"] = [str(folder / "calibration.json")]
+    page = folder / "report.html"
+    content["files"] = [str(folder / "calibration.json"), str(page)]
     if correlation is not None:
         content["files"].append(str(tornado(correlation, folder / "tornado.png")))
     text = json.dumps(content, indent=2)
     write_text(folder / "calibration.json", text + "\n")
+    write_calibration_page(content, estimate, unused, page)
     if as_json:
         print_json(content)
     else:
@@ -95,7 +104,10 @@ def _usable(problem: Problem, findings: list[Finding]) -> list[Finding]:
 
 
 def calibration_table(
-    estimate: Estimate, correlation: Correlation | None, findings: list[Finding]
+    estimate: Estimate,
+    unused: Residuals,
+    correlation: Correlation | None,
+    findings: list[Finding],
 ) -> dict[str, Any]:
     """What `--json` prints."""
     from ..calibrate.estimate import channel_rms
@@ -103,8 +115,7 @@ def calibration_table(
 
     problem = estimate.problem
     fitted = channel_rms(problem, estimate.residuals)
-    unused = [run.name for run in problem.runs if run.purpose == "validation"]
-    checked = validation_rms(estimate) if unused else {}
+    checked = channel_rms(problem, unused) if unused else {}
     return {
         "dataset": problem.name,
         "system": problem.file.name,
@@ -142,15 +153,16 @@ def calibration_table(
     }  # fmt: skip
 
 
-def validation_rms(estimate: Estimate) -> dict[str, float]:
+def validation_residuals(estimate: Estimate) -> Residuals:
     """Residuals over sigma on the runs that were not fitted, their own values fitted."""
-    from ..calibrate.estimate import channel_rms
     from ..calibrate.nuisance import settled
 
     problem = estimate.problem
     names = [run.name for run in problem.runs if run.purpose == "validation"]
+    if not names:
+        return []
     theta = settled(estimate.simulator, estimate.theta, names)
-    return channel_rms(problem, estimate.simulator.residuals(theta, names))
+    return list(estimate.simulator.residuals(theta, names))
 
 
 def _scaled(value: float | None, sigma: float) -> float | None:

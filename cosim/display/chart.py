@@ -1,4 +1,4 @@
-"""Line and bar charts as inline SVG."""
+"""Line charts as inline SVG, for where no script runs: notebooks."""
 
 from __future__ import annotations
 
@@ -10,10 +10,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from .html import Html, join, tag
+
 Vector = NDArray[np.float64]
 POINTS = 600
 """Points per line: more cannot be seen."""
-COLOURS = ("#888888", "#0b6fb8", "#c2410c", "#15803d")
+COLOURS = (
+    "#0b6fb8", "#c2500a", "#15803d", "#7c3aed", "#b45309", "#0e7490", "#be185d", "#4b5563",
+)  # fmt: skip
+GREY = "#8a94a0"
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Line:
     name: str
     x: Vector
     y: Vector
-    colour: str = COLOURS[1]
+    colour: str = COLOURS[0]
 
 
 def ticks(low: float, high: float, count: int = 4) -> list[float]:
@@ -34,7 +39,7 @@ def ticks(low: float, high: float, count: int = 4) -> list[float]:
     power = 10.0 ** np.floor(np.log10(rough))
     step = next(power * f for f in (1, 2, 5, 10) if power * f >= rough)
     first = np.ceil(low / step) * step
-    return [float(v) for v in np.arange(first, high + 1e-9 * step, step)]
+    return [float(v) + 0.0 for v in np.arange(first, high + 1e-9 * step, step)]  # no -0
 
 
 def thinned(line: Line) -> Line:
@@ -52,14 +57,14 @@ def thinned(line: Line) -> Line:
 
 
 def lines(
-    items: Sequence[Line], *, title: str, x_label: str, y_label: str, band: float | None = None,
-    width: int = 640, height: int = 200,
-) -> str:  # fmt: skip
-    """A chart of lines; `band` shades +- a value (the noise)."""
+    items: Sequence[Line], *, title: str, x_label: str = "time [s]", band: float | None = None,
+    width: int = 720, height: int = 190,
+) -> Html:  # fmt: skip
+    """A chart of lines with its key; `band` shades +- a value (the noise); "" without points."""
     drawn = [line for line in (thinned(item) for item in items) if line.x.size]
     if not drawn:
-        return ""
-    left, right, top, bottom = 64, 12, 26, 38
+        return Html("")
+    left, right, top, bottom = 58, 10, 22, 34
     low_x = min(float(v.x.min()) for v in drawn)
     high_x = max(float(v.x.max()) for v in drawn)
     low = min(float(v.y.min()) for v in drawn)
@@ -72,14 +77,14 @@ def lines(
         high_x = low_x + 1.0
 
     def px(x: float) -> float:
-        return left + (float(x) - low_x) / (high_x - low_x) * (width - left - right)
+        return left + (x - low_x) / (high_x - low_x) * (width - left - right)
 
     def py(y: float) -> float:
-        return top + (high - float(y)) / (high - low) * (height - top - bottom)
+        return top + (high - y) / (high - low) * (height - top - bottom)
 
     parts = [
         f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(title)}">',
-        f'<text x="{left}" y="15" class="title">{escape(title)}</text>',
+        f'<text x="{left}" y="14" class="title">{escape(title)}</text>',
     ]
     if band is not None:
         parts.append(
@@ -88,9 +93,8 @@ def lines(
         )
     for value in ticks(low, high):
         parts.append(
-            f'<line x1="{left}" x2="{width - right}" y1="{py(value):.1f}" y2="{py(value):.1f}" '
-            f'stroke="#eee"/><text x="{left - 6}" y="{py(value) + 4:.1f}" text-anchor="end">'
-            f"{value:g}</text>"
+            f'<path d="M{left} {py(value):.1f}H{width - right}" stroke="#e3e8ee"/>'
+            f'<text x="{left - 6}" y="{py(value) + 4:.1f}" text-anchor="end">{value:g}</text>'
         )
     for value in ticks(low_x, high_x, 6):
         parts.append(
@@ -98,21 +102,20 @@ def lines(
             f"{value:g}</text>"
         )
     parts.append(
-        f'<text x="{(left + width - right) / 2}" y="{height - 6}" text-anchor="middle">'
-        f'{escape(x_label)}</text><text transform="translate(12,{(top + height - bottom) / 2}) '
-        f'rotate(-90)" text-anchor="middle">{escape(y_label)}</text>'
+        f'<text x="{(left + width - right) / 2}" y="{height - 5}" text-anchor="middle">'
+        f"{escape(x_label)}</text>"
     )
-    for number, line in enumerate(drawn):
-        path = " ".join(f"{px(a):.1f},{py(b):.1f}" for a, b in zip(line.x, line.y, strict=True))
-        parts.append(
-            f'<polyline points="{path}" fill="none" stroke="{line.colour}" stroke-width="1"/>'
+    for line in drawn:
+        path = " ".join(
+            f"{px(a):.1f},{py(b):.1f}"
+            for a, b in zip(line.x.tolist(), line.y.tolist(), strict=True)
         )
-        if len(drawn) > 1:
-            x = width - right - 110 * (len(drawn) - number)
-            parts.append(
-                f'<text x="{x + 16}" y="15">{escape(line.name)}</text>'
-                f'<line x1="{x}" x2="{x + 12}" y1="11" y2="11" stroke="{line.colour}" '
-                'stroke-width="3"/>'
-            )
+        parts.append(
+            f'<polyline points="{path}" fill="none" stroke="{line.colour}" stroke-width="1.2"/>'
+        )
     parts.append("</svg>")
-    return "".join(parts)
+    keys = [
+        tag("span", tag("i", style=f"background:{line.colour}"), line.name, class_="key")
+        for line in drawn if len(drawn) > 1 and line.name
+    ]  # fmt: skip
+    return join(Html("".join(parts)), tag("div", *keys) if keys else "")
