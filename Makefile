@@ -47,7 +47,7 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check,docs]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,logs,study,test,check]"
 	touch $(STAMP)
 
 clean:

@@ -16,14 +16,15 @@ from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
 from ..master.master import Master
 from ..reading.schema import shown
-from ..spec.units import Unit
+from ..spec.units import Unit, parse
 from ..system.provider import Provider
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
+from .clocks import bounds, check_clock, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
-from .parts import COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
 
@@ -105,6 +106,7 @@ class Joined(MappedLogs):
             raise ScenarioError(f"{self.path}: no channel's column is in the logs")
         stated = [*self.declared(), *self.others()]
         check_parameters(stated)
+        self.late = {name: bounds(stated, name) for name in self.logs}
         parameters = [p for p in stated if not p.late]
         return Problem(
             self.data.name,
@@ -300,10 +302,9 @@ class Joined(MappedLogs):
         found = []
         source = known(unit, where) if unit else None
         for name, factor in _targets(entry, where):
-            try:
-                wanted = self.system.variables(name)[1][0].unit
-            except UnknownNameError:
-                wanted = None
+            if name.startswith(CLOCK):
+                check_clock(name, self.columns, where)
+            wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"
             gain, offset = scaled(source, wanted, given, f"{where}: {name}", "its factor", way)
@@ -311,6 +312,15 @@ class Joined(MappedLogs):
                 raise UnitError(f"{where}: {name}: {unit!r} has another zero; {way}")
             found.append((name, gain))
         return tuple(found)
+
+    def _wanted(self, name: str) -> Unit | None:
+        """Unit of a target, None where that is unknown."""
+        if name.startswith(CLOCK):
+            return parse("s")
+        try:
+            return self.system.variables(name)[1][0].unit
+        except UnknownNameError:
+            return None
 
     def value(self, entry: Any, run: str, where: str, unit: str = "") -> float:
         """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
@@ -320,6 +330,11 @@ class Joined(MappedLogs):
         """
         if isinstance(entry, (int, float)):
             return float(entry)
+        if not run:
+            raise ScenarioError(
+                f"{where}: nominal {entry!r} is another value in each run; say per_run = true, or "
+                "give a number"
+            )
         if entry.startswith("begin:"):
             begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
@@ -356,6 +371,7 @@ class Joined(MappedLogs):
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
+        data = masked(log.time[during], data, channels, self.late[name], -lead)
         anchor = 0
         for triple in self.table.get("relative", []):
             place = [[c.name for c in channels].index(one) for one in triple]
@@ -419,13 +435,27 @@ class Joined(MappedLogs):
             return *scaled(source, known(unit, where), factor, where, "gain", way), unit
         return *scaled(source, wanted, factor, where, "gain", way), ""
 
+    def _course(self, log: Log, column: str, lead: float) -> tuple[Vector, Vector]:
+        """Times and values of what drives an input, where they are known.
+
+        What is held on a clock of its own changes at its own times, not at those of the log.
+        """
+        if column not in log.own:
+            good = np.isfinite(log[column])
+            return log.time[good], log[column][good]
+        times, values = log.own[column]
+        first, last = min(float(log.time[0]), -lead), float(log.time[-1])
+        begin = max(int(np.searchsorted(times, first, "right")) - 1, 0)
+        mine = slice(begin, int(np.searchsorted(times, last, "right")))
+        # the last value holds to the end of the log; of several at one time the last one counts
+        times, values = np.append(times[mine], last), np.append(values[mine], values[mine][-1:])
+        counts = np.append(np.diff(times) > 0.0, True)
+        return times[counts], values[counts]
+
     def _input(
         self, log: Log, target: str, column: str, entry: Mapping[str, Any], lead: float
     ) -> Table:
-        values = log[column]
-        good = np.isfinite(values)
-        times = log.time[good]
-        values = values[good]
+        times, values = self._course(log, column, lead)
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
             values = np.rint(values / quantum) * quantum

@@ -107,9 +107,12 @@ class Simulator:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
         place = {name: column for column, name in enumerate(ran.names)}
-        sampler = Sampler(run.times, ran.times)
+        sampler, late = Sampler(run.times, ran.times), problem.lateness(theta, run)
         read = np.column_stack(
-            [c.of(sampler, ran.rows[:, place[c.signal]]) for c in problem.channels]
+            [
+                c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
+                for c in problem.channels
+            ]
         )
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]

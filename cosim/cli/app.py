@@ -25,6 +25,7 @@ from ..installation.builder import default_provider
 from ..master import algorithms
 from ..system.provider import FolderProvider, Provider
 from .calibrate import calibrate_command
+from .data import data_app
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .fmus import fmus_app
@@ -46,6 +47,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.add_typer(fmus_app, name="fmus")
+app.add_typer(data_app, name="data")
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)

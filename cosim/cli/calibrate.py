@@ -110,6 +110,7 @@ def calibration_table(
     findings: list[Finding],
 ) -> dict[str, Any]:
     """What `--json` prints."""
+    from ..calibrate.clocks import offsets
     from ..calibrate.estimate import channel_rms
     from ..calibrate.sensitivity import local
 
@@ -134,6 +135,7 @@ def calibration_table(
             )
             if p.role != "nuisance"
         },
+        "clocks": offsets(estimate),
         "not_separable": [str(item) for item in estimate.combinations if str(item)],
         "channels": {
             c.name: {
@@ -169,6 +171,20 @@ def _scaled(value: float | None, sigma: float) -> float | None:
     return None if value is None or math.isnan(value) else value * sigma
 
 
+def clock_lines(clocks: dict[str, dict[str, Any]]) -> list[str]:
+    """What is said of clocks that were estimated."""
+    found = []
+    for name, item in clocks.items():
+        low, high = item["ci95"]
+        note = "" if item["identifiable"] else ", not identifiable"
+        note += ", at its bound" if item["at_bound"] else ""
+        side = "late" if item["value"] >= 0.0 else "early"
+        size = f"{abs(item['value']):.4g} {item['unit']}"
+        same = "; a delay of all commands looks the same" if item["value"] > 0.0 else ""
+        found.append(f"{name}: {size} {side} ({low:.4g} to {high:.4g}{note}){same}")
+    return found
+
+
 def _print(content: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -184,6 +200,8 @@ def _print(content: dict[str, Any]) -> None:
             f"{item['nominal']:.5g}", note + (" at bound" if item["at_bound"] else ""),
         )  # fmt: skip
     console.print(table)
+    for text in clock_lines(content["clocks"]):
+        console.print(text, soft_wrap=True)
     for text in content["not_separable"]:
         console.print(f"the runs do not tell apart: {text} (in spans)")
     table = Table("channel", "unit", "noise", "identification", "validation")

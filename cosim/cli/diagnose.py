@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..files import make_folder, write_text
+from .calibrate import clock_lines
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ def _print(result: Diagnosis) -> None:
     for effect in result.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    for text in clock_lines(result.to_dict()["clocks"]):
+        console.print(f"  {text}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.clocks import offsets
 from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
@@ -131,6 +132,7 @@ class Diagnosis:
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
             "start_values": self.start_values(),
             "bursts": self.bursts,
             "unstable_from": self.ended,
