@@ -133,6 +133,7 @@ def test_only_the_builder_and_the_algorithms_import_by_name() -> None:
         "cosim/__init__.py",  # its names when they are used
         "cosim/installation/builder.py",  # the sources
         "cosim/master/algorithms/__init__.py",  # its own submodules
+        "cosim/spec/distribution.py",  # packages of the extras
     }
 
 

@@ -17,7 +17,7 @@ from ..files import flatten
 from ..master.master import Master
 from ..reading.schema import shown
 from ..spec.units import Unit, parse
-from ..system.provider import Provider
+from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
 from .clocks import bounds, check_clock, masked
@@ -75,6 +75,7 @@ class Joined(MappedLogs):
         """The problem, on a system."""
         table = self.table
         model = Model.of(file, provider)
+        get_ready(provider, model.instances.values())
         self.system = model.plain({})
         self.algorithm = str(table.get("algorithm", "jacobi"))
         self.options = dict(table.get("options", {}))

@@ -12,6 +12,8 @@ import typer
 
 from ..errors import InputError
 from ..files import make_folder, write_text
+from ..installation.builder import default_provider
+from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -31,12 +33,16 @@ logs whose noise is guessed up to half as much again."""
 
 
 def calibrate_command(
-    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    dataset: Annotated[
+        Path,
+        typer.Argument(metavar="DATASET", help="Folder of logs, or a set of `cosim scenarios`."),
+    ],
     system: Annotated[
         str | None, typer.Option(help="Another system than that of the mapping.")
     ] = None,
     mapping: Annotated[
-        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+        Path | None,
+        typer.Option(help="A dataset.toml, or a name of `cosim scenarios` [by the rig]."),
     ] = None,
     samples: Annotated[
         int, typer.Option(help="Parameter sets for the correlation index, 0 for none.")
@@ -49,7 +55,7 @@ def calibrate_command(
 ) -> None:
     """Estimate the declared parameters of a system from measured runs.
 
-    Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
+    Example: `cosim calibrate MB-12 --out out/MB-12`
     """
     from ..calibrate.calibration import calibrated
     from ..calibrate.checks.examine import examine
@@ -61,14 +67,20 @@ def calibrate_command(
     from ..report.calibration import write_calibration_page
 
     started = time.perf_counter()
-    problem = read_problem(dataset, mapping=mapping, system=system)
-    simulator = Simulator(problem, workers=workers)
-    findings = _usable(problem, examine(simulator))
-    estimate, exchange = calibrated(simulator)
+    with Display() as display:
+        provider = default_provider(display.building)
+        problem = read_problem(dataset, provider, mapping=mapping, system=system)
+        simulator = Simulator(problem, workers=workers)
+        stage = "checking the data"
+        with display.watch("calibrating", lambda: f"{stage}: {simulator.evaluations} simulations"):
+            findings = _usable(problem, examine(simulator))
+            stage = "fitting"
+            estimate, exchange = calibrated(simulator)
+            findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
+            stage = "what the runs tell of each parameter"
+            correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
     if not exchange.small:
         typer.echo(f"warning: {exchange}", err=True)
-    findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
-    correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
     unused = validation_residuals(estimate)
     content = calibration_table(estimate, unused, correlation, findings)
     content["exchange"] = exchange.to_dict()

@@ -20,7 +20,7 @@ from ..calibrate.clocks import offsets
 from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
+from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
 from .adding import made_of
@@ -300,7 +300,14 @@ def _searched(
     winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
-from ..errors import CosimError
+from ..errors import CosimError, UnbuiltError
 from ..spec.hints import Mix
 from .candidates import Candidate, balances, element_of, new_parameters
 
@@ -126,6 +126,8 @@ class Batch:
             assert self.change is not None
             problem = base.with_effects(self.change)
             problem.system()
+        except UnbuiltError:
+            raise
         except CosimError:
             return _single(base, self.candidates)
         found = [p for c, _ in self.members for p in _of(c, base, problem)]
@@ -167,6 +169,8 @@ def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
         try:
             problem = candidate.added_to(base)
             problem.system()
+        except UnbuiltError:
+            raise
         except CosimError:
             continue
         found += _of(candidate, base, problem)

@@ -421,13 +421,13 @@ def _run(
             result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
             if place is not None and error.recording is not None:
-                path = error.recording.write_parquet(place / "recording.parquet")
+                path = error.recording.keep(place / "recording")
                 error.add_note(f"the recording up to then is in {path}")
             raise
         results[run_name] = result
         if place is not None:
             files += [
-                result.recording.write_parquet(place / "recording.parquet"),
+                result.recording.keep(place / "recording"),
                 result.recording.write_csv(place / "recording.csv"),
             ]
             result.plot(place / "plot.png")

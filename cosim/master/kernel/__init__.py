@@ -10,7 +10,6 @@ import ctypes as ct
 import hashlib
 import math
 import platform
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -163,15 +162,20 @@ def standing(memory: NDArray[np.uint8]) -> Standing:
     return Standing(int(run.index), int(run.row), *found)
 
 
-def library_name() -> str:
-    """File name of the library for these sources and this machine."""
+def library_name(target: str = "") -> str:
+    """File name of the library for these sources.
+
+    Args:
+        target: machine and system, such as x86_64-linux; this machine's if not given.
+    """
     content = b"\0".join(path.read_bytes() for path in SOURCES)
     digest = hashlib.sha256(content).hexdigest()[:16]
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    return f"kernel-{digest}-{machine}-{platform.system().lower()}{suffix}"
+    if not target:
+        machine = platform.machine().lower()
+        machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+        target = f"{machine}-{platform.system().lower()}"
+    suffix = {"windows": ".dll", "darwin": ".dylib"}.get(target.rpartition("-")[2], ".so")
+    return f"kernel-{digest}-{target}{suffix}"
 
 
 def cache_folder() -> Path:
