@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ..data.logs import Log
 from ..data.segments import relative_pose
 from ..data.signals import Table
-from ..errors import ScenarioError, UnitError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
+from ..master.master import Master
+from ..reading.schema import shown
 from ..spec.units import Unit, parse
-from ..system.provider import Provider
+from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
 from .clocks import bounds, check_clock, masked
@@ -47,9 +49,9 @@ def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
     value = values[match["key"]]
     try:
         return float(value[int(match["index"])] if match["index"] else value)
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, OverflowError):
         raise ScenarioError(
-            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{where}: entry {key!r} is no number, it reads {shown(value)}; name an element as "
             f"{match['key']}[0]"
         ) from None
 
@@ -73,7 +75,14 @@ class Joined(MappedLogs):
         """The problem, on a system."""
         table = self.table
         model = Model.of(file, provider)
+        get_ready(provider, model.instances.values())
         self.system = model.plain({})
+        self.algorithm = str(table.get("algorithm", "jacobi"))
+        self.options = dict(table.get("options", {}))
+        search = self.search()
+        for options in (self.options, {**self.options, **search.options}):
+            with within(str(self.path)):  # what the master refuses is said before data are read
+                Master(self.system, self.algorithm, search.step, options=options).compile([], [])
         constants: dict[str, float] = {}
         for name, value in flatten(table.get("parameters", {})).items():
             if isinstance(value, list):
@@ -107,9 +116,10 @@ class Joined(MappedLogs):
             present,
             [self.run(name, present) for name in self.logs],
             float(table["step"]),
-            self.search(),
+            search,
             constants=constants,
-            algorithm=str(table.get("algorithm", "jacobi")),
+            algorithm=self.algorithm,
+            options=self.options,
             period=float(table["period"]) if "period" in table else None,
             ticks=bool(table.get("ticks", False)),
             relative=[tuple(names) for names in self.table.get("relative", [])],
@@ -264,6 +274,11 @@ class Joined(MappedLogs):
                 where = f"{self.path}: {key} {entry.get('name')}"
                 targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
+                if isinstance(entry["nominal"], str) and not entry.get("per_run"):
+                    raise ScenarioError(
+                        f"{where}: nominal {entry['nominal']!r} is another one in each run; "
+                        "write per_run = true, or a number"
+                    )
                 for run in runs:
                     nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
                     span = float(entry.get("span", 0.0))

@@ -41,7 +41,7 @@ class Problem:
         step: communication step [s].
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         constants: full variable name -> value for all runs.
-        algorithm: of the master.
+        algorithm, options: of the master; a search may have further options.
         period: time between recorded points [s]; the sample interval if not given.
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
@@ -60,6 +60,7 @@ class Problem:
     search: Coarse
     constants: Mapping[str, float] = field(default_factory=dict)
     algorithm: str = "jacobi"
+    options: Mapping[str, Any] = field(default_factory=dict)
     period: float | None = None
     ticks: bool = False
     relative: Sequence[Sequence[str]] = ()
@@ -175,9 +176,10 @@ class Problem:
         return self.model.instances
 
     @property
-    def options(self) -> Mapping[str, Any]:
+    def chosen_options(self) -> Mapping[str, Any]:
         """Of the master's algorithm at this step."""
-        return self.search.options if self.step == self.search.step else {}
+        own = self.search.options if self.step == self.search.step else {}
+        return {**self.options, **own}
 
     @property
     def _coarse(self) -> Mapping[str, float]:
@@ -187,7 +189,8 @@ class Problem:
     def kind(self) -> Hashable:
         """What problems have in common that the same prepared simulations serve."""
         return (
-            *(tuple(sorted(i.items())) for i in (self.instances, self._coarse, self.options)),
+            *(tuple(sorted(i.items())) for i in (self.instances, self._coarse)),
+            repr(sorted(self.chosen_options.items())),  # values may be tables
             self.step, self.algorithm, self.period,
             tuple((c.signal, c.shift) for c in self.channels),
         )  # fmt: skip
@@ -315,7 +318,7 @@ class Problem:
                     added.append(
                         free_parameter(
                             variable, full, full, strength=variable.name in strengths,
-                            hints=hints.get(variable.name, NO_HINTS).within(name),
+                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                         )
                     )  # fmt: skip
         return changed.changed(parameters=[*self.parameters, *added])

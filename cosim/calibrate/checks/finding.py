@@ -71,6 +71,15 @@ class Finding:
             way = f' (if the data are right: [checks] allow = ["{self.kind}"] in dataset.toml)'
         return f"{self.severity}: {where + ': ' if where else ''}{self.text}{way}"
 
+    def _repr_html_(self) -> str:
+        from ...display.html import tag
+        from ...display.notebook import view
+
+        where = [f"run {self.run}"] * bool(self.run) + [self.column] * bool(self.column)
+        kind = "over" if self.severity == "error" else ""
+        text = tag("p", tag("span", self.text, class_=kind))
+        return view(f"{self.severity}: {self.kind}", ", ".join(where), text)
+
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {"severity": self.severity, "kind": self.kind, "run": self.run,
