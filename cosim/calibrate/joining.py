@@ -331,11 +331,6 @@ class Joined(MappedLogs):
         """
         if isinstance(entry, (int, float)):
             return float(entry)
-        if not run:
-            raise ScenarioError(
-                f"{where}: nominal {entry!r} is another value in each run; say per_run = true, or "
-                "give a number"
-            )
         if entry.startswith("begin:"):
             begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))

@@ -12,7 +12,7 @@ from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.clocks import clocked, offsets
 from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
-from cosim.errors import ScenarioError, UnitError, UnknownNameError, ValueRangeError
+from cosim.errors import UnitError, UnknownNameError, ValueRangeError
 
 LATE = 0.11
 MAPPING = f"""
@@ -167,11 +167,6 @@ def test_held_inputs_change_at_their_own_times(folder: Path) -> None:
     path.write_text(MAPPING.replace("period = 0.01", f"resample = {FRAME}"))
     coarse = read_problem(folder).runs[0].inputs["base.w_l"]
     assert np.max(np.abs(coarse.at(known - LATE) - wanted)) > 1.0
-
-
-def test_what_a_run_begins_with_belongs_to_a_run(folder: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"'first:x' is another value in each run; .* per_run"):
-        problem(folder, START.replace("per_run = true", ""))
 
 
 def test_of_a_burst_of_commands_the_last_one_counts(tmp_path: Path, folder: Path) -> None:
