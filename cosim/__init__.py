@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .errors import CosimError
     from .fmu.instance import Instance
     from .master.master import Master
+    from .master.twin import Twin
+    from .running.opening import open_twin as open
     from .running.runner import Result, RunResult, run
     from .system.provider import FolderProvider
     from .system.system import System
@@ -35,7 +37,9 @@ __all__ = [
     "RunResult",
     "System",
     "Table",
+    "Twin",
     "errors",
+    "open",
     "read_recording",
     "read_system",
     "run",
@@ -53,11 +57,13 @@ _HOMES = {
     "RunResult": "running.runner",
     "System": "system.system",
     "Table": "data.signals",
+    "Twin": "master.twin",
+    "open": "running.opening:open_twin",
     "read_recording": "data.recording",
     "read_system": "system.toml",
     "run": "running.runner",
 }
-"""Name -> module, loaded when the name is first used (PEP 562).
+"""Name -> module (`:` its name there, if it is another one), loaded when first used (PEP 562).
 
 A module of this package, the command line above all, then loads what it needs and no more.
 """
@@ -65,7 +71,8 @@ A module of this package, the command line above all, then loads what it needs a
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+        module, _, other = _HOMES[name].partition(":")
+        value = getattr(importlib.import_module(f".{module}", __name__), other or name)
     elif name == "errors":
         value = importlib.import_module(".errors", __name__)
     else:

@@ -23,6 +23,7 @@ from ..master.algorithms import names
 from ..master.master import Master
 from ..master.outline import Outline
 from ..master.session import Session
+from ..master.twin import Twin
 from ..scenario import scenario as scenarios
 from ..scenario.checks import CheckResult, evaluate
 from ..scenario.scenario import Scenario
@@ -195,6 +196,10 @@ class Prepared:
     def session(self) -> Session:
         """Instances for many runs, one after the other."""
         return Session(self.master, self.scenario.duration, **self._arguments)
+
+    def twin(self) -> Twin:
+        """Instances that are stepped from outside."""
+        return Twin(self.master, self.scenario.duration, **self._arguments)
 
     def outline(self) -> Outline:
         """Everything checked, inputs tabulated, no FMU created."""
