@@ -58,6 +58,7 @@ class Twin:
         duration: how far it can go [s]; infinite by default. Inputs that are tables are then held
             beyond their ends.
         inputs, record, every, start: as of `Master.run`.
+        about: what the provenance of its recordings says besides.
 
     Attributes:
         ended: the words of an FMU that asked to end, "" if none did.
@@ -75,6 +76,7 @@ class Twin:
         record: Sequence[str] | None = None,
         every: int = 1,
         start: float = 0.0,
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         if not isinstance(master, Master):
             raise wrong(
@@ -82,7 +84,7 @@ class Twin:
                 'write Twin(Master(system)), or cosim.open("motor_bench/ST1") for a scenario',
             )  # fmt: skip
         need_number("the duration of a Twin", duration, "give it in seconds")
-        self._made = (master, duration, inputs, record, every, start)
+        self._made = (master, duration, inputs, record, every, start, about)
         self.master, endless = master, duration == math.inf
         if endless:
             duration = math.ceil(WINDOW / every) * every * master.step
@@ -374,9 +376,10 @@ class Twin:
         saved = self.save()
         try:
             states = saved.memory.serialized(self._run)
-            master, duration, inputs, record, every, start = self._made
+            master, duration, inputs, record, every, start, about = self._made
             other = Twin(
-                master, duration, inputs=inputs, record=record, every=every, start=start
+                master, duration, inputs=inputs, record=record, every=every, start=start,
+                about=about,
             )  # fmt: skip
             try:
                 other._run.external[:2] = self._first
@@ -446,7 +449,8 @@ class Twin:
             notes=[*self._execution.notes(), *filter(None, [self.ended])],
         )  # fmt: skip
         given = {**found.provenance["inputs"], **dict.fromkeys(sorted(self._told), "set in steps")}
-        return replace(found, provenance={**found.provenance, "inputs": given})
+        about = self._made[-1] or {}
+        return replace(found, provenance={**found.provenance, "inputs": given, **about})
 
     def _present(self, objects: dict[str, list[Any]]) -> Vector | None:
         """The present point as a run that ends here records it; nothing changes by this."""

@@ -56,6 +56,6 @@ def open_twin(
     )  # fmt: skip
     prepared = prepare(
         item, builder.default_provider() if provider is None else provider,
-        variants=variants, parameters=parameters, base=Path.cwd(),
+        variants=variants, parameters=parameters, base=Path.cwd(), scene=True,
     )  # fmt: skip
     return prepared.twin()
