@@ -32,7 +32,8 @@ PAGE = """<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
 html,body{{height:100%;margin:0}}
-body{{font:14px/1.4 system-ui,sans-serif;color:#1f2937;display:grid;grid-template:auto 1fr auto/1fr minmax(260px,26%)}}
+body{{font:14px/1.4 system-ui,sans-serif;color:#1f2937;display:grid;
+grid-template:auto 1fr auto/1fr minmax(260px,26%)}}
 header{{grid-column:1/3;padding:.5em 1em;display:flex;gap:1.2em;align-items:baseline;
 border-bottom:1px solid #e5e7eb}}h1{{font-size:1.05em;margin:0}}
 #stage{{position:relative;min-height:0}}#scene{{position:absolute;width:100%;
