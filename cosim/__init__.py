@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .fmu.instance import Instance
     from .master.master import Master
     from .master.twin import Twin
-    from .running.opening import open_twin as open
+    from .running.opening import open
     from .running.runner import Result, RunResult, run
     from .system.provider import FolderProvider
     from .system.system import System
@@ -58,12 +58,12 @@ _HOMES = {
     "System": "system.system",
     "Table": "data.signals",
     "Twin": "master.twin",
-    "open": "running.opening:open_twin",
+    "open": "running.opening",
     "read_recording": "data.recording",
     "read_system": "system.toml",
     "run": "running.runner",
 }
-"""Name -> module (`:` its name there, if it is another one), loaded when first used (PEP 562).
+"""Name -> module, loaded when the name is first used (PEP 562).
 
 A module of this package, the command line above all, then loads what it needs and no more.
 """
@@ -71,8 +71,7 @@ A module of this package, the command line above all, then loads what it needs a
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        module, _, other = _HOMES[name].partition(":")
-        value = getattr(importlib.import_module(f".{module}", __name__), other or name)
+        value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
     elif name == "errors":
         value = importlib.import_module(".errors", __name__)
     else:

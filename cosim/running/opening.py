@@ -14,7 +14,7 @@ from ..system.provider import Provider
 from .runner import adjusted, find_runs, prepare
 
 
-def open_twin(
+def open(
     name: Path | str,
     *,
     variants: Mapping[str, str] | None = None,
