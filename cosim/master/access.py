@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..arguments import need_number
 from ..data.signals import SignalVector, Table
-from ..errors import GraphError, UnitError, UnknownNameError, listing
+from ..errors import GraphError, UnitError, UnknownNameError, ValueRangeError, listing
 from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..spec.units import conversion, parse
 from ..system.inputs import Driver
 from .interpreter import Interpreter
+
+WHOLE = 1e-6
+"""Part of a communication step by which a duration may miss a whole number of them, as in runs."""
 
 
 @dataclass(frozen=True)
@@ -187,3 +192,19 @@ def held(driver: Driver) -> Driver:
         driver = copy.copy(driver)
         driver.extend = True
     return driver
+
+
+def whole_steps(duration: float, step: float) -> int:
+    """How many communication steps a duration is.
+
+    Raises:
+        ValueRangeError: no whole number of them.
+    """
+    need_number("the duration of a step", duration, "give it in seconds")
+    count = round(duration / step) if math.isfinite(duration) else 0
+    if count < 1 or abs(count * step - duration) > WHOLE * step:
+        raise ValueRangeError(
+            f"a step of {duration:.9g} s is not a whole number of communication steps of "
+            f"{step:.9g} s; take {max(count, 1) * step:.9g} s"
+        )
+    return count

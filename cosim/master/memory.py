@@ -54,14 +54,14 @@ class Memory:
     row: int
     kept: dict[str, list[Any]]
     base: int
-    given: dict[int, float]
+    given: dict[int, Any]
     stepper: Any
     blocks: int = 0
     rows: Vector | None = None
     earlier: list[tuple[Vector, Vector]] | None = field(default=None)
 
     @classmethod
-    def of(cls, run: Interpreter, stepper: Any, base: int, given: Mapping[int, float]) -> Memory:
+    def of(cls, run: Interpreter, stepper: Any, base: int, given: Mapping[int, Any]) -> Memory:
         """The present point.
 
         Raises:

@@ -30,13 +30,15 @@ from ..errors import (
     AlgebraicLoopError,
     EndRequest,
     FmuCallError,
+    GraphError,
     StepError,
     ValueRangeError,
 )
 from ..fmu.surroundings import Surroundings
 from ..fmu.values import check_values
 from ..system.inputs import Driver
-from .access import Access, held
+from .access import Access, held, whole_steps
+from .driven import DrivenInputs
 from .execution import Execution
 from .initialization import initialize
 from .master import Master
@@ -46,8 +48,6 @@ from .plan import Op, decoded
 Vector = NDArray[np.float64]
 WINDOW = 4096
 """Communication points for which an endless twin has room at a time."""
-WHOLE = 1e-6
-"""Part of a communication step by which a duration may miss a whole number of them, as in runs."""
 
 
 class Twin:
@@ -99,13 +99,9 @@ class Twin:
         self._stack = ExitStack()
         self._failed = self.ended = ""
         self._begun = self._closed = False
-        self._base = 0
+        self._base = self._taken = 0
         self._blocks: list[tuple[Vector, Vector]] = []
         self._saved: list[Saved] = []
-        self._first = outline.external[:2].copy()
-        self._table: dict[int, Vector] = {}
-        self._given: dict[int, float] = {}
-        self._columns: tuple[NDArray[np.intp], Vector] | None = None
         self._told: set[str] = set()
         self._final: Recording | None = None
         try:
@@ -118,6 +114,7 @@ class Twin:
                     "input, which a twin cannot know; take gauss_seidel, jacobi or iterated"
                 )
             self._access = Access(self._run, tuple(self._outline.signals))
+            self._inputs = DrivenInputs(master, self._run)
         except BaseException:
             self._stack.close()
             raise
@@ -158,7 +155,8 @@ class Twin:
 
         Args:
             name: an input that no FMU drives, or a tunable parameter; whole or an element.
-            value: a number (a list for a vector), in the variable's unit.
+            value: a number (a list for a vector), in the variable's unit; or a signal over the
+                twin's time, for an input that the twin was opened with.
             unit: of the value, if it is another one.
 
         Raises:
@@ -169,6 +167,15 @@ class Twin:
         """
         self._check_open()
         target = self._access.target(name)
+        if hasattr(value, "at"):
+            if target.columns is None or len(target.columns) != 1:
+                raise GraphError(
+                    f"{name} takes no signal: the twin was not opened with something that drives "
+                    "it, or it is a vector; set numbers, or open the twin with inputs"
+                )
+            self._inputs.set(target.columns[0], value)
+            self._told.add(name)
+            return
         if unit:
             value = self._access.convert(name, value, unit, into=True)
         if target.columns is None:
@@ -176,8 +183,7 @@ class Twin:
         else:
             found = check_values(name, target.variables, value)
             for column, item in zip(target.columns, found, strict=True):
-                self._given[column] = float(item)
-            self._columns = None
+                self._inputs.set(column, float(item))
         self._told.add(name)
 
     def get(self, name: str, unit: str = "") -> Any:
@@ -200,7 +206,8 @@ class Twin:
             value: Any = float(self._run.values[source.slot] * source.gain + source.offset)
         elif source.column >= 0:
             row = self._run.external[self._run.index]
-            value = self._given.get(source.column, float(row[source.column]))
+            self._inputs.put(self._run.index, self._run.index + 1)
+            value = float(row[source.column])
         else:
             value = self._access.fetch(source)
         return self._access.convert(name, value, unit, into=False) if unit else value
@@ -218,7 +225,7 @@ class Twin:
             StepError: an FMU failed; carries the recording up to then. The twin can return to a
                 saved state, or be closed.
         """
-        left = 1 if duration is None else self._count(duration)
+        left = 1 if duration is None else whole_steps(duration, self._run.step)
         self._begin()
         self._check_alive()
         run = self._run
@@ -233,7 +240,7 @@ class Twin:
                     self._roll()
                 last = min(run.index + left, self._outline.count)
                 left -= last - run.index
-                self._drive(run.index, last + 1)
+                self._inputs.put(run.index, last + 1)
                 self._stepper.advance(last)
         except EndRequest as request:
             self.ended = str(request)
@@ -245,23 +252,12 @@ class Twin:
             ) from error
         return self.time
 
-    def _count(self, duration: float) -> int:
-        need_number("the duration of a step", duration, "give it in seconds")
-        step = self._run.step
-        count = round(duration / step) if math.isfinite(duration) else 0
-        if count < 1 or abs(count * step - duration) > WHOLE * step:
-            raise ValueRangeError(
-                f"a step of {duration:.9g} s is not a whole number of communication steps of "
-                f"{step:.9g} s; take {max(count, 1) * step:.9g} s"
-            )
-        return count
-
     def _begin(self) -> None:
         """Initialize, with the inputs that have been set."""
         self._check_open()
         if self._begun:
             return
-        self._drive(0, 2)
+        self._inputs.put(0, 2)
         before = Surroundings.now()
         try:
             initialize(self._run)
@@ -274,22 +270,11 @@ class Twin:
             self._execution.changed = before.restore()
         self._begun = True
 
-    def _drive(self, first: int, behind: int) -> None:
-        """Put what was set into the table of the inputs."""
-        if not self._given:
-            return
-        if self._columns is None:
-            for column in self._given:
-                if column not in self._table:
-                    self._table[column] = self._run.external[:, column].copy()
-            self._columns = (np.array(list(self._given)), np.array(list(self._given.values())))
-        columns, values = self._columns
-        self._run.external[first:behind, columns] = values
-
     def _roll(self) -> None:
         """Let an endless twin's window begin where it stands."""
         run = self._run
-        self._blocks.append((run.recorded_times(), run.rows[: run.row].copy()))
+        self._blocks.append(self._fresh())
+        self._taken = 0
         memory = self._stepper.save()
         self._window(self._base + run.index)
         run.past[0] = max(int(run.past[0]), 3)  # values there are before the window
@@ -302,9 +287,7 @@ class Twin:
         self._base = base
         run.times[:] = self._start + run.step * (base + points)
         vars(run).pop("instants", None)
-        run.external[:] = self.master.tabulate(self._outline.signals, run.times)
-        self._table.clear()
-        self._columns = None
+        self._inputs.tabulate()
 
     def _check_open(self) -> None:
         if self._closed:
@@ -327,7 +310,7 @@ class Twin:
         """
         self._begin()
         self._check_alive()
-        memory = Memory.of(self._run, self._stepper.save(), self._base, self._given)
+        memory = Memory.of(self._run, self._stepper.save(), self._base, self._inputs.given)
         memory.blocks = len(self._blocks)
         saved = Saved(self.time, memory)
         self._saved.append(saved)
@@ -350,12 +333,9 @@ class Twin:
         self._take(saved.memory)
 
     def _take(self, memory: Memory, states: Sequence[Any] | None = None) -> None:
-        self._given = dict(memory.given)
-        self._columns = None
         if memory.base != self._base:
             self._window(memory.base)
-        for column, values in self._table.items():
-            self._run.external[:, column] = values
+        self._inputs.replace(memory.given)
         self._blocks = memory.recorded(self._run, self._blocks)
         memory.put(self._run, states)
         self._stepper.restore(memory.stepper)
@@ -382,9 +362,9 @@ class Twin:
                 about=about,
             )  # fmt: skip
             try:
-                other._run.external[:2] = self._first
+                other._inputs.begin_as(self._inputs)
                 other._begin()
-                other._blocks = list(self._blocks)
+                other._blocks, other._taken = list(self._blocks), self._taken
                 memory = copy.copy(saved.memory)
                 memory.rows = self._run.rows[: self._run.row].copy()
                 given = [
@@ -407,13 +387,12 @@ class Twin:
         self._check_open()
         for saved in list(self._saved):
             self.drop(saved)
-        self._given, self._columns = {}, None
         self._execution.restart()
         if self._base:
             self._window(0)
-        for column, values in self._table.items():
-            self._run.external[:, column] = values
+        self._inputs.replace({})
         self._blocks.clear()
+        self._taken = 0
         self._told.clear()
         self._failed = self.ended = ""
         self._begun = False
@@ -428,8 +407,8 @@ class Twin:
         if not self._failed:
             self._begin()
         run = self._run
-        times = [*(item[0] for item in self._blocks), run.recorded_times()]
-        rows = [*(item[1] for item in self._blocks), run.rows[: run.row]]
+        parts = [*self._blocks, self._fresh()]
+        times, rows = [part[0] for part in parts], [part[1] for part in parts]
         objects = {name: list(items) for name, items in run.passing.kept.items()}
         if not self._failed:
             now = self._present(objects)
@@ -452,12 +431,32 @@ class Twin:
         about = self._made[-1] or {}
         return replace(found, provenance={**found.provenance, "inputs": given, **about})
 
+    def _fresh(self) -> tuple[Vector, Vector]:
+        """Times and rows of the window that were not drained."""
+        run = self._run
+        return run.recorded_times()[self._taken :], run.rows[self._taken : run.row].copy()
+
+    def drain(self) -> tuple[Vector, Vector]:
+        """Times and rows that were recorded since the last call; the twin then forgets them.
+
+        The present point is not among them: it is recorded by the step that leaves it, with the
+        inputs that it has then. States saved before cannot be returned to.
+        """
+        parts = [*self._blocks, self._fresh()]
+        self._blocks, self._taken = [], self._run.row
+        for saved in list(self._saved):
+            self.drop(saved)
+        return (
+            np.concatenate([part[0] for part in parts]),
+            np.concatenate([part[1] for part in parts]),
+        )
+
     def _present(self, objects: dict[str, list[Any]]) -> Vector | None:
         """The present point as a run that ends here records it; nothing changes by this."""
         run, layout = self._run, self._run.layout
         if run.index % run.every or run.row > run.index // run.every:
             return None
-        self._drive(run.index, run.index + 1)
+        self._inputs.put(run.index, run.index + 1)
         with Memory.exchange(run):
             for op, a, b in decoded(run.plan.final):
                 if op is not Op.RECORD:
