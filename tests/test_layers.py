@@ -14,7 +14,7 @@ MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
     "errors", "reading", "arguments", "files", "spec", "data", "fmu", "drawing", "system", "master",
     "installation", "scenario", "ssp", "view", "running", "control", "study", "calibrate",
-    "diagnose", "report", "cli", "__main__",
+    "diagnose", "live", "report", "cli", "__main__",
 )  # fmt: skip
 """Of `cosim`, from the bottom up: each may import those before it."""
 FORBIDDEN = {"sources", "cosim_library", "casadi", "pythonfmu", "ziglang", "scenarios", "tests"}

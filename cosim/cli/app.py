@@ -33,6 +33,7 @@ from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
 from .streams import print_json, stdout_for_json
 from .study import study_command
+from .twin import twin_command
 from .view import view_command
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
 app.command("study")(study_command)
+app.command("twin")(twin_command)
 app.command("view")(view_command)
 
 

@@ -131,6 +131,11 @@ class Twin:
         """How far it can go [s]; may be infinite."""
         return self._outline.end
 
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Full scalar names of the signals that are recorded."""
+        return self._outline.observed
+
     def inputs(self) -> dict[str, str]:
         """What `set` takes besides tunable parameters -> its unit: inputs that no FMU drives."""
         system = self.master.system
