@@ -52,8 +52,8 @@ class Sorter:
     def restart(self) -> None:
         """Forget all samples: what comes now may have other times."""
         self._heap: list[tuple[float, int, Sample]] = []
-        self._held: set[int] = set()
-        self._past: deque[int] = deque(maxlen=REMEMBERED)
+        self._seen: set[int] = set()
+        self._past: deque[int] = deque()
         self._last: Sample | None = None
         self._newest = float("-inf")
 
@@ -63,14 +63,14 @@ class Sorter:
     def push(self, sample: Sample) -> None:
         """Take a sample; it is dropped if it is late or doubled."""
         key = self._key(sample.time)
-        near = (key - 1, key, key + 1)
-        if any(k in self._held for k in near) or any(k in self._past for k in near):
+        seen = self._seen
+        if key in seen or key - 1 in seen or key + 1 in seen:
             self.counts.doubled += 1
         elif self._last is not None and sample.time <= self._last.time:
             self.counts.late += 1
         else:
             self._serial += 1
-            self._held.add(key)
+            seen.add(key)
             heapq.heappush(self._heap, (sample.time, self._serial, sample))
             self._newest = max(self._newest, sample.time)
 
@@ -80,8 +80,9 @@ class Sorter:
         while self._heap and (everything or self._heap[0][0] <= self._newest - self.wait):
             _, _, sample = heapq.heappop(self._heap)
             key = self._key(sample.time)
-            self._held.discard(key)
-            self._past.append(key)
+            self._past.append(key)  # still among those seen
+            if len(self._past) > REMEMBERED:
+                self._seen.discard(self._past.popleft())
             self._count_missing(sample)
             self._last = sample
             found.append(sample)

@@ -159,6 +159,7 @@ class Watch:
             lines: with their arrivals.
             paced: wait until each sample is due.
         """
+        ready: list[Sample] = []
         for arrival, line in lines:
             try:
                 message = read_message(line, self.reading.clock)
@@ -169,9 +170,11 @@ class Watch:
                     self.emit({"event": "unreadable", "line": text, "why": str(error)})
                 continue
             if isinstance(message, End):
+                self._go(ready)
                 return False
             if isinstance(message, Begin):
-                self._release(everything=True)
+                self._go([*ready, *self._sorter.release(everything=True)])
+                ready = []
                 self._end_run("a new run was told")
                 self._sorter.restart()
                 self._entries = message.values
@@ -180,10 +183,12 @@ class Watch:
             if self._first is None:
                 self._first = message.time
             self._sorter.push(message)
+            ready += self._sorter.release()  # now: who is late must not depend on the blocks
             limit = self.settings.duration
             if limit is not None and message.time - self._first >= limit:
+                self._go(ready)
                 return False
-        self._release()
+        self._go(ready)
         return True
 
     def _wait_until_due(self, sample: Sample, arrival: float, paced: bool) -> None:
@@ -200,9 +205,8 @@ class Watch:
         elif self._offset is None or begin < self._offset:
             self._offset = begin
 
-    def _release(self, everything: bool = False) -> None:
-        """Go through the samples whose turn it is."""
-        samples = self._sorter.release(everything)
+    def _go(self, samples: Sequence[Sample]) -> None:
+        """Go through samples in their order; long gaps between them end a run."""
         first = 0
         for index, sample in enumerate(samples):
             before = samples[index - 1] if index > first else self._run and self._run.last
@@ -372,7 +376,7 @@ class Watch:
 
     def finish(self) -> None:
         """Go through what is still held back, and end the run."""
-        self._release(everything=True)
+        self._go(self._sorter.release(everything=True))
         self._end_run("the stream ended")
 
     def summary(self) -> dict[str, Any]:
