@@ -89,7 +89,7 @@ def broker(reading: Reading, minutes: float) -> None:
             command = [sys.executable, "-m", "benchmarks.beside", "publish", "--minutes",
                        str(minutes)]  # fmt: skip
             publisher = subprocess.Popen(command)
-            settings = Settings(pace=1.0, report=30.0, idle=60.0)
+            settings = Settings(pace=1.0, report=30.0, idle=600.0)
             Watch(reading, settings, lambda event: print(json.dumps(event), flush=True)).follow(
                 source
             )

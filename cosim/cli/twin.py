@@ -33,6 +33,9 @@ def twin_command(
         Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
     ] = None,
     false_alarms: Annotated[float, typer.Option(help="Expected false alarms per hour.")] = 0.01,
+    margin: Annotated[
+        float, typer.Option(help="What the model may be off by without a fault [sigma].")
+    ] = 0.0,
     wait: Annotated[
         float | None, typer.Option(help="How late samples may come [s; 0.1 for udp, else 0].")
     ] = None,
@@ -57,7 +60,7 @@ def twin_command(
 
     if wait is None:
         wait = 0.1 if source.startswith("udp://") else 0.0
-    settings = Settings(pace, false_alarms, wait, settle, report, idle, duration)
+    settings = Settings(pace, false_alarms, margin, wait, settle, report, idle, duration)
     reading = read_reading(
         dataset,
         mapping=mapping,

@@ -10,8 +10,10 @@ An alarm is a probability below a threshold. Its expected number under noise is 
 thresholds over all tests, whatever tests depend on each other; the thresholds share the stated rate
 evenly over the lengths. Long windows find weak effects late, short ones strong effects at once.
 
-What this assumes: the residual of a machine without a fault is white, Gaussian, of the data set's
-sigma. A model whose parameters are off is a fault.
+What this assumes: the noise is white, Gaussian, of the data set's sigma. What the model is off by
+without a fault, since calibrated values have errors of their own, is told by `margin`: it must
+exceed neither the mean nor the root mean square of that in any window, in sigmas. Then z counts
+less margin sqrt(n), q is noncentral chi-square(n, n margin^2), and false alarms come no oftener.
 """
 
 from __future__ import annotations
@@ -67,6 +69,7 @@ class Alarms:
         channels: names.
         interval: between samples [s].
         rate: expected false alarms per hour, of all channels together.
+        margin: what the model may be off by without a fault, over sigma.
 
     Attributes:
         lengths: of the windows, in samples.
@@ -74,8 +77,11 @@ class Alarms:
         tests: made so far.
     """
 
-    def __init__(self, channels: Sequence[str], interval: float, rate: float) -> None:
-        self.channels, self.interval, self.rate = tuple(channels), interval, rate
+    def __init__(
+        self, channels: Sequence[str], interval: float, rate: float, margin: float = 0.0
+    ) -> None:
+        self.channels, self.interval = tuple(channels), interval
+        self.rate, self.margin = rate, margin
         count = max(int(np.log2(max(LONGEST / interval / FIRST, 1.0))), 0) + 1
         self.lengths = [FIRST << level for level in range(count)]
         per_hour = [len(KINDS) * len(channels) * HOUR / (n * interval) for n in self.lengths]
@@ -117,12 +123,22 @@ class Alarms:
         self._level(0, sums, stamps[FIRST - 1 : whole : FIRST], found)
         return sorted(found, key=lambda alarm: (alarm.t, alarm.window_s))
 
+    def _more(self, square: Vector, n: Vector) -> Vector:
+        """Probabilities of a larger sum of squares."""
+        if self.margin == 0.0:
+            return np.asarray(chdtrc(n, square), dtype=np.float64)
+        from scipy.stats import ncx2
+
+        return np.asarray(ncx2.sf(square, n, n * self.margin**2), dtype=np.float64)
+
     def _level(self, level: int, sums: Vector, ends: Vector, found: list[Alarm]) -> None:
         """Test windows (sum, sum of squares, count) and join them to those of the next length."""
         total, square, count = sums[:, 0], sums[:, 1], sums[:, 2]
         there = count > 0
         n = np.where(there, count, 1.0)
-        chances = (erfc(np.abs(total) / np.sqrt(2.0 * n)), chdtrc(n, square))
+        allowed = self.margin * np.sqrt(n)
+        beyond = np.maximum(np.abs(total) / np.sqrt(n) - allowed, 0.0)
+        chances = (erfc(beyond / np.sqrt(2.0)), self._more(square, n))
         self.tests += len(KINDS) * int(there.sum())
         values = (total / n, np.sqrt(square / n))
         for kind, chance, value in zip(KINDS, chances, values, strict=True):

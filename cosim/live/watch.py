@@ -36,6 +36,7 @@ class Settings:
     Attributes:
         pace: times real time at which a recorded stream is played, 0 for as fast as possible.
         rate: expected false alarms per hour.
+        margin: what the model may be off by without a fault, over sigma.
         wait: how long samples may come after later ones [s].
         settle: no alarms for so long after the begin of a run [s].
         report: time between reports [s].
@@ -45,6 +46,7 @@ class Settings:
 
     pace: float = 1.0
     rate: float = 0.01
+    margin: float = 0.0
     wait: float = 0.0
     settle: float = 0.0
     report: float = 1.0
@@ -52,7 +54,7 @@ class Settings:
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("pace", "wait", "settle"):
+        for name in ("pace", "margin", "wait", "settle"):
             if not getattr(self, name) >= 0.0:
                 raise InputError(f"{name} of a stream is {getattr(self, name)}, not 0 or more")
         for name in ("rate", "report", "idle", "duration"):
@@ -110,7 +112,9 @@ class Watch:
         self.reading, self.settings, self.emit, self.folder = reading, settings, emit, folder
         channels = reading.problem.channels
         self.counts, self.lateness = Counts(), Lateness()
-        self.alarms = Alarms([c.name for c in channels], reading.interval, settings.rate)
+        self.alarms = Alarms(
+            [c.name for c in channels], reading.interval, settings.rate, settings.margin
+        )
         self.raised: dict[tuple[str, str], int] = {}
         self._sorter = Sorter(reading.interval, settings.wait, self.counts)
         self._keep = max(c.window for c in channels) + 4.0 * reading.size

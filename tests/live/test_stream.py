@@ -139,6 +139,17 @@ def test_strong_shifts_are_found_at_once_and_weak_ones_later(shift, longest) -> 
     assert first.t <= longest
 
 
+@pytest.mark.parametrize("kind", ["mean", "energy"])
+def test_what_the_margin_allows_raises_no_alarm_and_what_is_beyond_does(kind) -> None:
+    noise = np.random.default_rng(8).standard_normal((65536, 1))
+    signs = 1.0 if kind == "mean" else np.resize([1.0, -1.0], (65536, 1))
+    for off, expected in ((0.3, False), (0.6, True)):
+        alarms = Alarms(["a"], 1.0, rate=0.01, margin=0.3)
+        found = alarms.take(np.arange(65536.0), noise + off * signs)
+        assert bool(found) is expected
+        assert (kind in {alarm.kind for alarm in found}) is expected
+
+
 def test_a_gap_is_no_number_in_an_alarm() -> None:
     whole, gaps = Alarms(["a"], 1.0, rate=1.0), Alarms(["a"], 1.0, rate=1.0)
     rows = np.random.default_rng(7).standard_normal((4096, 1))
