@@ -82,19 +82,19 @@ def broker(reading: Reading, minutes: float) -> None:
         config.write_text(
             f"listener {PORT} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n"
         )
+        command = [sys.executable, "-m", "benchmarks.beside", "publish", "--minutes", str(minutes)]
         server = subprocess.Popen([program, "-c", str(config)], stderr=subprocess.DEVNULL)
+        publisher = subprocess.Popen(command)
         try:
             time.sleep(1.0)
             source = Source(f"mqtt://127.0.0.1:{PORT}/{TOPIC}")
-            command = [sys.executable, "-m", "benchmarks.beside", "publish", "--minutes",
-                       str(minutes)]  # fmt: skip
-            publisher = subprocess.Popen(command)
             settings = Settings(pace=1.0, report=30.0, idle=600.0)
             Watch(reading, settings, lambda event: print(json.dumps(event), flush=True)).follow(
                 source
             )
             publisher.wait()
         finally:
+            publisher.kill()
             server.terminate()
             server.wait()
 
@@ -103,10 +103,10 @@ def publish(reading: Reading, minutes: float) -> None:
     """Publish each sample when it is due."""
     from paho.mqtt import client as mqtt
 
+    lines = [line for block in machine(reading, 60.0 * minutes, 3).lines() for line in block]
     client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
     client.connect("127.0.0.1", PORT)
     client.loop_start()
-    lines = [line for block in machine(reading, 60.0 * minutes, 3).lines() for line in block]
     begun = time.monotonic()
     for number, line in enumerate(lines):
         delay = begun + number * reading.interval - time.monotonic()

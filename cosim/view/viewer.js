@@ -239,7 +239,7 @@ function fit() {
   trails.forEach((trail) => { if (trail) for (let i = 0; i < frames; i++) cover(...trail.subarray(3 * i, 3 * i + 3)); });
   poses([0, 0]).forEach((pose) => cover(...pose.slice(12, 15)));
   camera.target = low.map((v, i) => (v + high[i]) / 2);
-  camera.distance = Math.hypot(...low.map((v, i) => high[i] - v)) + reach;
+  camera.distance = Math.hypot(...low.map((v, i) => high[i] - v)) + 2 * reach;
 }
 function viewMatrix() {
   const { turn, rise, distance, target } = camera;

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.calibrate import Simulator, read_problem
+from cosim.calibrate.replay import replay
 from cosim.data.comparison import Reference
 from cosim.data.recording import Recording
 from cosim.errors import FmuFileError, ValueRangeError
@@ -28,6 +31,7 @@ from tests.fmus import fmu
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 SHOWN = [name for name in components() if component_scene(name)]
+SETS = Path(__file__).parents[2] / "scenarios"
 RECORDED = 5e-6
 """Of positions in a page [m]: single precision, 6e-8 of some metres, through a chain of 14."""
 
@@ -228,3 +232,41 @@ def test_a_browser_shows_it_without_an_error(turns, tmp_path: Path) -> None:
     pixels = matplotlib.image.imread(picture)[40:540, :600, :3]
     saturated = pixels.max(axis=2) - pixels.min(axis=2) > 0.15
     assert saturated.mean() > 0.01  # coloured bodies, not a grey page
+
+
+@pytest.mark.slow
+def test_a_measured_run_stands_beside_its_model(tmp_path: Path) -> None:
+    problem = read_problem(SETS / "omni_bench/data/OB-06")
+    run = problem.run("STR")
+    recording, references = replay(problem, problem.nominal, run)
+    found = paths(content(recording, references, ()))
+    gap = found["camera: pose measured"] - found["camera: pose"]
+    assert "base: wheel 3" in found
+    assert "base: wheel 3 measured" not in found
+    # the same model as in a calibration, whose residual this is
+    simulated = Simulator(problem, workers=1).simulate(problem.nominal, run)
+    column = [channel.signal for channel in problem.channels].index("camera.x_meas")
+    assert np.abs(gap[:, 0] - (run.data - simulated)[:, column]).max() < RECORDED
+
+
+@pytest.mark.slow
+def test_a_run_of_a_set_is_named_in_the_path() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim", "view", str(SETS / "omni_bench/data/OB-06")],
+        capture_output=True, text=True, cwd=SETS.parent,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "has 8 runs; add one to the path: there is STR" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_run_is_shown_from_the_shell(turns, tmp_path: Path) -> None:
+    turns.write_parquet(tmp_path / "SET1_1" / "recording.parquet")
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim", "view", str(tmp_path), "--json"],
+        capture_output=True, text=True, cwd=SETS.parent,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    page = Path(json.loads(done.stdout)["page"])
+    assert page == tmp_path / "SET1_1" / "view.html"
+    assert "own, measured" in page.read_text()  # of the scenario that the recording names
