@@ -90,5 +90,8 @@ def _number(column: str, item: Any) -> float:
     if item is None:
         return math.nan
     if isinstance(item, (int, float)):  # true and false count 1 and 0
-        return float(item)
+        try:
+            return float(item)
+        except OverflowError:
+            raise ValueError(f"{column} is too large") from None
     raise ValueError(f"{column} is {item!r}, no number")

@@ -21,6 +21,7 @@ from cosim.errors import InputError, ScenarioError, UnknownNameError
 from cosim.live.alarm import FIRST, Alarms
 from cosim.live.folder import Folder
 from cosim.live.lateness import Lateness
+from cosim.live.messages import read_message
 from cosim.live.reading import Reading, read_reading
 from cosim.live.sources import Source
 from cosim.live.watch import Settings, Watch
@@ -174,6 +175,34 @@ def test_late_doubled_and_missing_samples_are_counted(reading) -> None:
         "late": 1, "doubled": 1, "missing": 3, "unreadable": 1,
     }  # fmt: skip
     assert summary["samples"] == 997
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        (b"{nonsense", "is no JSON"),
+        (b"[1]", "is no JSON object"),
+        (b'{"torque": 1}', "has no 'time', the clock"),
+        (b'{"time": "now"}', "time is 'now', no number"),
+        (b'{"time": NaN}', "time is nan"),
+        (b'{"time": 1, "w": {}}', "w is {}, no number"),
+        (b'{"time": 1, "n": 1.5}', "n is 1.5, no whole number"),
+        (b'{"time": 1, "w": 1' + 400 * b"0" + b"}", "w is too large"),
+        (b"[" * 100000, "is no JSON"),
+        (b'{"time": 1, "w": "\xff"}', "is no JSON|no number"),
+    ],
+)
+def test_a_line_that_is_no_message_says_why(line, why) -> None:
+    with pytest.raises(ValueError, match=why):
+        read_message(line)
+
+
+def test_messages_carry_gaps_lists_and_numbers() -> None:
+    sample = read_message(b'{"n": 7, "t": 0.5, "q": [0.1, null], "on": true}', "t")
+    assert (sample.time, sample.number) == (0.5, 7)
+    assert sample.values["q_1"] == 0.1
+    assert np.isnan(sample.values["q_2"])
+    assert sample.values["on"] == 1.0
 
 
 def test_samples_out_of_order_within_the_wait_change_nothing(reading) -> None:
