@@ -44,7 +44,7 @@ wheel: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,gym,live,study,test,check]"
 	touch $(STAMP)
 
 clean:
