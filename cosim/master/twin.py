@@ -18,7 +18,6 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -98,7 +97,7 @@ class Twin:
         self._start = start
         self._stack = ExitStack()
         self._failed = self.ended = ""
-        self._begun = self._closed = False
+        self._begun = self._closed = self._complete = False
         self._base = self._taken = 0
         self._blocks: list[tuple[Vector, Vector]] = []
         self._saved: list[Saved] = []
@@ -248,7 +247,7 @@ class Twin:
                 self._inputs.put(run.index, last + 1)
                 self._stepper.advance(last)
         except EndRequest as request:
-            self.ended = str(request)
+            self.ended, self._complete = str(request), request.complete
         except (FmuCallError, AlgebraicLoopError) as error:
             self._failed = str(error)
             stopped = self._execution.stopped(error, keep=False)
@@ -459,7 +458,10 @@ class Twin:
     def _present(self, objects: dict[str, list[Any]]) -> Vector | None:
         """The present point as a run that ends here records it; nothing changes by this."""
         run, layout = self._run, self._run.layout
-        if run.index % run.every or run.row > run.index // run.every:
+        between = run.index % run.every != 0
+        if between and not (self.ended and self._complete):  # where all FMUs ended is recorded
+            return None
+        if not between and run.row > run.index // run.every:
             return None
         self._inputs.put(run.index, run.index + 1)
         with Memory.exchange(run):
@@ -491,10 +493,5 @@ class Twin:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

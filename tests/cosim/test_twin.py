@@ -23,6 +23,8 @@ from cosim.master.master import Master
 from cosim.master.twin import Twin
 from cosim.system.system import System
 from tests.cosim.bench import bench
+from tests.cosim.test_fmi_runs import CLOCK, EARLY, END, TIME
+from tests.tiny_fmus import tiny
 
 STEP, COUNT = 1e-3, 60
 RECORD = ["load.w", "motor.i", "motor.w_ref", "gearbox.tau_b"]
@@ -223,3 +225,41 @@ def test_a_fault_keeps_what_was_recorded(affine: Path) -> None:
             twin.step()
         twin.restart()
         assert twin.step(1.0) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("law", "status"), [(END, 0), (EARLY, 2)])
+def test_it_ends_where_an_fmu_asks_as_a_run_does(fmi, law, status, tmp_path: Path) -> None:
+    text = law.replace("END_STATUS", str(status if fmi == 2 else 0))
+    system = System("alone")
+    for name in "ab":
+        system.add(name, str(tiny(tmp_path, CLOCK, TIME, text, fmi=fmi)))
+    for every in (1, 3):
+        master = Master(system, step=0.1)
+        run = master.run(1.0, every=every)
+        with Twin(master, 1.0, every=every) as twin:
+            twin.step(1.0)
+            assert "asked to end" in twin.ended
+            with pytest.raises(FmuCallError, match=r"has ended: .*asked to end"):
+                twin.step()
+        assert np.array_equal(twin.recording.time, run.time)
+        assert np.array_equal(twin.recording.values, run.values)
+        assert twin.recording.notes == run.notes
+
+
+@pytest.mark.slow
+def test_fmus_of_version_3_are_saved_and_forked(provider) -> None:
+    provider.fmi = 3
+    master = Master(bench(provider), "gauss_seidel", STEP)
+    with Twin(master, record=RECORD) as twin:
+        go(twin, 20)
+        saved = twin.save()
+        go(twin, 20)
+        first = twin.recording.values
+        twin.restore(saved)
+        with twin.fork() as fork:
+            go(fork, 20)
+        go(twin, 20)
+    assert np.array_equal(twin.recording.values, first)
+    assert np.array_equal(fork.recording.values, first)
