@@ -119,10 +119,9 @@ class Reading:
         for name, value in (calibrated or {}).items():
             if "@" not in name:
                 self.theta[problem.index(name)] = value
-        self.own = [p for p in problem.parameters if not p.run]
         self.needs = [
-            key for key in self._entries() if not isinstance(key, float | int)
-            and not key.startswith("first:")
+            key for key, _, _ in self._entries()
+            if isinstance(key, str) and not key.startswith("first:")
         ]  # fmt: skip
 
     def _columns(self, table: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -193,13 +192,16 @@ class Reading:
 
     # -- the twin ----------------------------------------------------------------------------------
 
-    def _entries(self) -> dict[Any, Any]:
-        """What the starts of a run are made of -> targets."""
-        found = dict(self.joined.table.get("starts", {}))
-        for key in ("nuisance", "parameter"):
-            for item in self.joined.table.get(key, []):
-                if item.get("per_run") or isinstance(item["nominal"], str):
-                    found[item["nominal"]] = item["targets"]
+    def _entries(self) -> list[tuple[Any, Any, str]]:
+        """What the starts of a run are made of, what they set, and their units where stated."""
+        table = self.joined.table
+        found: list[tuple[Any, Any, str]] = []
+        for key, targets in table.get("starts", {}).items():
+            first = key.removeprefix("first:") if key.startswith("first:") else ""
+            found.append((key, targets, self.joined.units.get(first, "")))
+        for item in [*table.get("nuisance", []), *table.get("parameter", [])]:
+            if item.get("per_run") or isinstance(item["nominal"], str):
+                found.append((item["nominal"], item["targets"], str(item.get("unit", ""))))
         return found
 
     def starts(self, entries: Mapping[str, Any], first: Sample) -> dict[str, float]:
@@ -213,10 +215,10 @@ class Reading:
             ScenarioError: an entry or a column that it needs is not there.
         """
         found: dict[str, float] = {}
-        for key, targets in self._entries().items():
-            where = f"{self.joined.path}: [starts] {key}"
+        for key, targets, unit in self._entries():
+            where = f"{self.joined.path}: the start of a run by {key}"
             value = self._start(key, entries, first, where)
-            found.update({name: f * value for name, f in self.joined.targets(targets, "", where)})
+            found.update({name: f * value for name, f in self.joined.targets(targets, unit, where)})
         return found
 
     def _start(self, key: Any, entries: Mapping[str, Any], first: Sample, where: str) -> float:

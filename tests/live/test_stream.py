@@ -243,6 +243,37 @@ def test_a_long_gap_ends_a_run_and_the_next_needs_its_begin(reading) -> None:
     assert len(Followed(reading, again).of("run")) == 2
 
 
+def test_a_run_that_starts_from_its_first_sample_needs_no_begin(tmp_path: Path) -> None:
+    rig(tmp_path / "disc")
+    path = tmp_path / "disc" / "dataset.toml"
+    first = """
+[[nuisance]]
+name = "angle_0"
+unit = "rad"
+nominal = "first:phi"
+span = 0.1
+per_run = true
+targets = "load.angle"
+[[nuisance]]
+name = "speed_0"
+unit = "rad/s"
+nominal = 0.0
+span = 0.1
+per_run = true
+targets = "load.speed"
+"""
+    stated = '[starts]\nangle_0 = "load.angle"\n'
+    assert stated in path.read_text()
+    path.write_text(path.read_text().replace(stated, "") + first)
+    reading = read_reading(tmp_path / "disc")
+    given = [json.dumps({"time": 0.01 * k, "torque": 0.0, "w": 0.0, "phi": 0.7}).encode()
+             for k in range(50)]  # fmt: skip
+    followed = Followed(reading, given)
+    (begun,) = followed.of("run")
+    assert begun["starts"] == {"load.angle": 0.7, "load.speed": 0.0}
+    assert followed.summary["residual_rms"]["phi"] == 0.0
+
+
 def test_a_stream_without_the_begin_of_a_run_says_what_it_needs(reading) -> None:
     followed = Followed(reading, lines(reading, 100)[1:])
     assert followed.summary["ignored"] == 100
