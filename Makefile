@@ -57,7 +57,7 @@ $(RUNS): pyproject.toml
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,logs,study,tables,validate,test,check]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,gym,live,logs,study,tables,validate,test,check]"
 	touch $(RUNS) $(STAMP)
 
 clean:

@@ -42,7 +42,12 @@ def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
     raise ScenarioError(f"{where}: {entry!r} names no variables")
 
 
-def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+def lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+    """A number among entries; `key` may be an element, `initial_pose[0]`.
+
+    Raises:
+        ScenarioError: there is none.
+    """
     match = ITEM.fullmatch(key)
     if match is None or match["key"] not in values:
         raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
@@ -91,7 +96,7 @@ class Joined(MappedLogs):
                 constants[name] = float(value)
         fixed = self.data.sheet.get("fixed", {})
         for key, entry in table.get("fixed", {}).items():
-            value = _lookup(fixed, key, f"{self.path}: [fixed]")
+            value = lookup(fixed, key, f"{self.path}: [fixed]")
             constants.update({name: factor * value for name, factor in
                               _targets(entry, f"{self.path}: {key}")})  # fmt: skip
         self.columns: dict[str, str] = {}
@@ -257,7 +262,7 @@ class Joined(MappedLogs):
                     f"{self.path}: [sheet] says nothing about the sheet's parameter {name!r}"
                 )
             where = f"{self.path}: [sheet] {name}"
-            targets = self._set(mapped[name], str(entry.get("unit", "")), where)
+            targets = self.targets(mapped[name], str(entry.get("unit", "")), where)
             found.append(
                 Parameter(
                     name, entry.get("unit", ""), float(entry["nominal"]), float(entry["min"]),
@@ -272,7 +277,7 @@ class Joined(MappedLogs):
         for role, key in (("declared", "parameter"), ("nuisance", "nuisance")):
             for entry in self.table.get(key, []):
                 where = f"{self.path}: {key} {entry.get('name')}"
-                targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
+                targets = self.targets(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
                 if isinstance(entry["nominal"], str) and not entry.get("per_run"):
                     raise ScenarioError(
@@ -295,7 +300,7 @@ class Joined(MappedLogs):
                     )  # fmt: skip
         return found
 
-    def _set(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
+    def targets(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
         """Variables that a value in this unit sets, with the factors into theirs.
 
         Those that the system lacks may belong to variants that a diagnosis tries.
@@ -332,7 +337,7 @@ class Joined(MappedLogs):
         if isinstance(entry, (int, float)):
             return float(entry)
         if entry.startswith("begin:"):
-            begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
+            begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
             log = self.logs[run]
@@ -352,7 +357,7 @@ class Joined(MappedLogs):
                     "",
                 )
             return float(values[np.isfinite(values)][0]) * gain + offset
-        return _lookup(self.logs[run].values, entry, where)
+        return lookup(self.logs[run].values, entry, where)
 
     def run(self, name: str, channels: list[Channel]) -> MeasuredRun:
         """One run."""
@@ -363,7 +368,7 @@ class Joined(MappedLogs):
             value = self.value(key, name, where)
             first = key.startswith("first:")
             own = self.units.get(key.removeprefix("first:"), "") if first else ""
-            starts.update({n: factor * value for n, factor in self._set(entry, own, where)})
+            starts.update({n: factor * value for n, factor in self.targets(entry, own, where)})
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
@@ -382,9 +387,8 @@ class Joined(MappedLogs):
             log.time[during] + lead,
             data,
             {
-                one: signal
-                for target, entry in self.table.get("inputs", {}).items()
-                for one, signal in self._inputs(log, target, entry, lead).items()
+                target: self._input(log, target, column, entry, lead)
+                for target, column, entry in self.drivers()
             },
             starts,
             log.values,
@@ -402,21 +406,28 @@ class Joined(MappedLogs):
         gain, offset = self.converted[channel.name]
         return values if (gain, offset) == (1.0, 0.0) else values * gain + offset
 
-    def _inputs(self, log: Log, target: str, entry: Any, lead: float) -> dict[str, Table]:
-        """The signals of an input, or of all elements of a vector input."""
-        if isinstance(entry, str):
-            entry = {"column": entry}
-        where = f"{self.path}: input {target}"
-        if "column" in entry:
-            return {target: self._input(log, target, str(entry["column"]), entry, lead)}
-        if "columns" not in entry:
-            raise ScenarioError(f"{where}: lacks 'column'; {listing(entry, 'column')}")
-        columns = entry["columns"]
-        names = expand(columns) if isinstance(columns, str) else list(columns)
-        return {f"{target}[{i}]": self._input(log, target, column, entry, lead)
-                for i, column in enumerate(names, 1)}  # fmt: skip
+    def drivers(self) -> list[tuple[str, str, Mapping[str, Any]]]:
+        """Each driven input, or element of one, with its column and its entry.
 
-    def _conversion(
+        Raises:
+            ScenarioError: an entry names no column.
+        """
+        found: list[tuple[str, str, Mapping[str, Any]]] = []
+        for target, said in self.table.get("inputs", {}).items():
+            entry = {"column": said} if isinstance(said, str) else said
+            if "column" in entry:
+                found.append((target, str(entry["column"]), entry))
+                continue
+            if "columns" not in entry:
+                raise ScenarioError(
+                    f"{self.path}: input {target}: lacks 'column'; {listing(entry, 'column')}"
+                )
+            columns = entry["columns"]
+            names = expand(columns) if isinstance(columns, str) else list(columns)
+            found += [(f"{target}[{i}]", column, entry) for i, column in enumerate(names, 1)]
+        return found
+
+    def conversion(
         self, target: str, column: str, entry: Mapping[str, Any]
     ) -> tuple[float, float, str]:
         """Gain and offset of a column that drives an input, and the unit of what they give."""
@@ -455,7 +466,7 @@ class Joined(MappedLogs):
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
             values = np.rint(values / quantum) * quantum
-        gain, offset, unit = self._conversion(target, column, entry)
+        gain, offset, unit = self.conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))
         last = np.append(np.diff(times) > 0.0, True)  # of a burst of commands the last one counts

@@ -120,6 +120,22 @@ def read_problem(
     Raises:
         ScenarioError, UnknownNameError: a file or a name in it is wrong.
     """
+    return read_joined(folder, provider, mapping=mapping, system=system, only=only)[1]
+
+
+def read_joined(
+    folder: Path | str,
+    provider: Provider | None = None,
+    *,
+    mapping: Path | str | None = None,
+    system: str | None = None,
+    only: Mapping[str, Any] | None = None,
+) -> tuple[Joined, Problem]:
+    """A problem as of `read_problem`, and what made it of mapping and data.
+
+    Raises:
+        ScenarioError, UnknownNameError: as of `read_problem`.
+    """
     if provider is None:
         provider = builder.default_provider()
     folder = _folder(Path(folder))
@@ -136,8 +152,8 @@ def read_problem(
         for name in table.get("further", [])
     ]
     with _named(path, folder):
-        problem = Joined(path, table, data, only or {}).problem(file, provider)
-    return problem.changed(further=further)
+        joined = Joined(path, table, data, only or {})
+        return joined, joined.problem(file, provider).changed(further=further)
 
 
 @contextmanager

@@ -38,6 +38,8 @@ from .progress import Display
 from .scenarios import scenarios_command
 from .streams import print_json, stdout_for_json
 from .study import study_command
+from .twin import twin_command
+from .view import view_command
 
 if TYPE_CHECKING:
     from ..running.runner import Result
@@ -58,6 +60,8 @@ app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
 app.command("study")(study_command)
+app.command("twin")(twin_command)
+app.command("view")(view_command)
 
 
 @app.callback()

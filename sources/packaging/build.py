@@ -25,6 +25,7 @@ from cosim.spec.variant import Name
 
 from ..function import Functions, build_functions
 from ..model import Model, ModelError
+from ..scene import model_scene
 from ..variant import build_model, fidelities, parse_name
 from . import description, native, python, rights
 from .cache import cache_folder, write_atomically
@@ -109,6 +110,9 @@ def component_json(variant: Variant) -> bytes:
         content["left_out"] = [
             {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
         ]
+    looks = model_scene(model, {entry.name for entry in variant.entries})
+    if looks:
+        content["scene"] = looks
     return (json.dumps(content, indent=2) + "\n").encode()
 
 

@@ -257,7 +257,7 @@ class Kernel:
             values=self._array(bound.values),
             times=self._array(bound.times),
             step=bound.step,
-            end=float(bound.times[-1]),
+            end=bound.outline.end,
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
@@ -333,10 +333,8 @@ class Kernel:
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
         self.run.average = self._array(derivatives.average)
-        self.run.slope, self.run.curve = (
-            self._array(derivatives.slope),
-            self._array(derivatives.curve),
-        )
+        self.run.slope = self._array(derivatives.slope)
+        self.run.curve = self._array(derivatives.curve)
         rows: list[_Derivatives] = []
         told = {}
         for key, told_calls in derivatives.calls.items():
@@ -401,6 +399,16 @@ class Kernel:
     def restart(self) -> None:
         """Begin again at the first communication point."""
         self.run.index = self.run.row = self.run.next_record = 0
+
+    def save(self) -> bytes:
+        """What it keeps beside the run's arrays: outputs noted for the energy of bonds."""
+        return bytes(self._made[_Term])
+
+    def restore(self, terms: bytes) -> None:
+        """Return to what `save` gave, at the communication point where the run stands."""
+        ct.memmove(self._made[_Term], terms, len(terms))
+        self.run.index, self.run.row = self._bound.index, self._bound.row
+        self.run.next_record = -(-self._bound.index // self._bound.every) * self._bound.every
 
     def reached(self) -> float | None:
         """The time that the failed step has reached, where the FMU says so [s]."""
