@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.own_robot import FRAME, RADIUS, TRACK, drive, write_csv
 from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.clocks import clocked, offsets
 from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
 from cosim.errors import UnitError, UnknownNameError, ValueRangeError
+from cosim.intake.example import FRAME, RADIUS, TRACK, drive, write_csv
 
 LATE = 0.11
 MAPPING = f"""
