@@ -24,6 +24,7 @@ from ..errors import CheckError, CosimError, InputError
 from ..installation.builder import default_provider
 from ..master import algorithms
 from ..system.provider import FolderProvider, Provider
+from .arm import arm_app
 from .calibrate import calibrate_command
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
@@ -45,6 +46,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.add_typer(fmus_app, name="fmus")
+app.add_typer(arm_app, name="arm")
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)

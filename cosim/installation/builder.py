@@ -14,7 +14,9 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, VariantError
+from ..spec import devices
 from ..spec.cache import cache_folder
+from ..spec.variant import parse_name
 from ..system.provider import FolderProvider, Provider
 from . import places
 
@@ -53,6 +55,13 @@ def naming_errors() -> Iterator[None]:
         ) from error
 
 
+def _beside_device(variant: str) -> Path | None:
+    """The folder of a device file of the user's own, where its FMUs are kept."""
+    name = parse_name(variant)
+    own = devices.find(name.component, name.device)
+    return None if own is None else own.parent
+
+
 class Builder:
     """Provider that builds variants from the sources (once; they are cached)."""
 
@@ -71,7 +80,7 @@ class Builder:
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU, built if it is not there."""
         with naming_errors():
-            return Path(self._build(variant, out=self.out))
+            return Path(self._build(variant, out=_beside_device(variant) or self.out))
 
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""
@@ -92,11 +101,16 @@ class Installed:
 
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU."""
+        beside = _beside_device(variant)
         try:
-            return self._folder.path(variant)
+            if beside is None:
+                return self._folder.path(variant)
+            return Builder().path(variant)  # the device file may have changed
         except VariantError as missing:
             try:
-                return Builder().path(variant)
+                if beside is None:
+                    return Builder().path(variant)
+                return FolderProvider(beside).path(variant)
             except VariantError as error:
                 raise error from missing
 
