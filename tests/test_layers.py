@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
     "errors", "reading", "arguments", "files", "spec", "data", "fmu", "drawing", "system", "master",
-    "installation", "robots", "scenario", "ssp", "running", "control", "study", "calibrate",
+    "installation", "scenario", "ssp", "running", "robots", "control", "study", "calibrate",
     "diagnose", "report", "cli", "__main__",
 )  # fmt: skip
 """Of `cosim`, from the bottom up: each may import those before it."""

@@ -30,6 +30,7 @@ from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .fmus import fmus_app
 from .linearize import linearize_command
+from .new import new_app
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
 from .streams import print_json, stdout_for_json
@@ -47,6 +48,7 @@ app = typer.Typer(
 )
 app.add_typer(fmus_app, name="fmus")
 app.add_typer(arm_app, name="arm")
+app.add_typer(new_app, name="new")
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)

@@ -19,6 +19,10 @@ SPRING = 2 * math.pi * 20.0
 """Of the elastic gears, with the links behind them [rad/s]."""
 ROTOR = 0.1
 """Inertia of a geared rotor over the largest of its joint; a UR5's is 0.2 to 5."""
+LINE = 0.025
+"""Distance of the frequencies of an excitation [Hz]; it takes 40 s."""
+FAST = 0.7
+"""Share of a joint's largest speed that an excitation may reach."""
 NO_LIMIT = 1e6
 """Torque [N.m] or force [N] that no arm reaches."""
 
@@ -52,11 +56,17 @@ def _range(joints: Sequence[Joint]) -> tuple[Any, Any]:
 
 
 def swings(arm: Arm) -> list[float]:
-    """Amplitudes about `home`: 0.3 rad or 0.05 m, at most a fifth of the range."""
-    return [
-        min(0.05 if joint.kind == "prismatic" else 0.3, 0.2 * (joint.upper - joint.lower))
-        for joint in arm.joints
-    ]
+    """Amplitudes about `home`: at most 1 rad or 0.3 m, a third of the range, and `FAST`.
+
+    Those of `multisine` with a distance of `LINE` between its frequencies; slower paths take the
+    same.
+    """
+    found = []
+    for k, joint in enumerate(arm.joints, 1):
+        rate = 2 * math.pi * LINE * (k + 2 * len(arm.joints))  # the mean of five frequencies
+        most = 0.3 if joint.kind == "prismatic" else 1.0
+        found.append(min(most, 0.35 * (joint.upper - joint.lower), FAST * joint.speed / rate))
+    return [float(f"{value:.3g}") for value in found]
 
 
 def text(arm: Arm, source: str) -> str:
@@ -140,10 +150,19 @@ def text(arm: Arm, source: str) -> str:
     add("k_i", [0.2 * BANDWIDTH**3 * m for m in moved], "N.m/(rad.s)",
         "Servos: integral part, a tenth of what would be unstable.",
         along="N/(m.s)", origin=made, assumed=True)  # fmt: skip
+    holding = [
+        min(max(torque, -j.effort), j.effort)
+        for j, torque in zip(arm.joints, arm.gravity_torques(middle), strict=True)
+    ]
+    add("integral", holding, "N.m", "Servos: integral part at the start, which holds the arm.",
+        along="N", origin=made)  # fmt: skip
     add("q_hold", middle, "rad", "Paths of `joint_trajectory` about the middle of each range.",
         along="m", origin=made, assumed=True)  # fmt: skip
     add("amplitude", swing, "rad", "`swing` and `multisine` about it.",
         along="m", origin=made, assumed=True)  # fmt: skip
+    out += ["# Distance of the frequencies of `multisine`: joints stay below seven tenths of their",
+            "# largest speeds.", "[joint_trajectory.f]", f"value = {LINE}", 'unit = "Hz"',
+            f'origin = "{made}"', "assumed = true", ""]  # fmt: skip
     add("q_start", middle, "rad", "`quintic` from here.", along="m", origin=made, assumed=True)
     add("q_end", [a + b for a, b in zip(middle, swing, strict=True)], "rad", "`quintic` to here.",
         along="m", origin=made, assumed=True)  # fmt: skip

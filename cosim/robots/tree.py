@@ -183,9 +183,24 @@ class Arm:
         return ""
 
     def inertia_matrix(self, q: Sequence[float]) -> Matrix:
-        """Joint inertia matrix [kg.m2, kg.m, kg] from the bodies' Jacobians."""
+        """Joint inertia matrix [kg.m2, kg.m, kg] at joint positions."""
+        matrix = np.zeros((len(self.joints), len(self.joints)))
+        for body, linear, angular, turn in self._jacobians(q):
+            inertia = turn @ body.inertia @ turn.T
+            matrix += body.mass * linear.T @ linear + angular.T @ inertia @ angular
+        return matrix
+
+    def gravity_torques(self, q: Sequence[float], gravity: float = 9.81) -> Matrix:
+        """Torques [N.m] and forces [N] that hold the arm on a level mount at joint positions."""
+        torques = np.zeros(len(self.joints))
+        for body, linear, _, _ in self._jacobians(q):
+            torques += body.mass * gravity * linear[2]
+        return torques
+
+    def _jacobians(self, q: Sequence[float]) -> Iterator[tuple[Inertial, Matrix, Matrix, Matrix]]:
+        """Each body with the Jacobians of its centre and its rotation, and its axes; mount axes."""
         size = len(self.joints)
-        pose, axes, matrix = Pose(), [], np.zeros((size, size))
+        pose, axes = Pose(), []
         for i, (joint, body) in enumerate(zip(self.joints, self.bodies, strict=True)):
             pose = pose @ self.poses[i]
             axes.append((pose.rotation[:, 2], pose.position, joint.kind == "prismatic"))
@@ -197,9 +212,7 @@ class Arm:
                     linear[:, k] = z
                 else:
                     linear[:, k], angular[:, k] = np.cross(z, centre - origin), z
-            inertia = pose.rotation @ body.inertia @ pose.rotation.T
-            matrix += body.mass * linear.T @ linear + angular.T @ inertia @ angular
-        return matrix
+            yield body, linear, angular, pose.rotation
 
 
 def displaced(kind: str, q: float) -> Pose:

@@ -177,11 +177,16 @@ def find(rotation: Any, offset: Any, prismatic: Sequence[float]) -> tuple[BasePa
         rows.append(regressor(rotation, offset, prismatic, q, *random.uniform(-3, 3, (2, size))))
     matrix = np.vstack(rows)
     length = np.linalg.norm(matrix, axis=0)
+    units = [UNITS[column % 10] for column in range(length.size)]
+    largest = {
+        unit: max(value for value, each in zip(length, units, strict=True) if each == unit)
+        for unit in UNITS
+    }
     kept: list[int] = []
     basis = np.zeros((matrix.shape[0], 0))
     absorbed: dict[int, list[tuple[int, int, float]]] = {}
     for column in (10 * link + element for link in range(size) for element in _ORDER):
-        if length[column] == 0.0:
+        if length[column] <= INVISIBLE * largest[UNITS[column % 10]]:
             continue
         values = matrix[:, column]
         rest = values - basis @ (basis.T @ values)
