@@ -73,7 +73,10 @@ def tree(root: ET.Element, shown: str) -> Tree:
         for body in world.findall("body"):
             _read_body(body, WORLD, "", settings, links, joints)
         return Tree(
-            root.get("model", Path(shown).stem), links, tuple(_coupled(root, joints, links))
+            root.get("model", Path(shown).stem),
+            links,
+            tuple(_coupled(root, joints)),
+            "has no <inertial> (those of geoms are not computed)",
         )
 
 
@@ -247,9 +250,7 @@ def _inertial(where: str, element: ET.Element, settings: _Settings) -> Inertial:
     return Inertial(mass, pose.position, turned)
 
 
-def _coupled(
-    root: ET.Element, joints: list[Joint], links: Mapping[str, Inertial | None]
-) -> list[Joint]:
+def _coupled(root: ET.Element, joints: list[Joint]) -> list[Joint]:
     """Joints with what `equality` makes of them.
 
     Raises:

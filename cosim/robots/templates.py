@@ -142,7 +142,7 @@ def texts(
                 return blocks[place]
             if place in template.table and isinstance(template.table[place], str):
                 return str(template.table[place])
-            return f"{evaluate(str(path), place, template._numbers()):.6g}"
+            return f"{evaluate(str(path), place, template._numbers()):.12g}"
 
         found[file] = _PLACE.sub(put, raw)
     return found
@@ -194,7 +194,7 @@ def _runs(template: Template, purpose: str) -> str:
     times = ", ".join(f"{time:g}" for time in TIMES)
     return "\n".join(
         f'"{item["variable"]}" = {{ times = [{times}], '
-        f"values = [{', '.join(f'{value:.6g}' for value in values[item['column']])}], "
+        f"values = [{', '.join(f'{value:.12g}' for value in values[item['column']])}], "
         f'unit = "{item["unit"]}" }}'
         for item in template.inputs
     )

@@ -99,11 +99,13 @@ class Tree:
         name: of the robot.
         links: name -> mass properties, None where the file gives none.
         joints: in the file's order.
+        lacking: what a link without mass properties lacks in this kind of file.
     """
 
     name: str
     links: Mapping[str, Inertial | None]
     joints: tuple[Joint, ...]
+    lacking: str = "has no <inertial>"
 
     def root(self) -> str:
         """The link that no joint carries.
@@ -283,7 +285,7 @@ def _last(tree: Tree, base: str) -> str:
         ]
         if len(moving) > 1:
             names = " and ".join(repr(joint.name) for joint in moving)
-            ends = sorted({_end(tree, joint.child) for joint in moving} | {link})
+            ends = [link, *sorted({_end(tree, joint.child) for joint in moving} - {link})]
             raise InputError(
                 f"the robot branches at link {link!r} into {names}: a serial chain has one way; "
                 f"name its end with --tip, e.g. {', '.join(ends)}"
@@ -319,7 +321,7 @@ def _collected(tree: Tree, link: str, pose: Pose, on_chain: set[str], notes: lis
     own = tree.links[link]
     if own is None:
         total = EMPTY
-        notes.append(f"link {link!r} has no <inertial>: it counts as massless")
+        notes.append(f"link {link!r} {tree.lacking}: it counts as massless")
     else:
         _check_body(link, own, notes)
         total = own.moved(pose)

@@ -89,7 +89,7 @@ def _inertial(link: str, element: ET.Element | None) -> Inertial | None:
         missing = "mass" if mass is None else "inertia"
         raise InputError(f"{where}: its <inertial> has no <{missing}>")
     xx, xy, xz, yy, yz, zz = (
-        finite(where, key, inertia.get(key, "0"))
+        finite(where, key, inertia.get(key, "0" if key in ("ixy", "ixz", "iyz") else ""))
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     pose = _origin(where, element.find("origin"))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -169,6 +170,14 @@ def _inertia_columns(v: Vector) -> Any:
 
 def find(rotation: Any, offset: Any, prismatic: Sequence[float]) -> tuple[BaseParameter, ...]:
     """The base parameters of a chain on a level mount at rest; arguments as of `regressor`."""
+    rows = (
+        tuple(tuple(float(value) for value in row) for row in rows) for rows in (rotation, offset)
+    )
+    return _find(*rows, tuple(float(flag) for flag in prismatic))
+
+
+@lru_cache(maxsize=64)
+def _find(rotation: Any, offset: Any, prismatic: tuple[float, ...]) -> tuple[BaseParameter, ...]:
     size = len(prismatic)
     random = np.random.default_rng(0)
     rows = []
@@ -196,7 +205,7 @@ def find(rotation: Any, offset: Any, prismatic: Sequence[float]) -> tuple[BasePa
             absorbed[column] = []
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
-        factors = np.linalg.lstsq(matrix[:, kept], values, rcond=None)[0]
+        factors = np.linalg.solve(basis.T @ matrix[:, kept], basis.T @ values)
         rounded: list[float] = [round(float(factor), DIGITS) for factor in factors]
         for column_kept, factor in zip(kept, rounded, strict=True):
             if factor:

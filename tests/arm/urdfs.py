@@ -119,10 +119,11 @@ def panda(hand: bool = False) -> str:
     if hand:
         body = (
             '<inertial><mass value="0.73"/>'
-            '<inertia ixx="1e-3" iyy="2.5e-3" izz="1.7e-3"/></inertial>'
+            '<inertia ixx="1e-3" iyy="2.5e-3" izz="1.7e-3" ixy="0" ixz="0" iyz="0"/></inertial>'
         )
         finger = (
-            '<inertial><mass value="0.015"/><inertia ixx="2e-6" iyy="2e-6" izz="1e-6"/></inertial>'
+            '<inertial><mass value="0.015"/>'
+            '<inertia ixx="2e-6" iyy="2e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial>'
         )
         parts.append(
             f'<link name="panda_hand">{body}</link>'
