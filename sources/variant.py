@@ -126,13 +126,18 @@ def effects() -> dict[str, ModuleType]:
     return dict(sorted(found.items()))
 
 
+def shipped_devices(component: str) -> dict[str, Path]:
+    """Parameter files of a component that come with cosim, by device name."""
+    return {path.stem: path for path in sorted((_ROOT / component / "parameters").glob("*.toml"))}
+
+
 def devices(component: str) -> dict[str, Path]:
     """Parameter files of a component by device name; the user's own come last.
 
     Raises:
         UnknownVariantError: one of the user's has the name of one that comes with cosim.
     """
-    found = {path.stem: path for path in sorted((_ROOT / component / "parameters").glob("*.toml"))}
+    found = shipped_devices(component)
     try:
         own = own_devices.own(component)
     except VariantError as error:

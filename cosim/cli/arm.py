@@ -41,6 +41,9 @@ def import_command(
     name: Annotated[str, typer.Option(help="Name of the device [that of the robot].")] = "",
     out: Annotated[Path, typer.Option(help="Folder of device files.")] = Path(devices.FOLDER),
     build: Annotated[bool, typer.Option(help="Build the FMUs, too.")] = True,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Write over a device file that differs.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a device file and FMUs of a serial arm.
@@ -58,6 +61,17 @@ def import_command(
         raise InputError(f"--name {wanted!r}: a device's name has letters, digits and _ only")
     path = out / f"{wanted}.toml"
     text = device.text(arm, file.name)
+    if path.is_file() and path.read_text(encoding="utf-8") != text and not replace:
+        raise InputError(
+            f"{path} is there and differs (another robot, or changed by hand); give another "
+            "--name, or --replace"
+        )
+    for component in device.COMPONENTS if build else ():
+        if wanted in sources("variant").shipped_devices(component):
+            raise InputError(
+                f"--name {wanted!r} is a device of {component!r} that comes with cosim; give "
+                "another"
+            )
     try:
         out.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

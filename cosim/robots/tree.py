@@ -362,10 +362,8 @@ def _note_base(
     masses = [tree.links[link] for link in links]
     total = sum(body.mass for body in masses if body is not None)
     if total:
-        notes.append(
-            f"{' and '.join(links)} ({total:.4g} kg) stand still: they belong to the mount, not to "
-            "the arm"
-        )
+        these = "does not move: it belongs" if len(links) == 1 else "do not move: they belong"
+        notes.append(f"{' and '.join(links)} ({total:.4g} kg) {these} to the mount, not to the arm")
 
 
 def _onto(axis: Matrix) -> Matrix:

@@ -26,4 +26,5 @@ COMPONENT = Component(
     ports=(JOINT,),
     device="two_link",
     source="Siciliano et al., Robotics: Modelling, Planning and Control, 2009, ch. 8.5",
+    like="ur5_drive",
 )

@@ -14,7 +14,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.simulator import Simulator
 from cosim.cli import main
 from cosim.errors import InputError, UnknownNameError, VariantError
-from cosim.installation.builder import Builder, default_provider
+from cosim.installation.builder import Builder, Installed, default_provider
 from cosim.robots import arms, device, reader
 from cosim.system.provider import FolderProvider
 from sources.laws import base_parameters as base
@@ -132,6 +132,20 @@ def test_devices_are_found_by_folder_and_by_the_environment(
     assert build_model("serial_arm.two/kinematic").device == "two"
 
 
+def test_without_the_sources_fmus_beside_the_device_file_serve(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = default_provider().path("joint_trajectory.two/quintic")
+
+    def missing(module: str) -> None:
+        raise VariantError("building FMUs needs casadi, which is not installed")
+
+    monkeypatch.setattr("cosim.installation.builder.sources", missing)
+    assert Installed().path("joint_trajectory.two/quintic") == built
+    with pytest.raises(VariantError, match=r"devices: has no FMU of 'joint_trajectory.two/swung'"):
+        Installed().path("joint_trajectory.two/swung")
+
+
 def test_a_device_does_not_hide_one_that_comes_with_cosim(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +184,14 @@ def test_the_command_line(
     assert content["file"] == "devices/two_link.toml"
     assert content["joints"] == ["shoulder", "elbow"] and content["tip"] == "tool"
     assert "note: link 'tool' has no <inertial>" in err
+    path = tmp_path / "devices" / "two_link.toml"
+    path.write_text(path.read_text().replace("[4.0, 2.0]", "[4.5, 2.0]"), encoding="utf-8")
+    code, _, err = cosim("arm", "import", "robot.urdf", "--no-build")
+    assert code == 2 and "is there and differs" in err and "4.5" in path.read_text()
+    code, _, err = cosim("arm", "import", "robot.urdf", "--no-build", "--replace")
+    assert code == 0 and "4.5" not in path.read_text()
+    code, _, err = cosim("arm", "import", "robot.urdf")
+    assert code == 2 and "'two_link' is a device of 'serial_arm' that comes with cosim" in err
     code, _, err = cosim("arm", "import", "robot.urdf", "--tip", "toll")
     assert code == 2 and "did you mean 'tool'" in err
     code, out, _ = cosim("new", "system", "--json")
