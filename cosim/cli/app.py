@@ -25,6 +25,7 @@ from ..installation.builder import default_provider
 from ..master import algorithms
 from ..spec import distribution
 from ..system.provider import FolderProvider, Provider
+from .arm import arm_app
 from .calibrate import calibrate_command
 from .data import data_app
 from .diagnose import diagnose_command
@@ -32,6 +33,7 @@ from .export import draw_command, export_command
 from .fmus import fmus_app
 from .guard import applies, guarded
 from .linearize import linearize_command
+from .new import new_app
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
 from .progress import Display
@@ -52,7 +54,9 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 app.add_typer(fmus_app, name="fmus")
+app.add_typer(arm_app, name="arm")
 app.add_typer(data_app, name="data")
+app.add_typer(new_app, name="new")
 app.command("scenarios")(scenarios_command)
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)

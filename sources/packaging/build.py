@@ -19,7 +19,7 @@ from typing import Literal
 import casadi as ca
 
 from cosim import spec
-from cosim.spec import hints
+from cosim.spec import devices, hints
 from cosim.spec.archive import pack
 from cosim.spec.variant import Name
 
@@ -246,6 +246,9 @@ def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
 def _stamp(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
     """A file that holds the hash of the FMU built from these very sources."""
     key = f"{sources_key()} {name} {fmi} {kind} {_platforms(platform)}"
+    own = devices.find(name.component, name.device)
+    if own is not None:
+        key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
     return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
 
 

@@ -7,10 +7,15 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from .. import ur5_arm as qs
-from ..laws.rigid_chain import Chain, ForwardDynamics, Posture, standard_dh, upper_triangle
+from .. import serial_arm as qs
+from ..laws.base_parameters import ELEMENTS, standard_parameters
+from ..laws.base_parameters import find as base_parameters
+from ..laws.chain import Chain, free_axes, standard_dh
+from ..laws.joints import Joints
+from ..laws.rigid_chain import ForwardDynamics, Posture, upper_triangle
 from ..laws.rotation import product, quaternion_rate, rotation_matrix, rotation_vector
 from ..model import SX, Model
+from ..quantity import Quantity
 
 
 class MountMotion(NamedTuple):
@@ -58,28 +63,65 @@ def move_mount(m: Model, mount: MountMotion) -> None:
     m.input_rate(mount.rate, mount.angular_acceleration)
 
 
+def joint_inputs(m: Model) -> tuple[SX, SX]:
+    """Declare the torques on the joints and the inertias that their rotors add."""
+    joints = Joints.of_device(m)
+    u = m.inputs(joints.sized(qs.TAU), joints.sized(qs.J_ADDED))
+    return u.tau, u.J_added
+
+
+def joint_states(m: Model) -> tuple[SX, SX]:
+    """Declare positions and speeds of the joints."""
+    joints = Joints.of_device(m)
+    x = m.states(joints.sized(qs.ANGLE), joints.sized(qs.SPEED))
+    return x.angle, x.speed
+
+
 def joint_efforts(m: Model, speed: SX, angle: SX, torque: SX) -> SX:
     """Open the balances of the joints, all together and one by one; what effects add to them."""
-    together = m.balance("joint", "rotation", velocity=speed, angle=angle, load=torque)
-    single = [
-        m.balance(
-            f"joint_{i + 1}", "rotation", velocity=speed[i], angle=angle[i], load=torque[i]
-        ).effort
-        for i in range(6)
-    ]
-    return together.effort + ca.vertcat(*single)
+    return Joints.of_device(m).efforts(m, speed=speed, angle=angle, load=torque)
 
 
-def chain(m: Model) -> Chain:
-    """The links of the device."""
-    return standard_dh(
-        *(m.constant(name) for name in ("d", "a", "alpha", "mass", "centre", "inertia"))
+def chain(m: Model, *, adjustable: bool = True) -> Chain:
+    """The links of the device: from standard DH data as numbers, else with base parameters.
+
+    Base parameters are parameters of the FMU. A change of one goes to the parameter of a link after
+    which it is named; the others keep the device's numbers. Torques of a mount at rest depend on
+    nothing else; how a moving mount feels the arm may.
+    """
+    if "alpha" in m.values:
+        return standard_dh(
+            *(m.constant(name) for name in ("d", "a", "alpha", "mass", "centre", "inertia"))
+        )
+    rotation, offset, prismatic = (m.constant(key) for key in ("rotation", "offset", "prismatic"))
+    mass = m.constant("mass")
+    standard = standard_parameters(mass, m.constant("centre"), m.constant("inertia"))
+    values = [[ca.SX(value) for value in row] for row in standard]
+    for base in base_parameters(rotation, offset, prismatic) if adjustable else ():
+        start = base.value(standard)
+        told = "with what shows only together with it" if base.others else "alone"
+        quantity = Quantity(
+            base.name,
+            base.unit,
+            f"base parameter: {ELEMENTS[base.element]} of link {base.link} about its joint, {told}",
+            start=start,
+            nominal=abs(start) or 1.0,
+        )
+        change = m.parameter(quantity) - start
+        values[base.link - 1][base.element] += change
+    return free_axes(
+        rotation,
+        offset,
+        prismatic,
+        [row[0] for row in values],
+        [row[1:4] for row in values],
+        [row[4:] for row in values],
     )
 
 
 @dataclass(frozen=True)
 class Links:
-    """The links at the present joint angles and speeds on the present mount.
+    """The links at the present joint positions and speeds on the present mount.
 
     Attributes:
         mount: motion of the mount.
@@ -114,7 +156,7 @@ class Links:
     def energy(self) -> tuple[SX, SX]:
         """Kinetic and potential energy; zero height is the world's origin."""
         rates = self.posture.rates(self.qd, self.mount.rate)
-        velocities = self.posture.velocities(rates, self.mount.velocity, self.mount.rate)
+        velocities = self.posture.velocities(rates, self.mount.velocity, self.mount.rate, self.qd)
         whole = self.posture.mass_properties()
         up = rotation_matrix(self.mount.quaternion).T
         moment = whole.first_moment + whole.mass * (up @ self.mount.position)
@@ -130,7 +172,7 @@ def links(m: Model, mount: MountMotion, q: SX, qd: SX) -> Links:
     gravity = rotation.T @ tilted
     posture = Posture(chain(m), q)
     rates = posture.rates(qd, mount.rate)
-    velocities = posture.velocities(rates, mount.velocity, mount.rate)
+    velocities = posture.velocities(rates, mount.velocity, mount.rate, qd)
     position, turn = posture.flange()
     velocity, rate = posture.flange_motion(rates, velocities)
     tool = m.balance(
@@ -156,11 +198,12 @@ def output_motion(
     position, _ = posture.flange()
     rotation = rotation_matrix(mount.quaternion)
     attitude = product(mount.quaternion, posture.flange_quaternion())
-    m.output(qs.Q, q)
-    m.output(qs.QD, qd)
+    joints = Joints.of_device(m)
+    m.output(joints.sized(qs.Q), q)
+    m.output(joints.sized(qs.QD), qd)
     m.output(qs.TOOL_POSITION, mount.position + rotation @ position)
     m.output(qs.TOOL_ROTATION, rotation_vector(attitude))
-    m.port(qs.JOINT, torque, qd)
+    m.port(joints.port(qs.JOINT), torque, qd)
 
 
 def output_wrench(m: Model, mount: MountMotion, inertia: SX, bias: SX, wrench: SX) -> None:
