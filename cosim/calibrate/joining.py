@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 from ..data.logs import Log
 from ..data.segments import relative_pose
 from ..data.signals import Table
-from ..errors import ScenarioError, UnitError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
-from ..spec.units import Unit
-from ..system.provider import Provider
+from ..master.master import Master
+from ..reading.schema import shown
+from ..spec.units import Unit, parse
+from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
+from .clocks import bounds, check_clock, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
-from .parts import COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
 
@@ -51,9 +54,9 @@ def lookup(values: Mapping[str, Any], key: str, where: str) -> float:
     value = values[match["key"]]
     try:
         return float(value[int(match["index"])] if match["index"] else value)
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, OverflowError):
         raise ScenarioError(
-            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{where}: entry {key!r} is no number, it reads {shown(value)}; name an element as "
             f"{match['key']}[0]"
         ) from None
 
@@ -77,7 +80,14 @@ class Joined(MappedLogs):
         """The problem, on a system."""
         table = self.table
         model = Model.of(file, provider)
+        get_ready(provider, model.instances.values())
         self.system = model.plain({})
+        self.algorithm = str(table.get("algorithm", "jacobi"))
+        self.options = dict(table.get("options", {}))
+        search = self.search()
+        for options in (self.options, {**self.options, **search.options}):
+            with within(str(self.path)):  # what the master refuses is said before data are read
+                Master(self.system, self.algorithm, search.step, options=options).compile([], [])
         constants: dict[str, float] = {}
         for name, value in flatten(table.get("parameters", {})).items():
             if isinstance(value, list):
@@ -102,6 +112,7 @@ class Joined(MappedLogs):
             raise ScenarioError(f"{self.path}: no channel's column is in the logs")
         stated = [*self.declared(), *self.others()]
         check_parameters(stated)
+        self.late = {name: bounds(stated, name) for name in self.logs}
         parameters = [p for p in stated if not p.late]
         return Problem(
             self.data.name,
@@ -110,9 +121,10 @@ class Joined(MappedLogs):
             present,
             [self.run(name, present) for name in self.logs],
             float(table["step"]),
-            self.search(),
+            search,
             constants=constants,
-            algorithm=str(table.get("algorithm", "jacobi")),
+            algorithm=self.algorithm,
+            options=self.options,
             period=float(table["period"]) if "period" in table else None,
             ticks=bool(table.get("ticks", False)),
             relative=[tuple(names) for names in self.table.get("relative", [])],
@@ -267,6 +279,11 @@ class Joined(MappedLogs):
                 where = f"{self.path}: {key} {entry.get('name')}"
                 targets = self.targets(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
+                if isinstance(entry["nominal"], str) and not entry.get("per_run"):
+                    raise ScenarioError(
+                        f"{where}: nominal {entry['nominal']!r} is another one in each run; "
+                        "write per_run = true, or a number"
+                    )
                 for run in runs:
                     nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
                     span = float(entry.get("span", 0.0))
@@ -291,10 +308,9 @@ class Joined(MappedLogs):
         found = []
         source = known(unit, where) if unit else None
         for name, factor in _targets(entry, where):
-            try:
-                wanted = self.system.variables(name)[1][0].unit
-            except UnknownNameError:
-                wanted = None
+            if name.startswith(CLOCK):
+                check_clock(name, self.columns, where)
+            wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"
             gain, offset = scaled(source, wanted, given, f"{where}: {name}", "its factor", way)
@@ -302,6 +318,15 @@ class Joined(MappedLogs):
                 raise UnitError(f"{where}: {name}: {unit!r} has another zero; {way}")
             found.append((name, gain))
         return tuple(found)
+
+    def _wanted(self, name: str) -> Unit | None:
+        """Unit of a target, None where that is unknown."""
+        if name.startswith(CLOCK):
+            return parse("s")
+        try:
+            return self.system.variables(name)[1][0].unit
+        except UnknownNameError:
+            return None
 
     def value(self, entry: Any, run: str, where: str, unit: str = "") -> float:
         """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
@@ -311,6 +336,11 @@ class Joined(MappedLogs):
         """
         if isinstance(entry, (int, float)):
             return float(entry)
+        if not run:
+            raise ScenarioError(
+                f"{where}: nominal {entry!r} is another value in each run; say per_run = true, or "
+                "give a number"
+            )
         if entry.startswith("begin:"):
             begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
@@ -347,6 +377,7 @@ class Joined(MappedLogs):
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
+        data = masked(log.time[during], data, channels, self.late[name], -lead)
         anchor = 0
         for triple in self.table.get("relative", []):
             place = [[c.name for c in channels].index(one) for one in triple]
@@ -416,13 +447,27 @@ class Joined(MappedLogs):
             return *scaled(source, known(unit, where), factor, where, "gain", way), unit
         return *scaled(source, wanted, factor, where, "gain", way), ""
 
+    def _course(self, log: Log, column: str, lead: float) -> tuple[Vector, Vector]:
+        """Times and values of what drives an input, where they are known.
+
+        What is held on a clock of its own changes at its own times, not at those of the log.
+        """
+        if column not in log.own:
+            good = np.isfinite(log[column])
+            return log.time[good], log[column][good]
+        times, values = log.own[column]
+        first, last = min(float(log.time[0]), -lead), float(log.time[-1])
+        begin = max(int(np.searchsorted(times, first, "right")) - 1, 0)
+        mine = slice(begin, int(np.searchsorted(times, last, "right")))
+        # the last value holds to the end of the log; of several at one time the last one counts
+        times, values = np.append(times[mine], last), np.append(values[mine], values[mine][-1:])
+        counts = np.append(np.diff(times) > 0.0, True)
+        return times[counts], values[counts]
+
     def _input(
         self, log: Log, target: str, column: str, entry: Mapping[str, Any], lead: float
     ) -> Table:
-        values = log[column]
-        good = np.isfinite(values)
-        times = log.time[good]
-        values = values[good]
+        times, values = self._course(log, column, lead)
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
             values = np.rint(values / quantum) * quantum

@@ -19,6 +19,14 @@ from .plan import Stepper, decoded
 from .startup import find_past
 
 EXECUTORS = ("auto", "c", "python")
+Maker = Callable[[Outline, ExitStack], Interpreter]
+_usual: Maker = Interpreter
+
+
+def usual(maker: Maker) -> None:
+    """Have all further executions of this process made in another way (see `board`)."""
+    global _usual
+    _usual = maker
 
 
 class Interpreted:
@@ -58,7 +66,7 @@ class Execution:
     Args:
         outline: what is run.
         stack: ends the FMUs' instances.
-        interpreter: what makes the instances and does the operations.
+        interpreter: what makes the instances and does the operations; see `usual`.
 
     Attributes:
         run: the instances and their values.
@@ -72,7 +80,7 @@ class Execution:
         self,
         outline: Outline,
         stack: ExitStack,
-        interpreter: Callable[[Outline, ExitStack], Interpreter] = Interpreter,
+        interpreter: Maker | None = None,
     ) -> None:
         if outline.executor not in EXECUTORS:
             raise ValueRangeError(
@@ -80,7 +88,7 @@ class Execution:
                 f"{EXECUTORS[-1]}"
             )
         self.outline = outline
-        self.run = interpreter(outline, stack)
+        self.run = (interpreter or _usual)(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
         self.lost: list[str] = []
@@ -165,9 +173,12 @@ class Execution:
 
         Args:
             request: of an FMU that ended it. Where all FMUs stand at one time then, their values
-                are recorded in any case.
+                are recorded in any case; otherwise those of the last time at which they did.
         """
         run = self.run
+        if request is not None and not request.complete:
+            run.keep_last(present=False)
+            return
         last = request is not None and request.complete
         if run.row > run.index // self.outline.every and not (
             last and run.index % self.outline.every
@@ -176,7 +187,7 @@ class Execution:
         for op, a, b in decoded(self.outline.plan.final):
             run.do(op, a, b)
         if last:
-            run.keep_last()
+            run.keep_last(present=True)
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""

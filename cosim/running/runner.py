@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,8 @@ from .plots import plot_overview, plot_run
 from .preparation import left_out, recorded_signals, recording_interval, swapped_system
 
 Vector = NDArray[np.float64]
+SHOWN_RUNS = 3
+"""Recordings that a result of many runs shows in a notebook."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,13 @@ class RunResult:
     wall_s: float
     fmu_steps: int
     notes: tuple[str, ...] = ()
+
+    def _repr_html_(self) -> str:
+        from ..display.html import Html, join
+
+        differences = (item._repr_html_() for item in self.comparisons.values())
+        checks = checks_html(self.scenario.name, self.checks)
+        return join(*map(Html, (checks, self.recording._repr_html_(), *differences)))
 
     def plot(self, path: Path | str | None = None) -> Any:
         """Plot what the scenario describes or names, else what is compared, else everything."""
@@ -127,6 +136,15 @@ class Result:
             }
         )
 
+    def _repr_html_(self) -> str:
+        from ..display.html import Html, join
+
+        if len(self.runs) == 1:
+            return next(iter(self.runs.values()))._repr_html_()
+        checks = [replace(check, name=name) for name, check in self.checks.items()]
+        shown = [run.recording._repr_html_() for run in list(self.runs.values())[:SHOWN_RUNS]]
+        return join(*map(Html, (checks_html(self.name, checks), *shown)))
+
     def to_dict(self) -> dict[str, Any]:
         """As `cosim run --json` prints it."""
         first = next(iter(self.runs.values()))
@@ -153,6 +171,27 @@ class Result:
             "notes": list(dict.fromkeys(n for run in self.runs.values() for n in run.notes)),
             "files": [str(path) for path in self.files],
         }
+
+
+def checks_html(name: str, checks: Sequence[CheckResult]) -> str:
+    """Checks for a notebook; "" without any."""
+    from ..display.html import Cell, number, table, unit
+    from ..display.notebook import view
+
+    if not checks:
+        return ""
+    rows = []
+    for check in checks:
+        limit = check.limit if isinstance(check.limit, list) else [check.limit]
+        outcome = "not judged" if check.unfit else "ok" if check.ok else "FAILED"
+        kind = "over" if check.failed else "" if check.unfit else "good"
+        rows.append(
+            [check.name, check.value, " to ".join(map(number, limit)), unit(check.unit),
+             Cell(outcome, kind=kind), Cell(check.source, kind="text")]
+        )  # fmt: skip
+    met = sum(check.ok and not check.unfit for check in checks)
+    head = ["check", "value", "limit", "unit", "", "source"]
+    return view(name, f"{met} of {len(checks)} checks met", table(head, rows))
 
 
 def _prefixed(run: str, name: str) -> str:
@@ -401,13 +440,13 @@ def _run(
             result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
             if place is not None and error.recording is not None:
-                path = error.recording.write_parquet(place / "recording.parquet")
+                path = error.recording.keep(place / "recording")
                 error.add_note(f"the recording up to then is in {path}")
             raise
         results[run_name] = result
         if place is not None:
             files += [
-                result.recording.write_parquet(place / "recording.parquet"),
+                result.recording.keep(place / "recording"),
                 result.recording.write_csv(place / "recording.csv"),
             ]
             result.plot(place / "plot.png")

@@ -56,6 +56,7 @@ class Compiled:
     def _ended(self, status: int) -> int:
         """Where the compiled executor is; what has not failed goes through."""
         self.run.index, self.run.row = int(self.kernel.run.index), int(self.kernel.run.row)
+        self.run.noted = self.run.index
         if status and status not in (TOO_LONG, TOO_LARGE):
             self._fail(status)
         return status
