@@ -15,6 +15,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -131,6 +132,7 @@ def run_command(
     from rich.console import Console
     from rich.progress import Progress
 
+    from ..report.run_page import write_run_page
     from ..running.runner import run
 
     changes = pairs(variants, "--set", "INSTANCE=VARIANT")
@@ -139,6 +141,7 @@ def run_command(
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
     provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
+    folder = out or Path("out") / _folder_name(name)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         tasks: dict[str, Any] = {}
 
@@ -156,11 +159,13 @@ def run_command(
             step=step,
             duration=duration,
             provider=provider,
-            out=out or Path("out") / _folder_name(name),
+            out=folder,
             progress=told,
             isolate=time_limit if isolate else None,
             guard=True,
         )
+    page = write_run_page(result, provider, folder / "report.html")
+    result = replace(result, files=(*result.files, page))
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         say(f"note: {note}")
     if as_json:
@@ -223,6 +228,7 @@ def _print_result(result: Result) -> None:
         console.print(f"in {len(folders) - 1} folders below {folders[-1]}", soft_wrap=True)
     for folder in folders if len(folders) <= SHOWN_FOLDERS else ():
         console.print(f"in {folder}", soft_wrap=True)
+    console.print(f"page: {result.files[-1]}", soft_wrap=True)
     pictures = [path for path in result.files if path.suffix == ".png"]
     for path in pictures[-1:] if pictures and pictures[-1].name == "overview.png" else pictures:
         console.print(f"picture: {path}", soft_wrap=True)

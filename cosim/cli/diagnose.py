@@ -38,7 +38,7 @@ def diagnose_command(
     """
     from ..calibrate.mapping import read_problem
     from ..diagnose import diagnose
-    from ..report import write_page
+    from ..report.page import write_page
 
     problem = read_problem(dataset, mapping=mapping, system=system)
     folder = make_folder(out or Path("out") / problem.name)
