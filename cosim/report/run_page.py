@@ -16,6 +16,7 @@ from ..display.html import Cell, Html, join, number, quantity, table, tag, unit,
 from ..display.plot import Curve, Panel, plot
 from ..display.series import Store, stretch
 from ..drawing.svg import svg
+from ..errors import CosimError
 from ..files import write_text
 from ..running.runner import Result, RunResult
 from ..system.provider import Provider
@@ -154,7 +155,10 @@ def _drawing(run: RunResult, provider: Provider | None) -> Html:
     if provider is None:
         return Html("")
     file = replace(run.scenario.system, instances=dict(run.variants), parameters={})
-    drawn = svg(file.build(provider))
+    try:
+        drawn = svg(file.build(provider))
+    except CosimError as error:  # its files may have gone since
+        return tag("p", f"The system is not drawn: {error}", class_="note")
     width = float(drawn.partition('width="')[2].partition('"')[0])
     return join(
         tag("h2", "The system"),

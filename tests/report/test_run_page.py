@@ -82,6 +82,16 @@ def test_signals_without_a_reference_are_drawn_together_by_unit(result: Result) 
     assert list(dict.fromkeys(titles)) == ["arm.q[0] and 5 more [rad]", "arm.q[6] and 1 more [rad]"]
 
 
+def test_a_system_whose_files_have_gone_is_not_drawn_and_it_is_said(result: Result) -> None:
+    from cosim.installation.builder import default_provider
+
+    first: RunResult = result.runs["ST1"]
+    gone = changed(result, variants={**first.variants, "load": "gone.fmu"})
+    html = run_page(gone, default_provider())
+    assert "The system is not drawn: " in html and "gone.fmu" in html
+    assert "cosim-system" not in html and "cosim-system" in run_page(result, default_provider())
+
+
 def test_a_browser_draws_it_with_its_system(result: Result, tmp_path: Path) -> None:
     from cosim.installation.builder import default_provider
 
