@@ -12,6 +12,8 @@ import typer
 
 from ..errors import InputError
 from ..files import make_folder, write_text
+from ..installation.builder import default_provider
+from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -25,14 +27,22 @@ if TYPE_CHECKING:
 
     Residuals = list[tuple[str, NDArray[np.float64]]]
 
+FAR = 2.0
+"""Residual over the noise from which a model evidently lacks something: good ones leave 1, and
+logs whose noise is guessed up to half as much again."""
+
 
 def calibrate_command(
-    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    dataset: Annotated[
+        Path,
+        typer.Argument(metavar="DATASET", help="Folder of logs, or a set of `cosim scenarios`."),
+    ],
     system: Annotated[
         str | None, typer.Option(help="Another system than that of the mapping.")
     ] = None,
     mapping: Annotated[
-        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+        Path | None,
+        typer.Option(help="A dataset.toml, or a name of `cosim scenarios` [by the rig]."),
     ] = None,
     samples: Annotated[
         int, typer.Option(help="Parameter sets for the correlation index, 0 for none.")
@@ -45,26 +55,36 @@ def calibrate_command(
 ) -> None:
     """Estimate the declared parameters of a system from measured runs.
 
-    Example: `cosim calibrate scenarios/motor_bench/data/MB-12 --out out/MB-12`
+    Example: `cosim calibrate MB-12 --out out/MB-12`
     """
+    from ..calibrate.calibration import calibrated
     from ..calibrate.checks.examine import examine
     from ..calibrate.checks.finding import passed
     from ..calibrate.checks.late import check_late
-    from ..calibrate.fit import fit
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
     from ..report.calibration import write_calibration_page
 
     started = time.perf_counter()
-    problem = read_problem(dataset, mapping=mapping, system=system)
-    simulator = Simulator(problem, workers=workers)
-    findings = _usable(problem, examine(simulator))
-    estimate = fit(simulator)
-    findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
-    correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
+    with Display() as display:
+        provider = default_provider(display.building)
+        problem = read_problem(dataset, provider, mapping=mapping, system=system)
+        simulator = Simulator(problem, workers=workers)
+        stage = "checking the data"
+        with display.watch("calibrating", lambda: f"{stage}: {simulator.evaluations} simulations"):
+            findings = _usable(problem, examine(simulator))
+            stage = "fitting"
+            estimate, exchange = calibrated(simulator)
+            findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
+            stage = "what the runs tell of each parameter"
+            correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
+    if not exchange.small:
+        typer.echo(f"warning: {exchange}", err=True)
     unused = validation_residuals(estimate)
     content = calibration_table(estimate, unused, correlation, findings)
+    content["exchange"] = exchange.to_dict()
+    content["evaluations"] = simulator.evaluations + exchange.evaluations
     content["wall_s"] = time.perf_counter() - started
     folder = make_folder(out or Path("out") / problem.name)
     page = folder / "report.html"
@@ -102,6 +122,7 @@ def calibration_table(
     findings: list[Finding],
 ) -> dict[str, Any]:
     """What `--json` prints."""
+    from ..calibrate.clocks import offsets
     from ..calibrate.estimate import channel_rms
     from ..calibrate.sensitivity import local
 
@@ -126,6 +147,7 @@ def calibration_table(
             )
             if p.role != "nuisance"
         },
+        "clocks": offsets(estimate),
         "not_separable": [str(item) for item in estimate.combinations if str(item)],
         "channels": {
             c.name: {
@@ -142,7 +164,6 @@ def calibration_table(
             "correlation_limit": correlation.limit if correlation else None,
         },
         "findings": [finding.to_dict() for finding in findings],
-        "evaluations": estimate.simulator.evaluations,
     }  # fmt: skip
 
 
@@ -162,6 +183,20 @@ def _scaled(value: float | None, sigma: float) -> float | None:
     return None if value is None or math.isnan(value) else value * sigma
 
 
+def clock_lines(clocks: dict[str, dict[str, Any]]) -> list[str]:
+    """What is said of clocks that were estimated."""
+    found = []
+    for name, item in clocks.items():
+        low, high = item["ci95"]
+        note = "" if item["identifiable"] else ", not identifiable"
+        note += ", at its bound" if item["at_bound"] else ""
+        side = "late" if item["value"] >= 0.0 else "early"
+        size = f"{abs(item['value']):.4g} {item['unit']}"
+        same = "; a delay of all commands looks the same" if item["value"] > 0.0 else ""
+        found.append(f"{name}: {size} {side} ({low:.4g} to {high:.4g}{note}){same}")
+    return found
+
+
 def _print(content: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -177,6 +212,8 @@ def _print(content: dict[str, Any]) -> None:
             f"{item['nominal']:.5g}", note + (" at bound" if item["at_bound"] else ""),
         )  # fmt: skip
     console.print(table)
+    for text in clock_lines(content["clocks"]):
+        console.print(text, soft_wrap=True)
     for text in content["not_separable"]:
         console.print(f"the runs do not tell apart: {text} (in spans)")
     table = Table("channel", "unit", "noise", "identification", "validation")
@@ -187,5 +224,14 @@ def _print(content: dict[str, Any]) -> None:
             *("-" if value is None else f"{value:.4g}" for value in cells),
         )  # fmt: skip
     console.print(table)
+    console.print(content["exchange"]["text"], soft_wrap=True)
+    far = {n: (v["identification"] or 0.0) / v["noise_rms"] for n, v in content["channels"].items()}
+    name = max(far, key=lambda n: far[n])
+    if far[name] > FAR:
+        console.print(
+            f"the model leaves {far[name]:.3g} times the noise in {name}: it lacks something that "
+            "values and intervals make up for; `cosim diagnose` looks for it",
+            soft_wrap=True,
+        )
     for path in content["files"]:
         console.print(path, soft_wrap=True)

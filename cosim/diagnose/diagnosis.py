@@ -16,14 +16,15 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.clocks import offsets
+from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
+from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
 from .adding import made_of
 from .bursts import bursts, times
-from .deferred import step_error
 from .exchange import reconsidered
 from .experiment import propose
 from .further import Further, judged
@@ -131,6 +132,7 @@ class Diagnosis:
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
             "start_values": self.start_values(),
             "bursts": self.bursts,
             "unstable_from": self.ended,
@@ -298,7 +300,14 @@ def _searched(
     winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(

@@ -28,6 +28,7 @@ KINDS = {
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",
     "reading": "what was assumed in reading",
+    "saturated": "a column that stays at its largest or smallest value",
     "short": "too few samples",
     "sign": "a column with the sign turned round",
     "simulation": "a model that does not run",
