@@ -1,16 +1,17 @@
-"""Checks of a run as a table for a notebook."""
+"""Outcomes of checks as a table for notebooks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..display.html import Cell, number, table, unit
-from ..display.notebook import view
 from ..scenario.checks import CheckResult
 
 
 def checks_html(name: str, checks: Sequence[CheckResult]) -> str:
     """Checks for a notebook; "" without any."""
+    from ..display.html import Cell, number, table, unit
+    from ..display.notebook import view
+
     if not checks:
         return ""
     rows = []
