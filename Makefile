@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RUNS := $(VENV)/.runs
 WORKERS ?= 2
 
-.PHONY: demo test quick check fmus docs fuzz bench wheel clean
+.PHONY: demo test quick check fmus docs site fuzz bench wheel clean
 
 demo: $(RUNS)
 	$(BIN)/python -m cosim run motor_bench --out out/motor_bench
@@ -31,6 +31,9 @@ docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
 
+site: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz --seconds 3600
 
@@ -54,7 +57,7 @@ $(RUNS): pyproject.toml
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,tables,validate,test,check]"
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,gym,live,logs,study,tables,validate,test,check]"
 	touch $(RUNS) $(STAMP)
 
 clean:

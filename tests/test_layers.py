@@ -12,9 +12,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
-    "errors", "reading", "arguments", "files", "spec", "data", "fmu", "drawing", "system", "master",
-    "installation", "scenario", "ssp", "running", "control", "study", "calibrate", "diagnose",
-    "report", "cli", "__main__",
+    "errors", "reading", "arguments", "files", "display", "spec", "data", "fmu", "drawing",
+    "system", "master", "installation", "scenario", "ssp", "view", "running", "robots", "control",
+    "study", "calibrate", "diagnose", "intake", "live", "report", "cli", "__main__",
 )  # fmt: skip
 """Of `cosim`, from the bottom up: each may import those before it."""
 FORBIDDEN = {"sources", "cosim_library", "casadi", "pythonfmu", "ziglang", "scenarios", "tests"}

@@ -8,13 +8,14 @@ in the model. It is looked for in the data set's folder, above it, and among the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..data.logs import DataSet, read_data_set, runs_of
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import InputError, ScenarioError, UnknownNameError, listing
 from ..files import read_toml
 from ..installation import builder, places
 from ..installation.examples import example_sets, named_mappings, read_mapping
@@ -119,6 +120,22 @@ def read_problem(
     Raises:
         ScenarioError, UnknownNameError: a file or a name in it is wrong.
     """
+    return read_joined(folder, provider, mapping=mapping, system=system, only=only)[1]
+
+
+def read_joined(
+    folder: Path | str,
+    provider: Provider | None = None,
+    *,
+    mapping: Path | str | None = None,
+    system: str | None = None,
+    only: Mapping[str, Any] | None = None,
+) -> tuple[Joined, Problem]:
+    """A problem as of `read_problem`, and what made it of mapping and data.
+
+    Raises:
+        ScenarioError, UnknownNameError: as of `read_problem`.
+    """
     if provider is None:
         provider = builder.default_provider()
     folder = _folder(Path(folder))
@@ -134,7 +151,20 @@ def read_problem(
         partial(read_problem, folder, provider, mapping=path.parent / name, only=only)
         for name in table.get("further", [])
     ]
-    return Joined(path, table, data, only or {}).problem(file, provider).changed(further=further)
+    with _named(path, folder):
+        joined = Joined(path, table, data, only or {})
+        return joined, joined.problem(file, provider).changed(further=further)
+
+
+@contextmanager
+def _named(path: Path, folder: Path) -> Iterator[None]:
+    """Errors that name no file of the data set are about the mapping."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error) or str(folder) in str(error):
+            raise
+        raise type(error)(f"{path}: {error}") from error
 
 
 def _asked(table: Mapping[str, Any]) -> set[str]:

@@ -12,6 +12,7 @@ import typer
 
 from ..files import make_folder, write_text
 from ..installation.builder import default_provider
+from .calibrate import clock_lines
 from .progress import Display
 from .streams import print_json
 
@@ -44,7 +45,7 @@ def diagnose_command(
     """
     from ..calibrate.mapping import read_problem
     from ..diagnose import diagnose
-    from ..report import write_page
+    from ..report.page import write_page
 
     begun, stage = time.monotonic(), "checking the data"
     with Display() as display:
@@ -79,6 +80,8 @@ def _print(result: Diagnosis) -> None:
     for effect in result.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    for text in clock_lines(result.to_dict()["clocks"]):
+        console.print(f"  {text}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip

@@ -106,6 +106,25 @@ class Recording:
         failed = f", stopped: {self.error}" if self.error else ""
         return f"<Recording of {len(self.names)} signals, {len(self)} times to {end}{failed}>"
 
+    def _repr_html_(self) -> str:
+        from ..display.notebook import key_values, more, signal_charts, view
+
+        columns = {
+            name: self.values[:, column]
+            for column, name in enumerate(self.names)
+            if self.objects.get(name, self.time).dtype != object
+        }
+        charts, left = signal_charts(self.time, columns, self.units)
+        title = self.provenance.get("scenario") or self.provenance.get("system") or "Recording"
+        end = f"{self.time[-1]:g} s" if len(self) else "empty"
+        facts: list[tuple[str, object]] = [("stopped", self.error)] if self.error else []
+        if self.bond_energy:
+            facts.append(("energy that the coupling invented", f"{self.energy_residual:.3g} J"))
+        return view(
+            title, f"{len(self.names)} signals, {len(self)} times to {end}",
+            key_values(facts) if facts else "", charts, more(left),
+        )  # fmt: skip
+
     # -- other forms -----------------------------------------------------------------------------
 
     def to_pandas(self) -> pd.DataFrame:

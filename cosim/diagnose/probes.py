@@ -84,20 +84,10 @@ class Probe:
         return (self.mixed.minimum, self.mixed.maximum) if self.mixed else (-math.inf, math.inf)
 
     @property
-    def visits(self) -> list[tuple[str, str]]:
-        """Parameters that are tried together along a run, with the variables that tell them."""
-        return [(p.name, p.hints.visits) for p in self.others if p.hints.visits]
-
-    @property
     def own(self) -> int:
         """Number of parameters of the effect, 0 of one on a whole vector."""
         prefix = self.candidate.prefix
         return sum(p.name.startswith(prefix) for p in self.problem.parameters)
-
-    @property
-    def choices(self) -> list[dict[str, float]]:
-        """Parameter -> value, one parameter at a time."""
-        return [{p.name: value} for p in self.others for value in p.hints.tries]
 
 
 @dataclass(frozen=True)

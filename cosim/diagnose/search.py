@@ -9,6 +9,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.deferred import corrected
 from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
@@ -17,7 +18,6 @@ from ..errors import UnbuiltError
 from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
-from .deferred import corrected
 from .established import needed, settle
 from .exchange import challenged, nearly, reconsidered, restarted
 from .fitter import ITERATIONS, Say

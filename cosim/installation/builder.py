@@ -16,9 +16,11 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, UnbuiltError, VariantError
+from ..spec import devices
 from ..spec.cache import cache_folder
 from ..spec.distribution import way_out
-from ..system.provider import Provider
+from ..spec.variant import parse_name
+from ..system.provider import FolderProvider, Provider
 from . import places
 from .library import Library
 
@@ -60,6 +62,13 @@ SHOWN = 80
 """Characters of a variant's name in an error."""
 Told = Callable[[str, int, int], None]
 """Told of FMUs that are built: what is in work ("" for nothing), how many are done, of how many."""
+
+
+def _beside_device(variant: str) -> Path | None:
+    """The folder of a device file of the user's own, where its FMUs are kept."""
+    name = parse_name(variant)
+    own = devices.find(name.component, name.device)
+    return None if own is None else own.parent
 
 
 class _Count:
@@ -117,12 +126,13 @@ class Builder:
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU, built if it is not there."""
         with naming_errors():
-            done = self._packaging.ready(variant, out=self.out)
+            folder = _beside_device(variant) or self.out
+            done = self._packaging.ready(variant, out=folder)
             if done is not None:
                 return Path(done)
             self._count.begin(variant)
             try:
-                return Path(self._packaging.build(variant, out=self.out))
+                return Path(self._packaging.build(variant, out=folder))
             finally:
                 self._count.end(variant)
 
@@ -134,9 +144,10 @@ class Builder:
     def prepare(self, variants: Iterable[str]) -> None:
         """Build variants, as many at a time as there are processors.
 
-        Names that do not exist are left to those who ask for them one by one.
+        Names that do not exist are left to those who ask for them one by one, as are devices of
+        the user's own, whose FMUs lie beside them.
         """
-        names = self._known(self._missing(variants))
+        names = [n for n in self._known(self._missing(variants)) if _beside_device(n) is None]
         if len(names) < 2:
             return
         self._count.expect(names)
@@ -150,7 +161,10 @@ class Builder:
             )
 
     def _missing(self, variants: Iterable[str]) -> list[str]:
-        return [n for n in dict.fromkeys(variants) if not self._packaging.ready(n, out=self.out)]
+        return [
+            n for n in dict.fromkeys(variants)
+            if not self._packaging.ready(n, out=_beside_device(n) or self.out)
+        ]  # fmt: skip
 
     def _known(self, variants: Iterable[str]) -> list[str]:
         build_model, found = sources("variant").build_model, []
@@ -201,11 +215,21 @@ class Installed:
 
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU."""
+        beside = _beside_device(variant)
+        if beside is not None:
+            try:
+                self._builder = self._builder or Builder(told=self._told)
+            except UnbuiltError:
+                return FolderProvider(beside).path(variant)
+            return self._builder.path(variant)  # the device file may have changed
         found = self.library.find(variant)
         return found if found is not None else self._built(variant).path(variant)
 
     def _lacks(self, variants: Iterable[str]) -> list[str]:
-        return [name for name in variants if not self.library.has(name)]
+        return [
+            name for name in variants
+            if _beside_device(name) is None and not self.library.has(name)
+        ]  # fmt: skip
 
     def expect(self, variants: Iterable[str]) -> None:
         """As of `Builder`, for those that must be built."""

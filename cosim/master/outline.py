@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,7 @@ class Outline:
         external: values of the driven inputs, one row per communication point.
         objects: per column of `external` whose values travel as objects, one per communication
             point.
+        endless: the run goes on beyond `times`, which are a window of it.
     """
 
     system: System
@@ -53,11 +55,17 @@ class Outline:
     signals: Mapping[str, Signal]
     external: Vector
     objects: Mapping[int, Sequence[Any]]
+    endless: bool = False
 
     @property
     def count(self) -> int:
         """Communication steps."""
         return self.times.size - 1
+
+    @property
+    def end(self) -> float:
+        """Where the run ends [s]; infinite if nobody knows."""
+        return math.inf if self.endless else float(self.times[-1])
 
     @property
     def capacity(self) -> int:

@@ -19,12 +19,13 @@ from typing import Literal
 import casadi as ca
 
 from cosim import spec
-from cosim.spec import hints
+from cosim.spec import devices, hints
 from cosim.spec.archive import pack
 from cosim.spec.variant import Name
 
 from ..function import Functions, build_functions
 from ..model import Model, ModelError
+from ..scene import model_scene
 from ..variant import build_model, fidelities, parse_name
 from . import description, native, python, rights
 from .cache import cache_folder, write_atomically
@@ -109,6 +110,9 @@ def component_json(variant: Variant) -> bytes:
         content["left_out"] = [
             {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
         ]
+    looks = model_scene(model, {entry.name for entry in variant.entries})
+    if looks:
+        content["scene"] = looks
     return (json.dumps(content, indent=2) + "\n").encode()
 
 
@@ -242,6 +246,9 @@ def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
 def _stamp(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
     """A file that holds the hash of the FMU built from these very sources."""
     key = f"{sources_key()} {name} {fmi} {kind} {_platforms(platform)}"
+    own = devices.find(name.component, name.device)
+    if own is not None:
+        key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
     return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
 
 
