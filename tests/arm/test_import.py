@@ -83,6 +83,7 @@ def test_inertia_gravity_and_regressor_are_those_of_pinocchio(seed: int, tmp_pat
     assert_near(torques, pin.rnea(model, data, q, qd, qdd))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "size"), [(1, 2), (2, 4), (30, 6)])
 def test_fmus_move_as_pinocchio_says(seed: int, size: int, tmp_path: Path, devices: Path) -> None:
     text = random_chain(seed, size)
@@ -105,6 +106,7 @@ def test_fmus_move_as_pinocchio_says(seed: int, size: int, tmp_path: Path, devic
     assert_near(torques, pin.rnea(model, data, q, qd, qdd))
 
 
+@pytest.mark.slow
 def test_the_account_of_energy_closes_with_sliding_joints(tmp_path: Path, devices: Path) -> None:
     text = random_chain(2, 4)
     assert "prismatic" in text
@@ -118,6 +120,7 @@ def test_the_account_of_energy_closes_with_sliding_joints(tmp_path: Path, device
         assert abs(defect) < ROUNDING * largest
 
 
+@pytest.mark.slow
 def test_a_panda_has_43_base_parameters_and_torques_follow_them(
     tmp_path: Path, devices: Path
 ) -> None:
@@ -144,6 +147,7 @@ def test_a_panda_has_43_base_parameters_and_torques_follow_them(
     assert_near(after - before, np.column_stack(columns) @ changes)
 
 
+@pytest.mark.slow
 def test_masses_that_show_in_no_torque_do_not_change_the_base_parameters(tmp_path: Path) -> None:
     given = values(read(panda(), tmp_path))
     geometry = given["rotation"], given["offset"], given["prismatic"]
