@@ -48,7 +48,7 @@ def environment(
         if not low < high:
             raise ValueRangeError(f"action {name}: its bounds {low:g} and {high:g} are not rising")
 
-    class Environment(gymnasium.Env):  # type: ignore[misc]
+    class Environment(gymnasium.Env):
         """See `environment`."""
 
         metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012

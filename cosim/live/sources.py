@@ -218,6 +218,7 @@ def _udp(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
 def _mqtt(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
     try:
         from paho.mqtt import client as mqtt
+        from paho.mqtt.enums import CallbackAPIVersion
     except ImportError:
         raise InputError(
             f"--source {address}: needs paho-mqtt, which is not installed; "
@@ -227,7 +228,7 @@ def _mqtt(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
     topic = unquote(parts.path.lstrip("/"))
     if not parts.hostname or not topic:
         raise InputError(f"--source {address}: lacks a host or a topic; write mqtt://HOST/TOPIC")
-    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    client = mqtt.Client(CallbackAPIVersion.VERSION2)
     if parts.username:
         client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
     refused: list[str] = []
