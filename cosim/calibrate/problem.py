@@ -25,7 +25,7 @@ from ..system.system import System
 from ..system.toml import SystemFile
 from .checks.finding import NO_SOURCE, Source
 from .model import Model
-from .parts import Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
+from .parts import CLOCK, Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
 
 Vector = NDArray[np.float64]
 
@@ -217,7 +217,7 @@ class Problem:
     @cached_property
     def _fixed(self) -> dict[str, float]:
         known = {n: v for n, v in self.constants.items() if self._has(n)}
-        if len(known) < len(self.constants):
+        if len(known) < sum(not n.startswith(CLOCK) for n in self.constants):
             self.system()  # says which one it does not know
         return {n: v for n, v in known.items() if n not in self._coarse}
 
@@ -226,6 +226,22 @@ class Problem:
         run = self.run(run) if isinstance(run, str) else run
         found = dict(self._fixed)
         found.update((name, value) for name, value in run.starts.items() if self._has(name))
+        found.update(self._set(theta, run))
+        return {name: value for name, value in found.items() if not name.startswith(CLOCK)}
+
+    def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
+        """How late the clocks of channels are in a run [s], where that is estimated or held."""
+        run = self.run(run) if isinstance(run, str) else run
+        found = {**self.constants, **run.starts, **self._set(theta, run)}
+        return {
+            name.removeprefix(CLOCK): value
+            for name, value in found.items()
+            if name.startswith(CLOCK)
+        }
+
+    def _set(self, theta: Vector, run: MeasuredRun) -> dict[str, float]:
+        """Targets of the parameters that concern a run -> values."""
+        found: dict[str, float] = {}
         for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
             if parameter.run in ("", run.name):
                 found.update(parameter.set(value))
@@ -302,7 +318,7 @@ class Problem:
                     added.append(
                         free_parameter(
                             variable, full, full, strength=variable.name in strengths,
-                            hints=hints.get(variable.name, NO_HINTS).within(name),
+                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                         )
                     )  # fmt: skip
         return changed.changed(parameters=[*self.parameters, *added])

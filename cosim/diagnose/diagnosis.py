@@ -16,12 +16,15 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.clocks import offsets
 from ..calibrate.deferred import step_error
+from ..calibrate.nuisance import late_values
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
+from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
+from .adding import made_of
 from .bursts import bursts, times
 from .exchange import reconsidered
 from .experiment import propose
@@ -61,6 +64,7 @@ class Diagnosis:
         further: the models on runs that need another system.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
+        findings: on the data.
     """
 
     problem: Problem
@@ -82,6 +86,12 @@ class Diagnosis:
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    def _repr_html_(self) -> str:
+        from .notebook import shown
+
+        return shown(self.to_dict(), self.problem, self.residuals)
 
     def rms(self, which: str, purpose: str) -> dict[str, float | None]:
         """Channel -> RMS residual in its unit over the runs of a purpose."""
@@ -110,7 +120,9 @@ class Diagnosis:
             "verdict": self.verdict,
             "reason": self.reason,
             "warnings": self.warnings,
+            "findings": [finding.to_dict() for finding in self.findings],
             "effects": self.effects(),
+            "model": made_of(self.problem, self.after),
             "alternatives": [
                 {"effects": [c.label for c in f.effects], "score": self._score(f)}
                 for f in self.rivals
@@ -121,6 +133,7 @@ class Diagnosis:
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
             "start_values": self.start_values(),
             "bursts": self.bursts,
             "unstable_from": self.ended,
@@ -168,15 +181,7 @@ class Diagnosis:
 
     def start_values(self) -> dict[str, dict[str, float]]:
         """Late values that were estimated, by run."""
-        found: dict[str, dict[str, float]] = {}
-        if self.after is not None:
-            for p in self.after.problem.late:
-                starts = self.after.problem.run(p.run).starts
-                for name, factor in p.targets[:1]:
-                    if name in starts:
-                        short = p.name.partition("@")[0]
-                        found.setdefault(p.run, {})[short] = starts[name] / factor
-        return found
+        return late_values(self.after.problem) if self.after is not None else {}
 
     def effects(self) -> list[dict[str, Any]]:
         """The effects that were found."""
@@ -267,7 +272,7 @@ def diagnose(
 def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
     """The verdict on data that cannot be used."""
     errors = lines(f for f in findings if f.severity == "error")
-    result = Diagnosis(problem, "bad_data", "; ".join(errors))
+    result = Diagnosis(problem, "bad_data", "; ".join(errors), findings=findings)
     result.warnings = lines(f for f in findings if f.severity != "error")
     result.wall = time.perf_counter() - begun
     return result
@@ -282,13 +287,20 @@ def _searched(
     begun: float,
 ) -> Diagnosis:
     problem = search.raw
-    result = Diagnosis(problem, "", "", search, base)
+    result = Diagnosis(problem, "", "", search, base, findings=findings)
     result.warnings = lines(findings)
     current = base
     winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(

@@ -32,6 +32,8 @@ def usual(maker: Maker) -> None:
 class Interpreted:
     """A `plan.Stepper` that does the operations of each step one by one."""
 
+    looks_ahead = False
+
     def __init__(self, run: Interpreter) -> None:
         self.run, self.step = run, decoded(run.plan.step)
 
@@ -42,6 +44,12 @@ class Interpreted:
 
     def restart(self) -> None:
         """Nothing to forget."""
+
+    def save(self) -> None:
+        """Nothing is kept from step to step."""
+
+    def restore(self, memory: None) -> None:
+        """Nothing to return to."""
 
     def steps(self) -> int:
         """Steps that were made."""
@@ -99,7 +107,7 @@ class Execution:
         count = self.outline.count
         shown = max(count // 100, 1)
         initialize(self.run)
-        self.lost = self._lost()
+        self.find_lost()
         before = Surroundings.now()
         try:
             stepper = self.begin()
@@ -239,8 +247,8 @@ class Execution:
         ]
         return [*self.lost, *filter(None, [self.ended]), *warnings, *changed]
 
-    def _lost(self) -> list[str]:
-        """Outputs that are not 0, must be passed on, and are not."""
+    def find_lost(self) -> None:
+        """Look which outputs are not 0, must be passed on, and are not."""
         found: dict[tuple[str, str], list[tuple[str, float]]] = {}
         system = self.outline.system
         instances = dict(zip(system.members, self.run.instances, strict=True))
@@ -252,7 +260,7 @@ class Execution:
             if value != 0.0:
                 array = name.partition("[")[0]
                 found.setdefault((owner, array), []).append((name, value))
-        return [
+        self.lost = [
             f"{owner}.{name} = {', '.join(f'{value:.3g}' for _, value in items)} "
             f"{system.unit(f'{owner}.{items[0][0]}')} is taken by nothing "
             f"({system.members[owner].description.extra['passed_on'][items[0][0]]}): it is missing "

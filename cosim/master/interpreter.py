@@ -176,7 +176,7 @@ class Interpreter:
 
     def size(self, time: float, step: float) -> float:
         """A step that does not miss the end of the run by rounding, and never goes beyond."""
-        end = self.instants[-1]
+        end = self.outline.end
         if time + step > end - ROUNDING * step:
             step = end - time
             while time + step > end:

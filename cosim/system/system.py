@@ -13,7 +13,7 @@ Everything is checked when it is said: names, causality, units, bounds, double d
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -429,9 +429,12 @@ class System:
 
     # -- pictures --------------------------------------------------------------------------------
 
-    def svg(self) -> str:
-        """The system as a drawing (SVG)."""
-        return drawing.svg(self)
+    def svg(self, marks: Mapping[str, Sequence[str]] | None = None) -> str:
+        """The system as a drawing (SVG); instances with marks (short texts) stand out."""
+        return drawing.svg(self, marks)
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
 
     def to_svg(self, path: Path | str) -> Path:
         """Write the drawing to a file."""

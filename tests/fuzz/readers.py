@@ -35,7 +35,7 @@ from cosim.study.store import Store
 from cosim.system.provider import FolderProvider
 from cosim.system.toml import read_system
 
-from . import seeds
+from . import bags, seeds
 from .mutate import (
     JSON_VALUES,
     NUMBERS,
@@ -394,6 +394,12 @@ READERS = {
         ),
         Reader("recording", "x.parquet", lambda: [seeds.recording()], _parquet, read_recording),
         Reader("store", "runs/k.json", lambda: [seeds.result(seeds.RESULT)], _result, _store),
+        Reader("inspect", "x.csv", lambda: [seeds.CSV.encode()], _csv, bags.inspected),
+        *(
+            Reader("mcap", "x.mcap", lambda: [bags.bag("MCAP")], some_bytes, bags.inspected),
+            Reader("db3", "x.db3", lambda: [bags.bag("SQLITE3")], some_bytes, bags.inspected),
+            Reader("bag", "x.bag", lambda: [bags.bag1()], some_bytes, bags.inspected),
+        )[: 3 * bags.THERE],
     )
 }  # fmt: skip
 

@@ -1,8 +1,8 @@
 """The whole check of one .fmu file, from the archive inwards.
 
 Our own rules name the variable, the line and the way out. What they leave is covered by the XML
-schemas of the standard and by FMPy's validation, which run on the description alone: FMPy is part
-of every installation and needs no compiler. Nothing is unpacked, loaded or run.
+schemas of the standard and by FMPy's validation, which run on the description alone where FMPy is
+installed (the extra `validate`). Nothing is unpacked, loaded or run.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Literal
 from ...errors import FmuFileError
 from ...reading import archives, markup
 from ...reading.limits import TEXT, UNPACKED
+from ...spec.distribution import has
 from ..description import parse_description
 from ..metadata import ENTRY, parse_metadata
 from .content import check_binaries, check_entries, check_folders, check_sources
@@ -126,7 +127,7 @@ def _description(
             about.error(str(error).removeprefix(": "), "or export it again")
     build = archive.read(entries[_BUILD]) if _BUILD in entries else None
     errors = [finding for finding in inside.found if finding.severity == "error"]
-    if len(errors) < _MORE:  # FMPy's time grows with the square of what is wrong
+    if has("fmpy") and len(errors) < _MORE:  # FMPy's time grows with the square of what is wrong
         inside.found += _of_fmpy(xml, build, model, errors)
     if not any(f.severity == "error" for f in inside.found):
         _as_run(xml, model, inside)

@@ -19,6 +19,8 @@ class Compiled:
         FileNotFoundError: this machine has no compiled executor; the text is its file name.
     """
 
+    looks_ahead = False
+
     def __init__(self, run: Interpreter) -> None:
         self.run, self.kernel = run, Kernel(run)
 
@@ -33,6 +35,14 @@ class Compiled:
     def restart(self) -> None:
         """Begin anew."""
         self.kernel.restart()
+
+    def save(self) -> bytes:
+        """What it keeps from step to step."""
+        return self.kernel.save()
+
+    def restore(self, memory: bytes) -> None:
+        """Return to it."""
+        self.kernel.restore(memory)
 
     def steps(self) -> int:
         """Steps that were made."""
