@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError, ValueRangeError
 from ..running.opening import open as open_twin
+from ..spec.distribution import way_out
 
 
 def environment(
@@ -42,7 +43,7 @@ def environment(
         import gymnasium
     except ImportError:
         raise InputError(
-            "an environment needs gymnasium, which is not installed; pip install 'cosim[gym]'"
+            f"an environment needs gymnasium, which is not installed; {way_out('gym')}"
         ) from None
     for name, (low, high) in actions.items():
         if not low < high:

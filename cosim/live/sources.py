@@ -23,6 +23,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from ..errors import CosimError, InputError, listing
+from ..spec.distribution import needed
 
 Line = tuple[float, bytes]
 """Arrival by `time.monotonic` [s], and the line."""
@@ -216,19 +217,12 @@ def _udp(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
 
 
 def _mqtt(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
-    try:
-        from paho.mqtt import client as mqtt
-        from paho.mqtt.enums import CallbackAPIVersion
-    except ImportError:
-        raise InputError(
-            f"--source {address}: needs paho-mqtt, which is not installed; "
-            "pip install 'cosim[live]'"
-        ) from None
+    mqtt = needed("paho.mqtt.client", f"--source {address}", "live")
     parts = urlsplit(address)
     topic = unquote(parts.path.lstrip("/"))
     if not parts.hostname or not topic:
         raise InputError(f"--source {address}: lacks a host or a topic; write mqtt://HOST/TOPIC")
-    client = mqtt.Client(CallbackAPIVersion.VERSION2)
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
     if parts.username:
         client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
     refused: list[str] = []
