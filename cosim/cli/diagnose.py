@@ -28,6 +28,14 @@ def diagnose_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
     workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LAW",
+            help="Leave an effect out of the catalogue: does data that has it then end with a "
+            "wrong name, or as it should with 'unexplained'? Repeatable.",
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON value to stdout.")
     ] = False,
@@ -46,13 +54,14 @@ def diagnose_command(
     result = diagnose(
         problem, folder,
         lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
-        workers=workers,
+        workers=workers, without=without or (),
     )  # fmt: skip
-    page, table = folder / "report.html", folder / "diagnosis.json"
+    page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
+    result.files += [page, table, models]
     write_page(result, page)
-    result.files += [page, table]
     content = result.to_dict()
     write_text(table, json.dumps(content, indent=2) + "\n")
+    write_text(models, json.dumps(result.table.to_dict(), indent=1) + "\n")
     if as_json:
         print_json(content)
     else:
@@ -65,9 +74,11 @@ def _print(result: Diagnosis) -> None:
 
     console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
-    for effect in result.effects():
+    for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    for hint in result.answer.hints:
+        console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip

@@ -1,0 +1,494 @@
+"""The verdict, a pure function of the table of models, and the facts that its sentence says.
+
+    bad_data         the data cannot be used
+    effect_found     the best set of laws stands up: unused runs want it, each of its laws is there
+                     and is missed if left out, and it leaves noise, or so little that no law does
+    confounded       so does another set that the data do not tell from it
+    nothing_missing  no set stands up, and the declared model leaves noise
+    unexplained      anything else, with the nearest laws as hints; a hint is not a name
+
+Sentence, tables and JSON are written from the same `Verdict`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .facts import Force, Gain, Law, Left, Model, Table
+from .linear import MATERIAL
+from .models import GATE_Z, LEVEL
+from .whiteness import structured
+
+TENTH = 0.1
+"""An order of magnitude, of RMS: that is what the tables show."""
+HALF = 0.5
+"""Share of what is left from which a free force at a port explains most of it: then something that
+acts there is still missing."""
+SAME = 2e-4
+"""Share of what a law explains by which the same law elsewhere may do worse: fits end that far from
+the minimum that both have in common."""
+HAIR = 0.005
+"""The same for its special case, where nothing that it has beyond that is determined: fits of laws
+that stick end that far from their minima."""
+HINTS, LEAST = 3, 0.01
+"""Nearest sets that are listed, and the share of the excess that a hint must explain: what does not
+show in the percentage that is printed helps nobody."""
+
+
+def gate(candidates: int) -> float:
+    """Log likelihood that unused runs must gain where there were so many candidates [nats].
+
+    The likelihood ratio of two fixed models has mean 1 if the simpler one is true, so for any of
+    N candidates it exceeds N / LEVEL with at most the probability LEVEL (Markov).
+    """
+    return math.log(max(candidates, 1) / LEVEL)
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A set of laws near the data that cannot be named.
+
+    Attributes:
+        laws: with the strengths that they would take.
+        explained: share of what the declared model leaves beyond noise.
+        left: the channel that stays farthest above its noise, None if none does, or not known.
+        why: why it is no name.
+        rough: told by a first order alone.
+    """
+
+    laws: tuple[Law, ...]
+    explained: float
+    left: Left | None
+    why: tuple[str, ...]
+    rough: bool = False
+
+    def __str__(self) -> str:
+        sizes = ", ".join(f"{law.label} ({_size(law)})" for law in self.laws)
+        text = f"{sizes} would explain {100.0 * self.explained:.3g} %"
+        if self.rough:
+            text += " to first order"
+        if self.left is not None:
+            text += f" and leave {self.left.channel} at {self.left.rms:.3g} times its noise"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the JSON."""
+        return {
+            "effects": [
+                {"effect": law.effect, "component": law.component, "port": law.port,
+                 "place": law.place, "parameters": parameters(law)}
+                for law in self.laws
+            ],
+            "explained": self.explained,
+            "left": None if self.left is None else {
+                "channel": self.left.channel, "purpose": self.left.purpose,
+                "times_noise": self.left.rms,
+            },
+            "why": list(self.why),
+            "first_order": self.rough,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict and what it says.
+
+    Attributes:
+        kind: effect_found, nothing_missing, confounded, unexplained or bad_data.
+        model: place of the named set in the table, else that of the declared model (0).
+        laws: named ones.
+        explained: share of what the declared model leaves beyond noise that the named set explains.
+        shares: law -> share of the excess that the model without it leaves.
+        rivals: sets that explain the data as well, by their places in the table, with their log
+            likelihood over that of the named set [nats].
+        others: laws of these that the named set has not, by rival.
+        places: named law -> other places (or laws) with which it would do the same.
+        left: channels above their noise, worst first.
+        hints: nearest sets, of `unexplained`.
+        force: the free force that explains most of the rest.
+        unused: whether there were unused runs.
+        errors, ended: see `Table`.
+    """
+
+    kind: str
+    model: int = 0
+    laws: tuple[Law, ...] = ()
+    explained: float = 0.0
+    shares: dict[str, float] = field(default_factory=dict)
+    rivals: tuple[tuple[int, float], ...] = ()
+    others: tuple[tuple[str, ...], ...] = ()
+    places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    left: tuple[Left, ...] = ()
+    hints: tuple[Hint, ...] = ()
+    force: Force | None = None
+    unused: bool = True
+    errors: tuple[str, ...] = ()
+    ended: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Two or three sentences."""
+        if self.kind == "bad_data":
+            return "; ".join(self.errors)
+        names = " and ".join(law.label for law in self.laws)
+        tail = f" More than noise is left in {_over(self.left)}." if self.left else ""
+        if self.kind == "effect_found":
+            text = (
+                f"{names} explains {_percent(self.explained)} of what the declared model leaves "
+                "beyond noise. The gain holds on runs that were not used for fitting, and no other "
+                "effect of the catalogue does as well."
+            )
+            return text + tail + self._ended()
+        if self.kind == "confounded":
+            others = ", ".join(" and ".join(labels) for labels in self.others)
+            return f"{names} explains the data, but so does {others}.{tail}{self._ended()}"
+        if self.kind == "nothing_missing":
+            return (
+                "The calibrated model leaves noise in all channels, and no effect of the catalogue "
+                "does better on runs that were not used for fitting."
+                if self.unused
+                else "The calibrated model leaves noise in all channels; no run was kept to judge "
+                "effects by."
+            )
+        text = f"{tail.strip()} No effect of the catalogue can be named".strip()
+        text += "." if self.unused else ": no run was kept unused to judge by."
+        if self.hints:
+            text += f" Nearest, but no name, since {self.hints[0].why[0]}: {self.hints[0]}."
+        if self.force is not None:
+            text += (
+                f" A free force at {self.force.label} would explain "
+                f"{_percent(self.force.explained)} of the rest of the worst run."
+            )
+        return text + self._ended()
+
+    def _ended(self) -> str:
+        if not self.ended:
+            return ""
+        until = ", ".join(f"{name} up to {time:.1f} s" for name, time in self.ended)
+        return (
+            f" Further effects were looked for in {until} only: after that, changes of the start "
+            "values that nobody can see decide what the model does."
+        )
+
+    def effects(self) -> list[dict[str, Any]]:
+        """The named laws, as in the JSON and in the tables."""
+        return [
+            {
+                "effect": law.effect,
+                "component": law.component,
+                "port": law.port,
+                "place": law.place,
+                "text": law.text,
+                "parameters": parameters(law),
+                "p_value": law.p_value,
+                "explained": self.shares[law.label],
+                "gain_nats": law.missed.fitted if law.missed else None,
+                "validation_gain_nats": law.missed.unused if law.missed else None,
+                "other_places": list(self.places.get(law.label, ())),
+            }
+            for law in self.laws
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its part of the JSON."""
+        return {
+            "verdict": self.kind,
+            "reason": self.reason,
+            "effects": self.effects(),
+            "alternatives": [
+                {"effects": list(labels), "score": score}
+                for labels, (_, score) in zip(self.others, self.rivals, strict=True)
+            ],
+            "hints": [hint.to_dict() for hint in self.hints],
+        }
+
+
+def parameters(law: Law) -> dict[str, dict[str, Any]]:
+    """A law's parameters, as in the JSON."""
+    return {
+        v.name: {"value": v.value, "ci95": [v.low, v.high], "unit": v.unit,
+                 "identifiable": v.identifiable}
+        for v in law.values
+    }  # fmt: skip
+
+
+def decide(table: Table) -> Verdict:
+    """The verdict on a table."""
+    if table.errors:
+        return Verdict("bad_data", errors=table.errors)
+    declared, unused = table.models[0], table.unused_count > 0
+    best = proposal(table)
+    if best is not None and stands(table, best):
+        return _named(table, best)
+    left = above(declared)
+    if best is None and not left:
+        return Verdict("nothing_missing", unused=unused, ended=table.ended)
+    force = declared.forces[0] if declared.forces else None
+    return Verdict("unexplained", left=left, hints=_hints(table), force=force, unused=unused,
+                   ended=table.ended)  # fmt: skip
+
+
+def proposal(table: Table) -> int | None:
+    """The best set of those that unused runs want and whose laws are all there and missed.
+
+    A law whose other parameters show nothing gives way to its special case.
+    """
+    able = [i for i, model in enumerate(table.models) if not doubts(table, model)]
+    if not able:
+        return None
+    best = max(able, key=lambda i: (table.models[i].score, -i))
+    while (simple := _special(table, best, able)) is not None:
+        best = simple
+    alike = [i for i in able if i == best or not _apart(table, best, i)]
+    one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
+    return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score, i))
+
+
+def doubts(table: Table, model: Model) -> list[str]:
+    """Why a set cannot be named whatever it leaves; nothing for one that can."""
+    if not model.laws:
+        return ["it is the declared model"]
+    found = []
+    if model.rough:
+        found.append("it was not worth a fit")
+    elif not table.unused_count:
+        found.append("no run was kept unused to judge by")
+    elif not wanted(model.gain, table.candidates):
+        gain = model.gain.unused if model.gain is not None else 0.0
+        found.append(
+            f"unused runs do not want it ({gain:.3g} nats where "
+            f"{gate(table.candidates):.3g} by {GATE_Z:g} standard deviations count)"
+        )
+    for law in model.laws:
+        if not law.there:
+            edge = max(law.absent, law.size.minimum)
+            found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
+        if model.rough or not table.unused_count:
+            continue
+        if not wanted(law.missed, table.candidates):
+            found.append(f"unused runs do not miss {law.label} if it is left out")
+        elif law.missed is not None and law.missed.change <= MATERIAL:
+            found.append(f"{law.label} changes no channel by {MATERIAL:g} of its noise")
+    return list(dict.fromkeys(found))
+
+
+def wanted(gain: Gain | None, candidates: int) -> bool:
+    """Whether unused runs want the better one of two models, and fitted runs do not speak against.
+
+    Args:
+        gain: of one over the other.
+        candidates: number of laws that there were to choose from.
+    """
+    return (
+        gain is not None
+        and gain.unused > gate(candidates)
+        and gain.unused_z > GATE_Z
+        and gain.fitted > 0.0
+    )
+
+
+def above(model: Model) -> tuple[Left, ...]:
+    """Channels that a model leaves above their noise, the worst first."""
+    return tuple(
+        sorted((x for x in model.left if structured(x.lasting, x.p_value)), key=lambda x: -x.rms)
+    )
+
+
+def stands(table: Table, place: int) -> bool:
+    """Whether what a set leaves is noise, or nothing that another law could explain.
+
+    That is: its RMS is a tenth of what was explained, and no free force explains half of it.
+    """
+    model = table.models[place]
+    if not above(model):
+        return True
+    if not model.forces or any(force.explained >= HALF for force in model.forces):
+        return False
+    left = _excess(table, model)
+    return left <= TENTH**2 * (_excess(table, table.models[0]) - left)
+
+
+def _excess(table: Table, model: Model) -> float:
+    """Sum of squares over sigma beyond what noise has, on all runs."""
+    return -2.0 * (model.fitted + model.unused) - table.fitted_count - table.unused_count
+
+
+def _explained(table: Table, model: Model, less: Model) -> float:
+    """Share of what a model leaves beyond noise that another one takes away."""
+    excess = _excess(table, less)
+    if model.rough:  # of unused runs a first order says nothing
+        excess = -2.0 * less.fitted - table.fitted_count
+    taken = 2.0 * (model.fitted + model.unused - less.fitted - less.unused)
+    return min(max(taken / excess, 0.0), 1.0) if excess > 0.0 else 0.0
+
+
+def _size_of(model: Model) -> tuple[int, int, int]:
+    """How simple a set is."""
+    return len(model.laws), sum(law.own for law in model.laws), model.free
+
+
+def _apart(table: Table, first: int, second: int) -> bool:
+    """Whether the data tell two models apart; those that were not compared are."""
+    if first == second:
+        return False
+    for c in table.comparisons:
+        if {c.first, c.second} == {first, second}:
+            need = gate(table.candidates)
+            told = any(
+                abs(nats) > need and abs(z) > GATE_Z
+                for nats, z in ((c.gain.fitted, c.gain.fitted_z), (c.gain.unused, c.gain.unused_z))
+            )
+            return told and not _elsewhere(table, first, second)
+    return True
+
+
+def _differ(first: Model, second: Model) -> tuple[list[Law], list[Law]]:
+    """Laws that only one of two sets has."""
+    return (
+        [law for law in first.laws if law.label not in second.labels],
+        [law for law in second.laws if law.label not in first.labels],
+    )
+
+
+def _elsewhere(table: Table, first: int, second: int) -> bool:
+    """Whether two sets differ by the place of one law and are equal but for a hair."""
+    one, two = table.models[first], table.models[second]
+    mine, other = _differ(one, two)
+    if len(mine) != 1 or len(other) != 1 or mine[0].effect != other[0].effect:
+        return False
+    gain = mine[0].missed or one.gain
+    most = abs(gain.fitted + gain.unused) if gain is not None else 0.0
+    return abs(one.fitted + one.unused - two.fitted - two.unused) < SAME * most
+
+
+def _kin(one: Law, two: Law) -> bool:
+    """Whether one of two laws may be the other's special case: it has fewer parameters.
+
+    And it is of the same quantity or at the same place; places where they do the same are one.
+    """
+    near = one.place in _places(two) or two.place in _places(one)
+    return one.own != two.own and (one.strength == two.strength or near)
+
+
+def _places(law: Law) -> set[str]:
+    return {law.place, *(label.partition(" at ")[2] for label in law.twins)}
+
+
+def _one_answer(first: Model, second: Model) -> bool:
+    """Whether two sets differ by one law alone, and one has the other's law or its special case."""
+    mine, other = _differ(first, second)
+    if len(mine) != 1 or len(other) != 1:
+        return False
+    return mine[0].effect == other[0].effect or _kin(mine[0], other[0])
+
+
+def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
+    """A set with the special case of a law of which nothing else is determined, if it does as well.
+
+    A bristle that gives way by nothing is dry friction.
+    """
+    model, declared = table.models[place], table.models[0]
+    least = (1.0 - HAIR) * (model.fitted + model.unused - declared.fitted - declared.unused)
+    found = []
+    for i in able:
+        mine, other = _differ(model, table.models[i])
+        if len(mine) != 1 or len(other) != 1:
+            continue
+        general, simple = mine[0], other[0]
+        further = [v for v in general.values if v.name != general.strength]
+        if (
+            further and not any(v.determined for v in further)
+            and simple.place == general.place and simple.strength == general.strength
+            and simple.own < general.own
+            and table.models[i].fitted + table.models[i].unused
+            - declared.fitted - declared.unused >= least
+        ):  # fmt: skip
+            found.append(i)
+    return max(found, key=lambda i: table.models[i].score, default=None)
+
+
+def _named(table: Table, best: int) -> Verdict:
+    """The verdict that names a set, or says what it is confounded with."""
+    model, declared = table.models[best], table.models[0]
+    places: dict[str, list[str]] = {
+        law.label: [t for t in law.twins if t not in _fitted(table)] for law in model.laws
+    }
+    rivals: list[tuple[int, float]] = []
+    others: list[tuple[str, ...]] = []
+    for i, rival in enumerate(table.models):
+        if i == best or not rival.laws or rival.rough or _apart(table, best, i):
+            continue
+        mine, other = _differ(model, rival)
+        if not mine or not other or len(rival.laws) > len(model.laws):
+            continue  # more than is missed
+        if not all(law.there for law in rival.laws):
+            continue  # a smaller set
+        if len(mine) == len(other) == 1 and mine[0].effect == other[0].effect:
+            places[mine[0].label].append(other[0].place)
+        elif not _one_answer(model, rival):
+            rivals.append((i, rival.score - model.score))
+            others.append(tuple(law.label for law in other))
+    order = sorted(range(len(rivals)), key=lambda k: -rivals[k][1])
+    shares = {}
+    for law in model.laws:
+        gain = law.missed
+        beyond = _excess(table, model) + (2.0 * (gain.fitted + gain.unused) if gain else 0.0)
+        taken = 2.0 * (gain.fitted + gain.unused) if gain else 0.0
+        shares[law.label] = min(max(taken / beyond, 0.0), 1.0) if beyond > 0.0 else 0.0
+    return Verdict(
+        "confounded" if rivals else "effect_found",
+        best,
+        model.laws,
+        _explained(table, model, declared),
+        shares,
+        tuple(rivals[k] for k in order),
+        tuple(others[k] for k in order),
+        {label: tuple(found) for label, found in places.items() if found},
+        above(model),
+        force=model.forces[0] if model.forces else None,
+        ended=table.ended,
+    )
+
+
+def _fitted(table: Table) -> set[str]:
+    """Labels of all laws that were fitted."""
+    return {law.label for model in table.models if not model.rough for law in model.laws}
+
+
+def _hints(table: Table) -> tuple[Hint, ...]:
+    """Sets that are nearest to the data, the best first, and why they are no names."""
+    declared, found, seen = table.models[0], [], set()
+    order = sorted(table.models[1:], key=lambda m: (m.rough, -m.score))
+    for model in order:
+        explained = _explained(table, model, declared)
+        if not model.laws or model.labels in seen or explained < LEAST:
+            continue
+        seen.add(model.labels)
+        left = above(model)
+        why = doubts(table, model)
+        if left:
+            why.append(f"it leaves more than noise in {_over(left)}")
+        found.append(
+            Hint(model.laws, explained, left[0] if left else None, tuple(why), model.rough)
+        )
+    return tuple(hint for hint in found if hint.why)[:HINTS]
+
+
+def _over(left: Sequence[Left]) -> str:
+    """Channels above their noise, for people."""
+    worst: dict[str, float] = {}
+    for x in left:
+        worst.setdefault(x.channel, x.rms)
+    return ", ".join(f"{name} ({rms:.3g} times its noise)" for name, rms in worst.items())
+
+
+def _size(law: Law) -> str:
+    value = law.size
+    return f"{value.name} = {value.value:.4g} [{value.low:.4g}, {value.high:.4g}] {value.unit}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
