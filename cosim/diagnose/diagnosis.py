@@ -18,6 +18,7 @@ from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError
 from ..files import atomic
 from ..system.provider import locate
+from .answer import Verdict
 from .bursts import bursts, times
 from .deferred import step_error
 from .exchange import reconsidered
@@ -33,7 +34,7 @@ from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of
 from .unstable import ends
-from .verdict import Verdict, above, decide, proposal
+from .verdict import above, decide, proposal
 from .whiteness import WhitenessTest, whiteness_tests
 
 TURNS = 4

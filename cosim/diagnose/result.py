@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
+from .answer import Verdict
 from .facts import Table
 from .further import Further
 from .localise import Place
 from .models import Fitted
 from .search import Search
-from .verdict import Verdict
 from .whiteness import WhitenessTest
 
 Vector = NDArray[np.float64]
