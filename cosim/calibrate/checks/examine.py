@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
+from .clipped import check_clipped
 from .copies import check_copies
 from .finding import Finding, passed
 from .gaps import check_gaps
@@ -17,7 +18,7 @@ from .smooth import check_smooth
 from .spiking import check_spikes
 from .starts import check_starts
 from .still import check_still
-from .swaps import check_channels, check_inputs
+from .swaps import check_channels, check_inputs, check_runs
 from .times import check_times
 from .wraps import check_wraps
 
@@ -81,12 +82,15 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
         return [Finding("error", "simulation", "", "", f"the model does not run: {error}")]
     found += check_spikes(problem, models)
     found += check_wraps(problem, models)
+    found += check_clipped(problem, models)
     for index in range(len(problem.channels)):
         found += check_scale(problem, models, index)
     swaps = list(check_channels(problem, models, {f.column for f in found if not f.run}))
     # exchanged columns of two sides have the other sign where the sides move against each other
     pairs = {name for f in swaps for name in f.column.split(" and ")}
     found = [f for f in found if f.run or f.column not in pairs] + swaps
+    if not found:
+        found += check_runs(problem, models)
     found += check_lags(problem, models, evident)
     found += check_inputs(simulator, models, theta)
     if not any(f.severity == "error" for f in found):

@@ -1,4 +1,4 @@
-"""Columns that are exchanged: of two channels, or of two inputs."""
+"""Columns that are exchanged: of two channels, of two inputs, or of two runs."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ...errors import CosimError
 from ..parts import MeasuredRun
 from .finding import Finding
 from .scale import FOLLOWS
+from .times import SHORT
 
 if TYPE_CHECKING:
     from ..problem import Problem
@@ -71,6 +72,42 @@ def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> 
             if abs(correlation) > FOLLOWS:
                 signs.append(correlation)
     return sum(c < 0.0 for c in signs) > 0.5 * max(len(signs), 1)
+
+
+def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
+    """Columns that follow their signal in another run and not in their own.
+
+    All other columns of the run must follow it: no law that a model lacks makes one column of a run
+    what it is in another one (a correlation beyond `FOLLOWS` over hundreds of samples is not of
+    chance), and a column that comes from elsewhere does not move what the others show.
+    """
+    for run in problem.runs:
+        own = [_follows(run, models[run.name], i) for i in range(len(problem.channels))]
+        for index, channel in enumerate(problem.channels):
+            others = [c for i, c in enumerate(own) if i != index and c is not None]
+            mine = own[index]
+            if mine is None or mine > FOLLOWS or any(c < FOLLOWS for c in others):
+                continue
+            for other in problem.runs:
+                there = _follows(run, models[other.name], index)
+                if other is run or there is None or there < FOLLOWS or not others:
+                    continue
+                text = (
+                    f"follows {channel.signal} as it is in run {other.name}, and not as it is in "
+                    "this one, which its other columns follow: the column of another run"
+                )
+                yield Finding("error", "mixed", run.name, channel.name, text)
+
+
+def _follows(run: MeasuredRun, model: Vector, index: int) -> float | None:
+    """Correlation of a column with its signal in a run, None where one of them does not move."""
+    size = min(len(model), len(run.data))
+    measured, simulated = run.data[:size, index], model[:size, index]
+    good = np.isfinite(measured) & np.isfinite(simulated)
+    measured, simulated = measured[good], simulated[good]
+    if measured.size < SHORT or np.std(measured) == 0.0 or np.std(simulated) == 0.0:
+        return None
+    return float(np.corrcoef(measured, simulated)[0, 1])
 
 
 def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: int) -> float:
