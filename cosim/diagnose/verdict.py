@@ -88,10 +88,10 @@ def doubts(table: Table, model: Model) -> list[str]:
     elif not table.unused_count:
         found.append("no run was kept unused to judge by")
     elif not wanted(model.gain, table.candidates):
-        gain = model.gain.unused if model.gain is not None else 0.0
+        gain, z = (model.gain.unused, model.gain.unused_z) if model.gain else (0.0, 0.0)
         found.append(
-            f"unused runs do not want it ({gain:.3g} nats where "
-            f"{gate(table.candidates):.3g} by {GATE_Z:g} standard deviations count)"
+            f"unused runs do not want it ({gain:.3g} nats by {z:.2g} standard deviations; "
+            f"{gate(table.candidates):.3g} by {GATE_Z:g} are needed)"
         )
     for law in model.laws:
         if not law.there:
@@ -99,9 +99,12 @@ def doubts(table: Table, model: Model) -> list[str]:
             found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
         if model.rough or not table.unused_count:
             continue
-        if not wanted(law.missed, table.candidates):
-            found.append(f"unused runs do not miss {law.label} if it is left out")
-        elif law.missed is not None and law.missed.change <= MATERIAL:
+        if law.missed is None:
+            found.append(f"what it is without {law.label} was not asked")
+        elif not wanted(law.missed, table.candidates):
+            if len(model.laws) > 1:
+                found.append(f"unused runs do not miss {law.label} if it is left out")
+        elif law.missed.change <= MATERIAL:
             found.append(f"{law.label} changes no channel by {MATERIAL:g} of its noise")
     return list(dict.fromkeys(found))
 
@@ -199,25 +202,25 @@ def _elsewhere(table: Table, first: int, second: int) -> bool:
     return abs(one.fitted + one.unused - two.fitted - two.unused) < SAME * most
 
 
-def _kin(one: Law, two: Law) -> bool:
-    """Whether one of two laws may be the other's special case: it has fewer parameters.
-
-    And it is of the same quantity or at the same place; places where they do the same are one.
-    """
-    near = one.place in _places(two) or two.place in _places(one)
-    return one.own != two.own and (one.strength == two.strength or near)
-
-
 def _places(law: Law) -> set[str]:
     return {law.place, *(label.partition(" at ")[2] for label in law.twins)}
 
 
 def _one_answer(first: Model, second: Model) -> bool:
-    """Whether two sets differ by one law alone, and one has the other's law or its special case."""
+    """Whether two sets differ by one law alone, and one has the other's, or a special case of it.
+
+    That is a law of the same quantity with fewer parameters, or one at the same place of which
+    fewer were fitted or chosen; places where two laws do the same are one.
+    """
     mine, other = _differ(first, second)
     if len(mine) != 1 or len(other) != 1:
         return False
-    return mine[0].effect == other[0].effect or _kin(mine[0], other[0])
+    one, two = mine[0], other[0]
+    if one.effect == two.effect:
+        return True
+    near = one.place in _places(two) or two.place in _places(one)
+    same = one.strength == two.strength
+    return (same and one.own != two.own) or (near and first.free != second.free)
 
 
 def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
@@ -296,8 +299,11 @@ def _fitted(table: Table) -> set[str]:
 def _hints(table: Table) -> tuple[Hint, ...]:
     """Sets that are nearest to the data, the best first, and why they are no names."""
     declared, found, seen = table.models[0], [], set()
-    order = sorted(table.models[1:], key=lambda m: (m.rough, -m.score))
-    for model in order:
+
+    def order(model: Model) -> tuple[bool, bool, float]:
+        return model.rough, not all(law.there for law in model.laws), -model.score
+
+    for model in sorted(table.models[1:], key=order):
         explained = _explained(table, model, declared)
         if not model.laws or model.labels in seen or explained < LEAST:
             continue

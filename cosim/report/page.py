@@ -64,6 +64,7 @@ def page(result: Diagnosis) -> str:
         f"{escape(result.reason)}</div>",
         *(f"<p class='over'>{escape(text)}</p>" for text in result.warnings),
         _effects(table["effects"]),
+        _hints(table["hints"]),
         _errors(result, table),
         _further(table["further_runs"]),
         _parameters(table["parameters"]),
@@ -125,6 +126,37 @@ def _effects(effects: list[dict[str, Any]]) -> str:
             f"</p>{_table(['parameter', 'value', '95 % interval', 'unit'], rows)}{where}"
         )  # fmt: skip
     return "<h2>What was found</h2>" + "".join(parts) if parts else ""
+
+
+def _hints(hints: list[dict[str, Any]]) -> str:
+    """Nearest laws of an unexplained residual: what they would take, and why they are no names."""
+    rows = []
+    for item in hints:
+        laws = [
+            f"{law['effect']} at {law['place']}: "
+            + ", ".join(
+                f"{name} = {_number(v['value'])} ({_interval(v)}) {v['unit']}"
+                for name, v in law["parameters"].items()
+            )
+            for law in item["effects"]
+        ]
+        left = item["left"]
+        stays = f"{left['channel']} {left['times_noise']:.3g}×" if left else "–"
+        share = f"{100 * item['explained']:.3g} %" + (" *" if item["first_order"] else "")
+        rows.append(
+            [_td("; ".join(laws), "text"), _td(share), _td(stays),
+             _td("; ".join(item["why"]), "text")]
+        )  # fmt: skip
+    if not rows:
+        return ""
+    note = "<p class='note'>* to first order, not fitted</p>"
+    return (
+        "<h2>Hints</h2><p>The nearest laws of the catalogue, fitted with all parameters: what each "
+        "would explain of what the declared model leaves beyond noise, which channel would stay "
+        "farthest above its noise, and why it is not named.</p>"
+        + _table(["laws", "explained", "stays", "no name, since"], rows)
+        + (note if any(item["first_order"] for item in hints) else "")
+    )
 
 
 def _ratio(value: float | None, noise: float) -> str:

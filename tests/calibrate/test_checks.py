@@ -365,16 +365,23 @@ def test_a_column_that_ends_at_a_limit_which_the_model_goes_beyond(made, model, 
     assert all("limit = 1.999998 " in f.text for f in found)
 
 
-def test_a_column_of_another_run(noisy) -> None:
+@pytest.mark.parametrize("both", [True, False])
+def test_a_column_of_another_run(noisy, both: bool) -> None:
+    """Exchanged between two runs, or taken from one that keeps it."""
     problem = noisy(0)
     column = [c.name for c in problem.channels].index("current")
     data = {run.name: run.data.copy() for run in problem.runs}
-    data["stairs"][:, column] = data["sines"][:, column]
-    found = [f for f in findings(problem.with_data(data)) if f.severity == "error"]
-    assert [(f.kind, f.run, f.column) for f in found] == [("mixed", "stairs", "current")]
-    assert "as it is in run sines" in found[0].text
-    # all columns of another run: no column has come alone
-    data["stairs"] = data["sines"] + 1e-3 * np.random.default_rng(1).normal(
-        size=data["sines"].shape
-    )
-    assert "mixed" not in {f.kind for f in findings(problem.with_data(data))}
+    data["stairs"][:, column] = problem.run("sines").data[:, column]
+    if both:
+        data["sines"][:, column] = problem.run("stairs").data[:, column]
+    found = [f for f in examine(simulator(problem.with_data(data))) if f.severity == "error"]
+    expected = ("swapped", "sines") if both else ("mixed", "stairs")
+    assert [(f.kind, f.run, f.column) for f in found] == [(*expected, "current")]
+    assert ("run stairs" if both else "that of run sines") in found[0].text
+
+
+def test_a_motion_that_comes_again_has_noise_of_its_own(noisy) -> None:
+    first, second = noisy(0), noisy(1)
+    data = {**{r.name: r.data for r in first.runs}, "check": second.run("sines").data}
+    found = findings(first.with_data(data))
+    assert not {f.kind for f in found} & {"mixed", "copy"}

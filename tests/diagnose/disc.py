@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 Law = Callable[[float, float, float], float]
 J, B = 0.02, 0.03
-INTERVAL, SPLIT = 0.01, 10
+INTERVAL, SPLIT = 0.01, 20
 """Of the log [s]; steps of the plant in it: its error is then far below the noise."""
 SIGMA = {"w": 0.02, "theta": 0.002}
 MAPPING = """
 rig = "disc"
 system = "system.toml"
-step = 0.01
+step = 0.005
 algorithm = "gauss_seidel"
 
 [columns]

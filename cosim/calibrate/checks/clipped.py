@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .finding import Finding
-from .smooth import ENOUGH, FALLS, ORDER, roughness
+from .smooth import noise
 from .times import SHORT
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
     """
     for index, channel in enumerate(problem.channels):
         columns = {run.name: run.data[:, index] for run in problem.runs}
-        sigma = _noise([v[np.isfinite(v)] for v in columns.values()])
+        sigma = noise(list(columns.values()))
         if sigma is None:
             continue
         for side, word in ((1.0, "largest"), (-1.0, "smallest")):
@@ -58,23 +58,3 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
                 f"limit = {(1.0 - 1e-6) * abs(edge):.7g} in [columns]"
             )
             yield Finding("error", "clipped", "", channel.name, text)
-
-
-def _noise(columns: list[Vector]) -> float | None:
-    """Deviation of a column's white noise, None if it has none, or none finer than its resolution.
-
-    Noise that falls towards half the sample rate is motion or a filter (`smooth.FALLS`).
-    """
-    sizes, falls, steps = [], [], []
-    for values in columns:
-        if values.size <= ENOUGH:
-            continue
-        own, twice = roughness(values, ORDER), roughness(values, 2 * ORDER)
-        if own > 0.0:
-            sizes.append(own)
-            falls.append(twice / own)
-            moves = np.abs(np.diff(values))
-            steps.append(float(np.min(moves[moves > 0.0])))
-    if not sizes or float(np.median(falls)) < FALLS or min(steps) > float(np.median(sizes)):
-        return None
-    return float(np.median(sizes))

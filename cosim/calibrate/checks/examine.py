@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...errors import CosimError
 from .clipped import check_clipped
-from .copies import check_copies
+from .copies import check_columns, check_copies
 from .finding import Finding, passed
 from .gaps import check_gaps
 from .lags import check_lags
@@ -55,7 +55,7 @@ def check_data(problem: Problem) -> list[Finding]:
     found = list(problem.source.findings)
     if not problem.chosen("identification"):
         found.append(Finding("error", "purpose", "", "", "no run is for identification"))
-    for check in (check_times, check_still, check_gaps, check_copies, check_smooth):
+    for check in (check_times, check_still, check_gaps, check_copies, check_columns, check_smooth):
         found += check(problem)
     return found
 

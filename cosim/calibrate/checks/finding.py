@@ -25,7 +25,7 @@ KINDS = {
     "gaps": "cells without a number",
     "held": "a column whose values stand for several samples each",
     "jitter": "sample times that are not even",
-    "mixed": "a column that belongs to another run",
+    "mixed": "a column that two runs have in common",
     "noise": "a column with more noise than it is said to have",
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",

@@ -13,7 +13,6 @@ from ...errors import CosimError
 from ..parts import MeasuredRun
 from .finding import Finding
 from .scale import FOLLOWS
-from .times import SHORT
 
 if TYPE_CHECKING:
     from ..problem import Problem
@@ -75,39 +74,39 @@ def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> 
 
 
 def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
-    """Columns that follow their signal in another run and not in their own.
+    """Columns that two runs have exchanged: each fits the other's signal ten times better.
 
-    All other columns of the run must follow it: no law that a model lacks makes one column of a run
-    what it is in another one (a correlation beyond `FOLLOWS` over hundreds of samples is not of
-    chance), and a column that comes from elsewhere does not move what the others show.
+    As for two channels, over all samples; no other column of the two runs does.
     """
-    for run in problem.runs:
-        own = [_follows(run, models[run.name], i) for i in range(len(problem.channels))]
-        for index, channel in enumerate(problem.channels):
-            others = [c for i, c in enumerate(own) if i != index and c is not None]
-            mine = own[index]
-            if mine is None or mine > FOLLOWS or any(c < FOLLOWS for c in others):
-                continue
-            for other in problem.runs:
-                there = _follows(run, models[other.name], index)
-                if other is run or there is None or there < FOLLOWS or not others:
-                    continue
-                text = (
-                    f"follows {channel.signal} as it is in run {other.name}, and not as it is in "
-                    "this one, which its other columns follow: the column of another run"
-                )
-                yield Finding("error", "mixed", run.name, channel.name, text)
+    every = range(len(problem.channels))
+    for a, first in enumerate(problem.runs):
+        for second in problem.runs[a + 1 :]:
+            straight = [_between(problem, models, first, first, second, i) for i in every]
+            crossed = [
+                _between(problem, models, second, first, second, i) < 0.1 * straight[i]
+                for i in every
+            ]
+            if sum(crossed) != 1 or len(crossed) < 2:
+                continue  # none, or whole runs
+            channel = problem.channels[crossed.index(True)]
+            text = (
+                f"and run {second.name}: each follows {channel.signal} as it is in the other one, "
+                "and no other column does: exchanged between the runs"
+            )
+            yield Finding("error", "swapped", first.name, channel.name, text)
 
 
-def _follows(run: MeasuredRun, model: Vector, index: int) -> float | None:
-    """Correlation of a column with its signal in a run, None where one of them does not move."""
-    size = min(len(model), len(run.data))
-    measured, simulated = run.data[:size, index], model[:size, index]
-    good = np.isfinite(measured) & np.isfinite(simulated)
-    measured, simulated = measured[good], simulated[good]
-    if measured.size < SHORT or np.std(measured) == 0.0 or np.std(simulated) == 0.0:
-        return None
-    return float(np.corrcoef(measured, simulated)[0, 1])
+def _between(
+    problem: Problem, models: Mapping[str, Vector], model: MeasuredRun, first: MeasuredRun,
+    second: MeasuredRun, index: int,
+) -> float:  # fmt: skip
+    """Misfit of a column of two runs: that of the first against a model, and the other's."""
+    size = min(len(first.data), len(second.data))
+    total = 0.0
+    for run, other in ((first, model), (second, first if model is second else second)):
+        apart = run.data[:size, index] - models[other.name][:size, index]
+        total += float(np.nansum((apart / problem.channels[index].sigma) ** 2))
+    return total
 
 
 def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: int) -> float:
