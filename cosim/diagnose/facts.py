@@ -8,6 +8,7 @@ from __future__ import annotations
 import types
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import cache
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 
@@ -234,11 +235,17 @@ class Table:
         return found
 
 
+@cache
+def _kinds(kind: type) -> tuple[tuple[str, Any], ...]:
+    """Names and kinds of a dataclass's fields."""
+    known = get_type_hints(kind)
+    return tuple((f.name, known[f.name]) for f in fields(kind))
+
+
 def _made(kind: Any, content: Any) -> Any:
     """A value of a kind from what JSON keeps of it."""
     if is_dataclass(kind) and isinstance(kind, type):
-        kinds = get_type_hints(kind)
-        return kind(**{f.name: _made(kinds[f.name], content[f.name]) for f in fields(kind)})
+        return kind(**{name: _made(of, content[name]) for name, of in _kinds(kind)})
     if get_origin(kind) in (Union, types.UnionType):
         if content is None:
             return None

@@ -189,7 +189,7 @@ def test_the_verdict_does_not_hang_on_the_order_of_the_table(
 def test_a_table_that_was_written_and_read_has_the_same_verdict(
     tables: list[tuple[Table, Verdict]],
 ) -> None:
-    for one, verdict in tables:
+    for one, verdict in tables[:100]:
         again = Table.read(json.loads(json.dumps(one.to_dict(), allow_nan=False)))
         assert again == one and decide(again) == verdict
 
