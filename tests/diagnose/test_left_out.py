@@ -28,7 +28,6 @@ LAWS: dict[str, disc.Law] = {
     "drag": lambda w, theta, t: 2e-3 * w * abs(w),
     "unbalance": lambda w, theta, t: 0.1 * math.sin(theta + 0.5),
     "teeth": lambda w, theta, t: 0.05 * math.sin(14.0 * theta + 0.5),
-    "pulses": lambda w, theta, t: 0.15 * (math.sin(9.0 * t) > 0.9),
 }
 
 
@@ -76,7 +75,6 @@ def test_a_disc_that_lacks_nothing_has_no_name_whatever_is_left_out(diagnosed: P
         ("drag", ("quadratic_drag",)),
         ("unbalance", ("unbalance", "cogging", "harmonic_ripple")),
         pytest.param("teeth", ("cogging", "harmonic_ripple"), marks=pytest.mark.slow),
-        pytest.param("pulses", (), marks=pytest.mark.slow),
     ],
 )
 def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
