@@ -118,11 +118,12 @@ class Verdict:
         text = f"{tail.strip()} No effect of the catalogue can be named".strip()
         text += "." if self.unused else ": no run was kept unused to judge by."
         if self.hints:
-            text += f" Nearest, but no name, since {self.hints[0].why[0]}: {self.hints[0]}."
+            text += f" Nearest, but no name: {self.hints[0]}"
+            text += "." if self.hints[0].left else f"; {self.hints[0].why[0]}."
         if self.force is not None:
             text += (
                 f" A free force at {self.force.label} would explain "
-                f"{percent(self.force.explained)} of the rest of the worst run."
+                f"{percent(self.force.explained)} of it in the worst run."
             )
         return text + self._ended()
 

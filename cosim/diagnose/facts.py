@@ -65,6 +65,7 @@ class Law:
         absent: see there.
         values: its fitted parameters, the strength among them.
         own: number of its parameters, fitted or held.
+        contains: effects that its law becomes for some values of its parameters.
         twins: labels of laws that do the same to the first order.
         p_value: of its score on identification runs, corrected for the number of candidates.
         missed: what the model is better by than the one without this law; None if not known.
@@ -78,6 +79,7 @@ class Law:
     text: str = ""
     absent: float = 0.0
     own: int = 1
+    contains: tuple[str, ...] = ()
     twins: tuple[str, ...] = ()
     p_value: float | None = None
     missed: Gain | None = None
@@ -165,6 +167,8 @@ class Model:
         left: by channel and purpose.
         gain: over the declared model, None of itself.
         forces: what free forces would explain of the rest, the best first; None if not asked.
+        worst: sum of squares over sigma beyond noise that it leaves in the run in which free forces
+            were tried on the declared model.
         rough: not fitted, a first order from the declared model: it can be a hint alone.
     """
 
@@ -175,6 +179,7 @@ class Model:
     left: tuple[Left, ...]
     gain: Gain | None = None
     forces: tuple[Force, ...] | None = None
+    worst: float = 0.0
     rough: bool = False
 
     @property

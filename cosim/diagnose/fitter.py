@@ -458,12 +458,12 @@ class Fitter(Judge):
         return result
 
     def examined(self, fitted: Fitted, candidates: int) -> Fitted:
-        """The model without effects that unused runs do not miss.
+        """The model without effects that may be absent, or that unused runs do not miss.
 
         What it is without each of the others has been fitted, and is in the memo.
 
         Args:
-            fitted: the model.
+            fitted: the model, with intervals.
             candidates: number of effects that there were to choose from.
         """
         for effect in fitted.effects if len(fitted.effects) > 1 else ():
@@ -471,10 +471,15 @@ class Fitter(Judge):
                 less = self.without(fitted, effect)
             except CosimError as error:  # it is needed
                 self.say(f"without {effect.label}: {error}")
+                self.memo.failed.add(fitted.labels - {effect.label})
                 continue
-            if wanted(self.better(less, fitted), candidates):
+            if self._missed(fitted, effect, candidates):
                 less = self.approached(less, fitted, fitted)
-            if not wanted(self.better(less, fitted), candidates):
+            if not self._missed(fitted, effect, candidates):
                 self.say(f"dropped again: {effect.label}")
-                return self.examined(less, candidates)
+                return self.examined(self.sharpened(less, fitted), candidates)
         return fitted
+
+    def _missed(self, fitted: Fitted, effect: Candidate, candidates: int) -> bool:
+        law = self.law(fitted, effect)
+        return law.there and wanted(law.missed, candidates)

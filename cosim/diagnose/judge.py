@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
-from .facts import Gain
+from .candidates import Candidate
+from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
 from .models import GATE, Fitted, compare, more_general
@@ -72,6 +73,44 @@ class Judge:
         unused = compare(self.check_data, first.check, second.check, self.checking)
         change = max(change, self.checking.largest(second.check - first.check))
         return Gain(fitted.gain, unused.gain, fitted.z, unused.z, change)
+
+    def law(
+        self,
+        fitted: Fitted,
+        candidate: Candidate,
+        twins: tuple[str, ...] = (),
+        p_value: float | None = None,
+    ) -> Law:
+        """An effect of a model as the verdict sees it.
+
+        Args:
+            fitted: the model.
+            candidate: the effect.
+            twins: labels of those with the same signature.
+            p_value: of its score.
+        """
+        problem, estimate, prefix = fitted.problem, fitted.estimate, candidate.prefix
+        own = [(i, p) for i, p in enumerate(problem.parameters) if p.name.startswith(prefix)]
+        strength = next(p for _, p in own if p.strength)
+        values = tuple(
+            Value(
+                p.name.removeprefix(prefix), p.unit, float(estimate.theta[i]),
+                float(estimate.low[i]), float(estimate.high[i]), p.minimum, p.maximum,
+                bool(estimate.identifiable[i]),
+            )
+            for i, p in own
+        )  # fmt: skip
+        names = {n for n in (*problem.names, *problem.constants) if n.startswith(prefix)}
+        rest = fitted.labels - {candidate.label}
+        # a model that cannot be simulated without it misses it as much as all effects together
+        less = self.memo.get(frozenset() if rest in self.memo.failed else rest)
+        return Law(
+            candidate.effect, candidate.instance, candidate.port,
+            strength.name.removeprefix(prefix), values, candidate.text,
+            strength.minimum if strength.inverse else 0.0, len(names), candidate.contains, twins,
+            p_value,
+            None if less is None else self.better(less, fitted),
+        )  # fmt: skip
 
     def count_in_full(self, full: bool = True) -> Problem:
         """Let residuals count in full though runs may turn unstable, or not again."""

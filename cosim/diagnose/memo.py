@@ -19,10 +19,15 @@ Labels = frozenset[str]
 
 
 class Memo:
-    """Fits by their sets of effects, without derivatives."""
+    """Fits by their sets of effects, without derivatives.
+
+    Attributes:
+        failed: sets that cannot be simulated.
+    """
 
     def __init__(self) -> None:
         self._fits: dict[Labels, Fitted] = {}
+        self.failed: set[Labels] = set()
 
     def __iter__(self) -> Iterator[Fitted]:
         return iter(self._fits.values())

@@ -8,14 +8,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import Candidate
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .judge import Judge
 from .linear import SampleStack
-from .localise import Place
+from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
-from .signature import Signature
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -45,20 +43,22 @@ def table_of(
     declared = judge.memo.get(frozenset())
     assert declared is not None
     fits = [declared, *(f for f in judge.memo if f.effects)]
-    scored = {s.candidate: s for stage in reversed(rounds) for s in stage.signatures}
+    same = {s.candidate: s.same for stage in reversed(rounds) for s in stage.signatures}
     chance = {label: p for stage in reversed(rounds) for label, p in stage.corrected.items()}
     unused = judge.unused
+    run = worst(judge, declared, 1)[0].name
     models = []
     for f in fits:
         models.append(
             Model(
-                tuple(_law(judge, f, c, scored.get(c), chance) for c in f.effects),
+                tuple(judge.law(f, c, same.get(c, ()), chance.get(c.label)) for c in f.effects),
                 f.complexity,
                 -judge.fitting.cost(judge.fit_data - f.fit),
                 -judge.checking.cost(judge.check_data - f.check) if unused else 0.0,
                 _left(judge, f),
                 judge.better(declared, f) if f.effects else None,
                 tuple(map(_force, forces[f.labels])) if f.labels in forces else None,
+                _excess(judge, f, run),
             )
         )
     rough = _first_orders(models, rounds) if rounds else []
@@ -77,33 +77,12 @@ def candidates_of(rounds: Sequence[Round]) -> int:
     return max((len(r.signatures) + len(r.aside) for r in rounds), default=0)
 
 
-def _law(
-    judge: Judge,
-    fitted: Fitted,
-    candidate: Candidate,
-    item: Signature | None,
-    chance: dict[str, float],
-) -> Law:
-    problem, estimate, prefix = fitted.problem, fitted.estimate, candidate.prefix
-    own = [(i, p) for i, p in enumerate(problem.parameters) if p.name.startswith(prefix)]
-    strength = next(p for _, p in own if p.strength)
-    values = tuple(
-        Value(
-            p.name.removeprefix(prefix), p.unit, float(estimate.theta[i]), float(estimate.low[i]),
-            float(estimate.high[i]), p.minimum, p.maximum, bool(estimate.identifiable[i]),
-        )
-        for i, p in own
-    )  # fmt: skip
-    names = {n for n in (*problem.names, *problem.constants) if n.startswith(prefix)}
-    rest = frozenset(c.label for c in fitted.effects if c != candidate)
-    less = judge.memo.get(rest)
-    return Law(
-        candidate.effect, candidate.instance, candidate.port,
-        strength.name.removeprefix(prefix), values, candidate.text,
-        strength.minimum if strength.inverse else 0.0, len(names),
-        item.same if item is not None else (), chance.get(candidate.label),
-        None if less is None else judge.better(less, fitted),
-    )  # fmt: skip
+def _excess(judge: Judge, fitted: Fitted, run: str) -> float:
+    """Sum of squares over sigma beyond noise that a model leaves in a run."""
+    rows = judge.fitting.by_run(judge.fit_data - fitted.fit)
+    values = rows[judge.fitting.names.index(run)]
+    values = values[np.isfinite(values)]
+    return float(values @ values) - values.size
 
 
 def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
@@ -112,16 +91,16 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
     if judge.unused:
         parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
     for purpose, stack, residual in parts:
-        worst = _worst(stack, residual)
+        farthest = _farthest(stack, residual)
         for test in whiteness_tests(residual, stack):
-            run, size = worst[test.channel]
+            run, size = farthest[test.channel]
             found.append(
                 Left(test.channel, purpose, test.rms, test.lasting, test.p_value, run, size)
             )
     return tuple(found)
 
 
-def _worst(stack: SampleStack, residual: Vector) -> dict[str, tuple[str, float]]:
+def _farthest(stack: SampleStack, residual: Vector) -> dict[str, tuple[str, float]]:
     """Channel -> run in which its RMS over noise is largest, and that."""
     found: dict[str, tuple[str, float]] = {}
     for run, rows in zip(stack.runs, stack.by_run(residual), strict=True):
@@ -169,7 +148,8 @@ def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:
         )  # fmt: skip
         law = Law(
             item.candidate.effect, item.candidate.instance, item.candidate.port, size.name, (size,),
-            item.candidate.text, p.minimum if p.inverse else 0.0, max(item.probe.own, 1), item.same,
+            item.candidate.text, p.minimum if p.inverse else 0.0, max(item.probe.own, 1),
+            item.candidate.contains, item.same,
             rounds[0].corrected.get(item.candidate.label),
         )  # fmt: skip
         declared = models[0]

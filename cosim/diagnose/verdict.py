@@ -134,15 +134,24 @@ def above(model: Model) -> tuple[Left, ...]:
 def stands(table: Table, place: int) -> bool:
     """Whether what a set leaves is noise, or nothing that another law could explain.
 
-    That is: its RMS is a tenth of what was explained, and no free force explains half of it.
+    That is: its RMS is a tenth of what was explained, no free force at a port would have left less
+    of the declared model's rest, and none explains half of its own.
     """
-    model = table.models[place]
+    model, declared = table.models[place], table.models[0]
     if not above(model):
         return True
     if not model.forces or _most(model.forces).explained >= HALF:
         return False
+    if not declared.forces or _by_force(declared, model) > 0.0:
+        return False
     left = _excess(table, model)
-    return left <= TENTH**2 * (_excess(table, table.models[0]) - left)
+    return left <= TENTH**2 * (_excess(table, declared) - left)
+
+
+def _by_force(declared: Model, model: Model) -> float:
+    """What a model leaves of the worst run more than a free force on the declared one would."""
+    share = _most(declared.forces).explained if declared.forces else 0.0
+    return model.worst - (1.0 - share) * declared.worst
 
 
 def _most(forces: Sequence[Force]) -> Force:
@@ -202,25 +211,13 @@ def _elsewhere(table: Table, first: int, second: int) -> bool:
     return abs(one.fitted + one.unused - two.fitted - two.unused) < SAME * most
 
 
-def _places(law: Law) -> set[str]:
-    return {law.place, *(label.partition(" at ")[2] for label in law.twins)}
-
-
 def _one_answer(first: Model, second: Model) -> bool:
-    """Whether two sets differ by one law alone, and one has the other's, or a special case of it.
-
-    That is a law of the same quantity with fewer parameters, or one at the same place of which
-    fewer were fitted or chosen; places where two laws do the same are one.
-    """
+    """Whether two sets differ by one law, and one has the other's, or a special case of it."""
     mine, other = _differ(first, second)
     if len(mine) != 1 or len(other) != 1:
         return False
     one, two = mine[0], other[0]
-    if one.effect == two.effect:
-        return True
-    near = one.place in _places(two) or two.place in _places(one)
-    same = one.strength == two.strength
-    return (same and one.own != two.own) or (near and first.free != second.free)
+    return one.effect in (two.effect, *two.contains) or two.effect in one.contains
 
 
 def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
@@ -239,8 +236,7 @@ def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
         further = [v for v in general.values if v.name != general.strength]
         if (
             further and not any(v.determined for v in further)
-            and simple.place == general.place and simple.strength == general.strength
-            and simple.own < general.own
+            and simple.place == general.place and simple.effect in general.contains
             and table.models[i].fitted + table.models[i].unused
             - declared.fitted - declared.unused >= least
         ):  # fmt: skip
@@ -312,6 +308,9 @@ def _hints(table: Table) -> tuple[Hint, ...]:
         why = doubts(table, model)
         if left:
             why.append(f"it leaves more than noise in {over(left)}")
+        if left and declared.forces and not model.rough and _by_force(declared, model) > 0.0:
+            force = _most(declared.forces)
+            why.append(f"a free force at {force.label} would explain more of the worst run")
         if left and model.forces and _most(model.forces).explained >= HALF:
             force = _most(model.forces)
             share = percent(force.explained)

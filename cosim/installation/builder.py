@@ -83,6 +83,11 @@ class Builder:
         with naming_errors():
             return list(sources("packaging.catalog").refinements(variant))
 
+    def contained(self, effect: str) -> tuple[str, ...]:
+        """Effects that the law of an effect becomes for some values of its parameters."""
+        with naming_errors():
+            return tuple(sources("packaging.catalog").contained(effect))
+
 
 class Installed:
     """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
@@ -107,6 +112,10 @@ class Installed:
     def refinements(self, variant: str) -> list[dict[str, Any]]:
         """Fidelities of which a variant is the limit, see the protocol `Catalogue`."""
         return Builder().refinements(variant)
+
+    def contained(self, effect: str) -> tuple[str, ...]:
+        """Effects that the law of an effect becomes for some values of its parameters."""
+        return Builder().contained(effect)
 
 
 def default_provider() -> Provider:

@@ -201,9 +201,13 @@ def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
         raise CosimError("unstable")
 
     said: list[str] = []
-    search: Any = SimpleNamespace(without=without, say=said.append)
-    model: Any = SimpleNamespace(effects=(needed, last))
+    memo = SimpleNamespace(failed=set())
+    search: Any = SimpleNamespace(without=without, say=said.append, memo=memo)
+    model: Any = SimpleNamespace(
+        effects=(needed, last), labels=frozenset((needed.label, last.label))
+    )
     assert Search.examined(search, model, 80) is model
+    assert memo.failed == {frozenset({needed.label}), frozenset({last.label})}
     assert said == ["without delay at motor.command: unstable", "without b: unstable"]
 
 

@@ -27,6 +27,8 @@ LAWS: dict[str, disc.Law] = {
     "friction": lambda w, theta, t: 0.08 * math.tanh(w / 0.02),
     "drag": lambda w, theta, t: 2e-3 * w * abs(w),
     "unbalance": lambda w, theta, t: 0.1 * math.sin(theta + 0.5),
+    "both": lambda w, theta, t: 0.08 * math.tanh(w / 0.02) + 0.1 * math.sin(theta + 0.5),
+    "two": lambda w, theta, t: 0.01 * math.tanh(w / 0.02) + 4e-4 * w * abs(w),
     "teeth": lambda w, theta, t: 0.05 * math.sin(14.0 * theta + 0.5),
 }
 

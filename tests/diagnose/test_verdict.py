@@ -23,16 +23,18 @@ TABLES = 500
 
 def law(
     effect: str = "coulomb", place: str = "load.flange", *, value: float = 0.4, half: float = 0.05,
-    gain: float = 500.0, z: float = 20.0, own: int = 1, strength: str = "", change: float = 3.0,
+    gain: float = 500.0, z: float = 20.0, own: int = 1, change: float = 3.0,
     fitted: float = 1000.0, extra: tuple[Value, ...] = (), twins: tuple[str, ...] = (),
+    contains: tuple[str, ...] = (),
 ) -> Law:  # fmt: skip
     """A law whose absence costs unused runs `gain` nats."""
     component, port = place.split(".")
-    name = strength or f"size_of_{effect}"
+    name = f"size_of_{effect}"
     low, high = max(value - half, 0.0), value + half
     size = Value(name, "N.m", value, low, high, 0.0, 10.0, True)
     missed = Gain(fitted, gain, z, z, change)
-    return Law(effect, component, port, name, (size, *extra), own=own, twins=twins, missed=missed)
+    return Law(effect, component, port, name, (size, *extra), own=own, contains=contains,
+               twins=twins, missed=missed)  # fmt: skip
 
 
 def left(rms: float, channel: str = "speed", purpose: str = "validation") -> Left:
@@ -57,7 +59,7 @@ def model(*laws: Law, rms: float = 1.0, force: float | None = None, gain: float 
         min((g.unused_z for g in gains), default=0.0), 3.0,
     ) if laws else None  # fmt: skip
     return Model(laws, 9 + len(laws), -cost, -cost, (left(rms),), better,
-                 None if force is None else (unknown,))  # fmt: skip
+                 None if force is None else (unknown,), 0.2 * COUNT * (rms**2 - 1.0))  # fmt: skip
 
 
 def table(*models: Model, alike: tuple[tuple[int, int], ...] = ()) -> Table:
@@ -85,7 +87,8 @@ def random_table(seed: int) -> Table:
             str(random.choice(EFFECTS)), str(random.choice(PLACES)), value=value,
             half=pick(0.01, 0.1, 0.1, 0.5), gain=pick(6.0, 300.0, 900.0, 9e4),
             z=pick(1.0, 9.0, 9.0, 9.0),
-            own=int(random.integers(1, 4)), strength=str(random.choice(["", "tau_c"])),
+            own=int(random.integers(1, 4)),
+            contains=("coulomb",) if random.random() < 0.3 else (),
             change=pick(0.1, 4.0, 4.0, 4.0), fitted=pick(-5.0, 500.0, 500.0, 500.0),
             extra=extra[: int(random.integers(2))],
         )  # fmt: skip
@@ -284,6 +287,15 @@ def test_what_is_left_must_be_noise_or_little_that_no_force_explains(
         assert any("more than noise in speed" in text for text in hint.why)
 
 
+def test_a_law_must_leave_less_than_a_free_force_would() -> None:
+    """Where it leaves more than noise: a curve with nine knots is no better than a law."""
+    for share, kind in ((0.99, "effect_found"), (0.9999, "unexplained")):
+        far = model(rms=40.0, force=share)
+        found = decide(table(far, model(law(), rms=1.3, force=0.2)))
+        assert found.kind == kind
+    assert "a free force at motor.shaft would explain more" in found.hints[0].why[-1]
+
+
 def test_each_law_of_a_set_must_be_missed() -> None:
     both = model(law(), law("delay", "motor.shaft"))
     assert decide(table(FAR, both)).kind == "effect_found"
@@ -313,7 +325,7 @@ def test_the_same_law_elsewhere_is_another_place_and_no_rival() -> None:
 @pytest.mark.parametrize("more", [0.0, 1.0])
 def test_a_law_and_its_special_case_are_one_answer(more: float) -> None:
     """The simpler one is named, though its likelihood is less by a hair."""
-    simple, general = law(strength="tau_c"), law("bristle", strength="tau_c", own=4)
+    simple, general = law(), law("bristle", own=4, contains=("coulomb",))
     found = decide(table(FAR, model(simple), model(general, gain=more), alike=((1, 2),)))
     assert found.kind == "effect_found" and [x.effect for x in found.laws] == ["coulomb"]
     # told apart by the data, the general one is what is there
@@ -326,8 +338,8 @@ def test_a_law_of_which_only_its_special_case_shows_is_that(known: bool, named: 
     """Though it does a little better: of what is open, something always fits noise."""
     span = (0.9, 1.1) if known else (0.0, 9.0)
     extra = (Value("x_0", "rad", 1.0, *span, 0.0, 9.0, True),)
-    simple = law(strength="tau_c")
-    general = law("bristle", strength="tau_c", own=4, extra=extra)
+    simple = law()
+    general = law("bristle", own=4, contains=("coulomb",), extra=extra)
     found = decide(table(FAR, model(simple), model(general, gain=90.0)))
     assert [x.effect for x in found.laws] == [named]
     much = decide(table(FAR, model(simple, gain=-9000.0), model(general)))
