@@ -19,8 +19,9 @@ from .answer import Hint, Verdict, over, percent
 from .facts import Force, Gain, Law, Left, Model, Table
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
-from .whiteness import structured
+from .whiteness import CALIBRATED, structured
 
+FITTED = "identification"
 TENTH = 0.1
 """An order of magnitude, of RMS: that is what the tables show."""
 HALF = 0.5
@@ -134,18 +135,31 @@ def above(model: Model) -> tuple[Left, ...]:
 def stands(table: Table, place: int) -> bool:
     """Whether what a set leaves is noise, or nothing that another law could explain.
 
-    That is: its RMS is a tenth of what was explained, no free force at a port would have left less
-    of the declared model's rest, and none explains half of its own.
+    That is: its RMS is a tenth of what was explained, and no more in unused runs than in fitted
+    ones; no free force at a port would have left less of the declared model's rest, and none
+    explains half of its own.
     """
     model, declared = table.models[place], table.models[0]
     if not above(model):
         return True
     if not model.forces or _most(model.forces).explained >= HALF:
         return False
-    if not declared.forces or _by_force(declared, model) > 0.0:
+    if not declared.forces or _by_force(declared, model) > 0.0 or not carries_over(model):
         return False
     left = _excess(table, model)
     return left <= TENTH**2 * (_excess(table, declared) - left)
+
+
+def carries_over(model: Model) -> bool:
+    """Whether no channel is farther above its noise in unused runs than in those that were fitted.
+
+    Parameters make the best of a wrong law, but in the runs that they are fitted to alone.
+    """
+    fitted = {x.channel: x.lasting for x in model.left if x.purpose == FITTED}
+    return all(
+        x.lasting <= CALIBRATED * max(fitted.get(x.channel, 1.0), 1.0)
+        for x in above(model) if x.purpose != FITTED
+    )  # fmt: skip
 
 
 def _by_force(declared: Model, model: Model) -> float:
@@ -308,6 +322,8 @@ def _hints(table: Table) -> tuple[Hint, ...]:
         why = doubts(table, model)
         if left:
             why.append(f"it leaves more than noise in {over(left)}")
+        if left and not carries_over(model):
+            why.append("it leaves more in unused runs than in those that were fitted")
         if left and declared.forces and not model.rough and _by_force(declared, model) > 0.0:
             force = _most(declared.forces)
             why.append(f"a free force at {force.label} would explain more of the worst run")
