@@ -13,14 +13,14 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
+from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
 from .answer import Verdict
 from .bursts import bursts, times
-from .deferred import step_error
 from .exchange import reconsidered
 from .experiment import propose
 from .facts import Table
@@ -87,7 +87,7 @@ def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnos
     """The verdict on data that cannot be used."""
     errors = tuple(lines(f for f in findings if f.severity == "error"))
     table = Table(errors=errors)
-    result = Diagnosis(problem, decide(table), table)
+    result = Diagnosis(problem, decide(table), table, findings=findings)
     result.warnings = lines(f for f in findings if f.severity != "error")
     result.wall = time.perf_counter() - begun
     return result
@@ -102,7 +102,7 @@ def _searched(
     begun: float,
 ) -> Diagnosis:
     problem = search.raw
-    result = Diagnosis(problem, Verdict(""), search=search, before=base)
+    result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
@@ -110,7 +110,14 @@ def _searched(
     winners: list[Round] = []
     for number in range(ROUNDS):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(

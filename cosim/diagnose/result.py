@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.checks.finding import Finding
+from ..calibrate.clocks import offsets
 from ..calibrate.problem import Problem
+from .adding import made_of
 from .answer import Verdict
 from .facts import Table
 from .further import Further
@@ -43,6 +46,7 @@ class Diagnosis:
         further: the models on runs that need another system.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
+        findings: on the data.
     """
 
     problem: Problem
@@ -63,6 +67,12 @@ class Diagnosis:
     withheld: tuple[str, ...] = ()
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    def _repr_html_(self) -> str:
+        from .notebook import shown
+
+        return shown(self.to_dict(), self.problem, self.residuals)
 
     @property
     def verdict(self) -> str:
@@ -100,6 +110,8 @@ class Diagnosis:
             "system": self.problem.file.path.stem,
             **self.answer.to_dict(),
             "warnings": self.warnings,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "model": made_of(self.problem, self.after),
             "withheld": list(self.withheld),
             "localisation": [place.to_dict() for place in self.located],
             "power": self.power,
@@ -107,6 +119,7 @@ class Diagnosis:
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
             "start_values": self.start_values(),
             "bursts": self.bursts,
             "unstable_from": self.ended,

@@ -10,7 +10,6 @@ import ctypes as ct
 import hashlib
 import math
 import platform
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...fmu.library import WORK
 from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
@@ -34,7 +34,7 @@ SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.
 _P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
-    "Boolean", "Boolean2",
+    "Boolean", "Boolean2", "Float32Whole",
 )  # fmt: skip
 _TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
 
@@ -48,7 +48,10 @@ class _Call(ct.Structure):
 
 
 class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64), ("modes", _I64))
+    _fields_ = (
+        ("component", _P), ("step", _P), ("work", _P), ("reached", _D), ("warned", _I64),
+        ("modes", _I64),
+    )  # fmt: skip
 
 
 class _Instruction(ct.Structure):
@@ -90,8 +93,9 @@ class _Derivatives(ct.Structure):
 class _Run(ct.Structure):
     _fields_ = (
         ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
-        ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
-        ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
+        ("n_instructions", _I64), ("n_members", _I64), ("times", _P), ("step", _D), ("end", _D),
+        ("external", _P), ("external_slot", _P), ("n_external", _I64), ("copies", _P),
+        ("records", _P),
         ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
         ("bond_energy", _P), ("bond_turnover", _P), ("n_terms", _I64), ("carried", _I64),
         ("index", _I64), ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
@@ -150,23 +154,28 @@ def standing(memory: NDArray[np.uint8]) -> Standing:
     run = _Run.from_buffer(memory.data)
     begins = [run.calls or 0, run.members or 0, run.derivatives or 0]
     found = [-1, -1, -1]
-    if run.at:
+    if at := run.at:  # read once: the other process goes on
         # arrays are apart: the one that begins last before the address holds it
-        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= run.at else -1)
+        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= at else -1)
         size = ct.sizeof((_Call, _Member, _Derivatives)[near])
-        found[near] = (run.at - begins[near]) // size
+        found[near] = (at - begins[near]) // size
     return Standing(int(run.index), int(run.row), *found)
 
 
-def library_name() -> str:
-    """File name of the library for these sources and this machine."""
+def library_name(target: str = "") -> str:
+    """File name of the library for these sources.
+
+    Args:
+        target: machine and system, such as x86_64-linux; this machine's if not given.
+    """
     content = b"\0".join(path.read_bytes() for path in SOURCES)
     digest = hashlib.sha256(content).hexdigest()[:16]
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    return f"kernel-{digest}-{machine}-{platform.system().lower()}{suffix}"
+    if not target:
+        machine = platform.machine().lower()
+        machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+        target = f"{machine}-{platform.system().lower()}"
+    suffix = {"windows": ".dll", "darwin": ".dylib"}.get(target.rpartition("-")[2], ".so")
+    return f"kernel-{digest}-{target}{suffix}"
 
 
 def cache_folder() -> Path:
@@ -243,11 +252,12 @@ class Kernel:
                 spans[op, index] = (first, len(calls))
         self.run = _Run(
             members=self._structures(_Member, (_member(instance) for instance in instances)),
+            n_members=len(instances),
             calls=self._structures(_Call, calls),
             values=self._array(bound.values),
             times=self._array(bound.times),
             step=bound.step,
-            end=float(bound.times[-1]),
+            end=bound.outline.end,
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
@@ -323,10 +333,8 @@ class Kernel:
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
         self.run.average = self._array(derivatives.average)
-        self.run.slope, self.run.curve = (
-            self._array(derivatives.slope),
-            self._array(derivatives.curve),
-        )
+        self.run.slope = self._array(derivatives.slope)
+        self.run.curve = self._array(derivatives.curve)
         rows: list[_Derivatives] = []
         told = {}
         for key, told_calls in derivatives.calls.items():
@@ -373,18 +381,34 @@ class Kernel:
 
     def advance(self, last: int) -> int:
         """Communication steps up to `last`; 0, or the status that ended it."""
+        self._enter()
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
     def advance_within(self, last: int, limit: float, most: float) -> int:
-        """The same within some processor time [s], while no recorded value is larger than `most`.
+        """The same within some work (see `Session.run`), while no recorded value is above `most`.
 
         It does not return in between: each time, a thread would wait for the interpreter lock.
         """
+        self._enter()
         return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
+
+    def _enter(self) -> None:
+        if self._bound.witness is not None:
+            self._bound.witness.enter()
 
     def restart(self) -> None:
         """Begin again at the first communication point."""
         self.run.index = self.run.row = self.run.next_record = 0
+
+    def save(self) -> bytes:
+        """What it keeps beside the run's arrays: outputs noted for the energy of bonds."""
+        return bytes(self._made[_Term])
+
+    def restore(self, terms: bytes) -> None:
+        """Return to what `save` gave, at the communication point where the run stands."""
+        ct.memmove(self._made[_Term], terms, len(terms))
+        self.run.index, self.run.row = self._bound.index, self._bound.row
+        self.run.next_record = -(-self._bound.index // self._bound.every) * self._bound.every
 
     def reached(self) -> float | None:
         """The time that the failed step has reached, where the FMU says so [s]."""
@@ -430,7 +454,9 @@ class Kernel:
 
 
 def _member(instance: Instance) -> _Member:
-    return _Member(instance.address, instance.functions[f"fmi{instance.binding.version}DoStep"])
+    functions = instance.functions
+    step = functions[f"fmi{instance.binding.version}DoStep"]
+    return _Member(instance.address, step, functions.get(WORK, 0))
 
 
 def _instructions(
