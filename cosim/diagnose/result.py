@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.checks.finding import Finding
 from ..calibrate.clocks import offsets
+from ..calibrate.nuisance import late_values
 from ..calibrate.problem import Problem
 from .adding import made_of
 from .answer import Verdict
@@ -161,12 +162,4 @@ class Diagnosis:
 
     def start_values(self) -> dict[str, dict[str, float]]:
         """Late values that were estimated, by run."""
-        found: dict[str, dict[str, float]] = {}
-        if self.after is not None:
-            for p in self.after.problem.late:
-                starts = self.after.problem.run(p.run).starts
-                for name, factor in p.targets[:1]:
-                    if name in starts:
-                        short = p.name.partition("@")[0]
-                        found.setdefault(p.run, {})[short] = starts[name] / factor
-        return found
+        return late_values(self.after.problem) if self.after is not None else {}

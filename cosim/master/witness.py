@@ -60,7 +60,7 @@ class Witness:
         shared = memory or partial(_mapped, folder if files else None)
         self.state = shared("state", np.int64, (THREAD + 1,))
         self._text = shared("text", np.uint8, (TEXT,))
-        self._run = shared("run", np.uint8, (kernel.RUN_SIZE,))
+        self._run = shared("run", np.uint8, (kernel.structures.RUN_SIZE,))
         self.rows: Vector = shared("rows", np.float64, (rows, columns))
         self._objects: BinaryIO | None = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from ..ssp import read_scenario
 from ..system.provider import Provider
 from ..system.variants import apply
 from ..view.scene import Scenes, needs, scenes
+from .checks_table import checks_html
 from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
 from .preparation import left_out, recorded_signals, recording_interval, swapped_system
@@ -171,27 +172,6 @@ class Result:
             "notes": list(dict.fromkeys(n for run in self.runs.values() for n in run.notes)),
             "files": [str(path) for path in self.files],
         }
-
-
-def checks_html(name: str, checks: Sequence[CheckResult]) -> str:
-    """Checks for a notebook; "" without any."""
-    from ..display.html import Cell, number, table, unit
-    from ..display.notebook import view
-
-    if not checks:
-        return ""
-    rows = []
-    for check in checks:
-        limit = check.limit if isinstance(check.limit, list) else [check.limit]
-        outcome = "not judged" if check.unfit else "ok" if check.ok else "FAILED"
-        kind = "over" if check.failed else "" if check.unfit else "good"
-        rows.append(
-            [check.name, check.value, " to ".join(map(number, limit)), unit(check.unit),
-             Cell(outcome, kind=kind), Cell(check.source, kind="text")]
-        )  # fmt: skip
-    met = sum(check.ok and not check.unfit for check in checks)
-    head = ["check", "value", "limit", "unit", "", "source"]
-    return view(name, f"{met} of {len(checks)} checks met", table(head, rows))
 
 
 def _prefixed(run: str, name: str) -> str:

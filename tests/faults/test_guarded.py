@@ -159,5 +159,5 @@ def test_what_is_guarded() -> None:
 
 def test_the_memory_holds_what_is_said() -> None:
     assert board.SIZE <= SIZE  # it is made before anything large is imported
-    made = board.kernel.RUN_SIZE + board.TEXT + 8 * (board.THREAD + 1)
+    made = board.kernel.structures.RUN_SIZE + board.TEXT + 8 * (board.THREAD + 1)
     assert made <= board.SLOT
