@@ -39,8 +39,8 @@ def diagnose_command(
         list[str] | None,
         typer.Option(
             metavar="LAW",
-            help="Leave an effect out of the catalogue: does data that has it then end with a "
-            "wrong name, or as it should with 'unexplained'? Repeatable.",
+            help="Leave an effect out of the catalogue, to test the verdict: data that have it "
+            "should end as unexplained, not with a wrong name. Repeatable.",
         ),
     ] = None,
     as_json: Annotated[
