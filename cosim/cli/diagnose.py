@@ -69,7 +69,7 @@ def diagnose_command(
         with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
             result = diagnose(problem, folder, told, workers=workers, without=without or ())
     page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
-    result.files += [page, table, models]
+    result.files += [models, page, table]
     write_page(result, page)
     content = result.to_dict()
     write_text(table, json.dumps(content, indent=2) + "\n")
