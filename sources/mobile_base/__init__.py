@@ -5,12 +5,8 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import INERTIA_UNITS, WRENCH_UNITS, Quantity
 
-TAU_L = Quantity(
-    "tau_l", "N.m", "torque on the left drive wheel, positive drives forward", start=5.0
-)
-TAU_R = Quantity(
-    "tau_r", "N.m", "torque on the right drive wheel, positive drives forward", start=4.0
-)
+TAU_L = Quantity("tau_l", "N.m", "torque on the left drive wheel, positive drives forward")
+TAU_R = Quantity("tau_r", "N.m", "torque on the right drive wheel, positive drives forward")
 J_L = Quantity("J_l", "kg.m2", "inertia that the left drive wheel carries for its drive")
 J_R = Quantity("J_r", "kg.m2", "inertia that the right drive wheel carries for its drive")
 ARM_INERTIA = Quantity(

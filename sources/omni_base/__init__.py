@@ -9,12 +9,7 @@ TAU_BETA = Quantity(
     "tau_beta", "N.m", "torque of the steering motors, positive turns beta up", size=3, nominal=5.0
 )
 TAU_PHI = Quantity(
-    "tau_phi",
-    "N.m",
-    "torque of the rolling motors, positive turns phi up",
-    start=5.0,
-    size=3,
-    nominal=5.0,
+    "tau_phi", "N.m", "torque of the rolling motors, positive turns phi up", size=3, nominal=5.0
 )
 
 X = Quantity("x", "m", "world position of the platform's reference point")

@@ -11,7 +11,7 @@ from ..quantity import Quantity
 X_SET = Quantity("x_set", "m", "set position in the world")
 Y_SET = Quantity("y_set", "m", "set position in the world")
 THETA_SET = Quantity("theta_set", "rad", "set heading, unwrapped, positive turns left")
-XD_SET = Quantity("xd_set", "m/s", "set velocity along the world's x axis", start=0.2)
+XD_SET = Quantity("xd_set", "m/s", "set velocity along the world's x axis")
 YD_SET = Quantity("yd_set", "m/s", "set velocity along the world's y axis")
 THETAD_SET = Quantity("thetad_set", "rad/s", "set yaw rate, positive turns left")
 XDD_SET = Quantity("xdd_set", "m/s2", "set acceleration along the world's x axis")

@@ -10,10 +10,11 @@ RADII = (0.06, 0.055, 0.045, 0.037, 0.037, 0.037)
 """Of the joints, read off drawings of the UR5 [m]."""
 
 
-def links() -> list[dict[str, Any]]:
+def links(count: int = len(RADII)) -> list[dict[str, Any]]:
     """A node behind each joint, and one at the end of each link."""
     found, last = [], "mount"
-    for i, radius in enumerate(RADII, 1):
+    for i in range(1, count + 1):
+        radius = RADII[min(i, len(RADII)) - 1]
         end: list[float | str] = [f"a[{i}]", 0, f"d[{i}]"]
         rods = [
             {"rod": [[0, 0, 0], [0, 0, f"d[{i}]"]], "radius": 0.8 * radius, "colour": STEEL},

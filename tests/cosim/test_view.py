@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,14 +24,25 @@ from cosim.data.recording import Recording
 from cosim.errors import FmuFileError, ValueRangeError
 from cosim.fmu.archive import open_fmu
 from cosim.fmu.metadata import parse_metadata
+from cosim.master.master import Master
 from cosim.spec import scene
+from cosim.system.system import System
 from cosim.view.page import content, view_page, write_view
+from cosim.view.scene import needs, scenes
 from sources.scene import component_scene
 from sources.variant import components, device_values, fidelities
 from tests.fmus import fmu
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-SHOWN = [name for name in components() if component_scene(name)]
+
+
+def looks(name: str) -> list[dict[str, Any]]:
+    """The scene of a component's usual device."""
+    values = device_values(name, components()[name].device)
+    return component_scene(name, {key: origin.value for key, origin in values.items()})
+
+
+SHOWN = [name for name in components() if looks(name)]
 SETS = Path(__file__).parents[2] / "scenarios"
 RECORDED = 5e-6
 """Of positions in a page [m]: single precision, 6e-8 of some metres, through a chain of 14."""
@@ -87,7 +99,7 @@ def turns() -> Recording:
 
 @pytest.mark.parametrize("name", SHOWN)
 def test_every_scene_is_one(name: str) -> None:
-    assert scene.problem(component_scene(name)) == ""
+    assert scene.problem(looks(name)) == ""
 
 
 @pytest.mark.slow
@@ -98,7 +110,7 @@ def test_every_name_in_a_scene_is_a_variable_of_some_fidelity(name: str) -> None
              if isinstance(o.value, (list, tuple)) for i in range(1, len(o.value) + 1)}  # fmt: skip
     for fidelity in fidelities(name):
         known |= set(open_fmu(fmu(f"{name}/{fidelity}")).description.variables)
-    items = [[node["pose"], node["shapes"]] for node in component_scene(name)]
+    items = [[node["pose"], node["shapes"]] for node in looks(name)]
     used = {n for formula in scene.formulas(items) for n in scene.names(formula)}
     assert used - known == set()
 
@@ -111,6 +123,18 @@ def test_the_drawn_arm_ends_where_its_fmu_says_the_tool_is() -> None:
     assert np.ptp(found["arm: tool"], axis=0).max() > 0.1  # it moved
     mount = found["arm: mount"] - found["base: body"]
     assert np.abs(np.linalg.norm(mount, axis=1) - np.linalg.norm(mount[0])).max() < RECORDED
+
+
+@pytest.mark.slow
+def test_an_arm_of_one_s_own_is_drawn_from_its_own_joints() -> None:
+    system = System("arm")
+    system.add("arm", str(fmu("serial_arm.two_link/kinematic")), {"angle": [0.4, -0.7]})
+    shown = scenes(system)
+    recording = Master(system, step=0.1).run(0.2, record=[*needs(shown), "arm.tool_position"])
+    about = {**recording.provenance, "scene": shown}
+    found = paths(content(replace(recording, provenance=about), (), ()))
+    assert np.abs(found["arm: tool"] - recording["arm.tool_position"]).max() < RECORDED
+    assert np.linalg.norm(found["arm: tool"][0]) < 1.99  # bent: two links of 1 m
 
 
 @pytest.mark.slow
