@@ -252,7 +252,7 @@ def outcome(kind: str, folder: Path, full: bool) -> Outcome:
         result = diagnose(problem)
     except CosimError as error:
         return Outcome(kind, "refused", (type(error).__name__,), str(error), lost)
-    effects = tuple(item["effect"] for item in result.effects())
+    effects = tuple(item["effect"] for item in result.answer.effects())
     return Outcome(kind, result.verdict, effects or by, result.reason, lost)
 
 

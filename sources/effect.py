@@ -151,6 +151,8 @@ class Effect:
             with that (play in a gear that is declared as rigid).
         random: whether it draws random numbers: its values say nothing about a log.
         general: effect with the same law for any unit, which need not be tried where this one fits.
+        contains: effects that its law becomes for some values of its parameters: a bristle that
+            does not give way is Coulomb friction. Data that do not tell the two apart have it.
     """
 
     name: str
@@ -165,6 +167,7 @@ class Effect:
     probe: bool = False
     random: bool = False
     alone: bool = False
+    contains: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for kind in self.kinds:

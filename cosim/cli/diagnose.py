@@ -35,6 +35,14 @@ def diagnose_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
     workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LAW",
+            help="Leave an effect out of the catalogue, to test the verdict: data that have it "
+            "should end as unexplained, not with a wrong name. Repeatable.",
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON value to stdout.")
     ] = False,
@@ -59,12 +67,13 @@ def diagnose_command(
             display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
 
         with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
-            result = diagnose(problem, folder, told, workers=workers)
-    page, table = folder / "report.html", folder / "diagnosis.json"
+            result = diagnose(problem, folder, told, workers=workers, without=without or ())
+    page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
+    result.files += [models, page, table]
     write_page(result, page)
-    result.files += [page, table]
     content = result.to_dict()
     write_text(table, json.dumps(content, indent=2) + "\n")
+    write_text(models, json.dumps(result.table.to_dict(), indent=1) + "\n")
     if as_json:
         print_json(content)
     else:
@@ -77,9 +86,11 @@ def _print(result: Diagnosis) -> None:
 
     console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
-    for effect in result.effects():
+    for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    for hint in result.answer.hints:
+        console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
     for text in clock_lines(result.to_dict()["clocks"]):
         console.print(f"  {text}", soft_wrap=True)
     table = Table()

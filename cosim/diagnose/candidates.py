@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from ..calibrate.parts import Parameter
@@ -28,6 +28,15 @@ class Catalogue(Protocol):
         ...
 
 
+@runtime_checkable
+class Kinship(Protocol):
+    """A provider that knows which laws are special cases of others."""
+
+    def contained(self, effect: str) -> Sequence[str]:
+        """Effects that the law of an effect becomes for some values of its parameters."""
+        ...
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place of the system.
@@ -38,6 +47,7 @@ class Candidate:
         effect, port: of the catalogue.
         text: one line about the effect.
         refinement: the fidelity that it stands for, None for an effect.
+        contains: effects that its law becomes for some values of its parameters.
     """
 
     instance: str
@@ -46,6 +56,7 @@ class Candidate:
     port: str
     text: str = ""
     refinement: Refinement | None = None
+    contains: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def label(self) -> str:
@@ -89,7 +100,8 @@ def candidates(problem: Problem) -> list[Candidate]:
             continue  # a file: nothing can be added to it
         for effect, port, text in provider.candidates(variant):
             if (instance, port) not in twins:
-                found.append(Candidate(instance, kind, effect, port, text))
+                special = tuple(provider.contained(effect) if isinstance(provider, Kinship) else ())
+                found.append(Candidate(instance, kind, effect, port, text, contains=special))
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))

@@ -1,234 +1,45 @@
-"""The whole chain on one data set, and its result."""
+"""The whole chain on one data set."""
 
 from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
-from ..calibrate.clocks import offsets
 from ..calibrate.deferred import step_error
-from ..calibrate.nuisance import late_values
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
 from ..files import atomic
 from ..system.provider import locate
-from .adding import made_of
+from .answer import Verdict
 from .bursts import bursts, times
 from .exchange import reconsidered
 from .experiment import propose
-from .further import Further, judged
+from .facts import Table
+from .further import judged
 from .linear import SampleStack
-from .localise import Place, localise
+from .localise import localise
 from .models import Fitted, is_open
 from .power import power
+from .result import PURPOSES, Diagnosis
 from .rounds import Round
 from .search import ROUNDS, Search
+from .table import candidates_of, table_of
 from .unstable import ends
+from .verdict import above, decide, proposal
 from .whiteness import WhitenessTest, whiteness_tests
 
-Vector = NDArray[np.float64]
-PURPOSES = ("identification", "validation")
-
-
-@dataclass
-class Diagnosis:
-    """Verdict and evidence.
-
-    Attributes:
-        problem: the declared system with the data as measured.
-        verdict: effect_found, nothing_missing, confounded, unexplained or bad_data.
-        reason: one or two sentences.
-        search: all rounds.
-        before, after: calibrated models without and with the effects.
-        rivals: sets of effects that explain the data equally well.
-        located: where an unknown input would have to enter the declared system, the best first.
-        places: other places where the same effect would do the same, by label.
-        residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
-        structure: (`before`/`after`, purpose) -> tests.
-        power: see `power.power`.
-        experiment: proposed to separate rivals.
-        ended: run -> time from which it does not count: what happens there hangs on small changes
-            of start values (see `unstable`).
-        further: the models on runs that need another system.
-        bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
-        files: written ones.
-        findings: on the data.
-    """
-
-    problem: Problem
-    verdict: str
-    reason: str
-    search: Search | None = None
-    before: Fitted | None = None
-    after: Fitted | None = None
-    rivals: list[Fitted] = field(default_factory=list)
-    located: list[Place] = field(default_factory=list)
-    places: dict[str, list[str]] = field(default_factory=dict)
-    residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
-    structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
-    power: dict[str, dict[str, Any]] = field(default_factory=dict)
-    experiment: dict[str, Any] | None = None
-    ended: dict[str, float] = field(default_factory=dict)
-    further: list[Further] = field(default_factory=list)
-    bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    files: list[Path] = field(default_factory=list)
-    wall: float = 0.0
-    warnings: list[str] = field(default_factory=list)
-    findings: list[Finding] = field(default_factory=list)
-
-    def _repr_html_(self) -> str:
-        from .notebook import shown
-
-        return shown(self.to_dict(), self.problem, self.residuals)
-
-    def rms(self, which: str, purpose: str) -> dict[str, float | None]:
-        """Channel -> RMS residual in its unit over the runs of a purpose."""
-        rows = [
-            self.residuals[which, run.name]
-            for run in self.problem.runs
-            if run.purpose == purpose and (which, run.name) in self.residuals
-        ]
-        if not rows:
-            return {c.name: None for c in self.problem.channels}
-        stacked = np.concatenate(rows)
-        found: dict[str, float | None] = {}
-        for column, channel in enumerate(self.problem.channels):
-            values = stacked[:, column]
-            values = values[np.isfinite(values)]
-            found[channel.name] = (
-                float(np.sqrt(np.mean(values**2))) * channel.sigma if values.size else None
-            )
-        return found
-
-    def to_dict(self) -> dict[str, Any]:
-        """As of `cosim diagnose --json`."""
-        table: dict[str, Any] = {
-            "dataset": self.problem.name,
-            "system": self.problem.file.path.stem,
-            "verdict": self.verdict,
-            "reason": self.reason,
-            "warnings": self.warnings,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "effects": self.effects(),
-            "model": made_of(self.problem, self.after),
-            "alternatives": [
-                {"effects": [c.label for c in f.effects], "score": self._score(f)}
-                for f in self.rivals
-            ],
-            "localisation": [place.to_dict() for place in self.located],
-            "power": self.power,
-            "proposed_experiment": self.experiment,
-            "channels": {},
-            "further_runs": [item.to_dict() for item in self.further],
-            "parameters": self.parameters(),
-            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
-            "start_values": self.start_values(),
-            "bursts": self.bursts,
-            "unstable_from": self.ended,
-            "structure": {
-                f"{which} {purpose}": [s.to_dict() for s in tests]
-                for (which, purpose), tests in self.structure.items()
-            },
-            "evaluations": self.search.evaluations if self.search else 0,
-            "wall_s": self.wall,
-            "files": [str(path) for path in self.files],
-        }
-        for channel in self.problem.channels:
-            table["channels"][channel.name] = {
-                "unit": channel.unit,
-                "noise_rms": channel.sigma,
-                **{
-                    which: {p: self.rms(which, p)[channel.name] for p in PURPOSES}
-                    for which in ("before", "after")
-                },
-            }
-        return table
-
-    def _score(self, fitted: Fitted) -> float:
-        """Log likelihood of a rival over that of its round's winner, all runs [nats]."""
-        assert self.search is not None
-        pairs = [p for r in self.search.rounds for p in zip(r.rivals, r.scores, strict=True)]
-        return next(score for rival, score in pairs if rival is fitted)
-
-    def parameters(self) -> dict[str, Any]:
-        """Calibrated parameters before and after."""
-        table: dict[str, Any] = {}
-        for which, fitted in (("before", self.before), ("after", self.after)):
-            if fitted is None:
-                continue
-            estimate = fitted.estimate
-            for i, p in enumerate(estimate.problem.parameters):
-                if p.role == "nuisance":
-                    continue
-                table.setdefault(p.name, {"unit": p.unit})[which] = {
-                    "value": float(estimate.theta[i]),
-                    "ci95": [float(estimate.low[i]), float(estimate.high[i])],
-                    "identifiable": bool(estimate.identifiable[i]),
-                }
-        return table
-
-    def start_values(self) -> dict[str, dict[str, float]]:
-        """Late values that were estimated, by run."""
-        return late_values(self.after.problem) if self.after is not None else {}
-
-    def effects(self) -> list[dict[str, Any]]:
-        """The effects that were found."""
-        if self.after is None or self.search is None or self.before is None:
-            return []
-        found = []
-        estimate = self.after.estimate
-        stages = {r.winner.effects[-1]: r for r in self.search.rounds if r.winner is not None}
-        for item in self.after.effects:
-            prefix = item.prefix
-            values = {
-                p.name.removeprefix(prefix): {
-                    "value": float(estimate.theta[i]),
-                    "ci95": [float(estimate.low[i]), float(estimate.high[i])],
-                    "unit": p.unit,
-                    "identifiable": bool(estimate.identifiable[i]),
-                }
-                for i, p in enumerate(estimate.problem.parameters)
-                if p.name.startswith(prefix)
-            }
-            stage = stages.get(item)
-            winner = stage.winner if stage else None
-            found.append(
-                {
-                    "effect": item.effect,
-                    "component": item.instance,
-                    "port": item.port,
-                    "place": item.place,
-                    "text": item.text,
-                    "parameters": values,
-                    "p_value": winner.p_value if winner else None,
-                    "explained": self._explained(stage),
-                    "gain_nats": self.search.gain(stage.base, winner) if stage and winner else None,
-                    "validation_gain_nats": winner.gate.gain if winner and winner.gate else None,
-                    "other_places": self.places.get(item.label, []),
-                }
-            )
-        return found
-
-    def _explained(self, stage: Round | None) -> float | None:
-        """Share of the excess over the noise that the effect takes away."""
-        if stage is None or stage.winner is None:
-            return None
-        before = stage.base.estimate
-        excess = 2.0 * before.cost - before.count
-        taken = 2.0 * (before.cost - stage.winner.estimate.cost)
-        return float(np.clip(taken / excess, 0.0, 1.0)) if excess > 0.0 else None
+TURNS = 4
+"""Times that a set is proposed: it is fitted to the end, asked what a free force would still
+explain, and may give way to another one once."""
 
 
 def diagnose(
@@ -237,6 +48,7 @@ def diagnose(
     say: Callable[[str], None] = lambda text: None,
     *,
     workers: int | None = None,
+    without: Iterable[str] = (),
 ) -> Diagnosis:
     """Close the loop on one data set.
 
@@ -245,16 +57,18 @@ def diagnose(
         out: folder for the FMUs with the effects.
         say: told what is done.
         workers: threads, one per core if not given.
+        without: effects that are left out of the catalogue, to see what it says of data that have
+            them: it should end with `unexplained`, or with laws that do the same.
 
     Raises:
-        CosimError: the declared system cannot be simulated.
+        CosimError: the declared system cannot be simulated, or no effect of that name fits it.
     """
     begun = time.perf_counter()
     simulator = Simulator(problem, workers=workers)
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
-    search = Search(simulator, say)
+    search = Search(simulator, say, without=without)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
@@ -271,8 +85,9 @@ def diagnose(
 
 def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
     """The verdict on data that cannot be used."""
-    errors = lines(f for f in findings if f.severity == "error")
-    result = Diagnosis(problem, "bad_data", "; ".join(errors), findings=findings)
+    errors = tuple(lines(f for f in findings if f.severity == "error"))
+    table = Table(errors=errors)
+    result = Diagnosis(problem, decide(table), table, findings=findings)
     result.warnings = lines(f for f in findings if f.severity != "error")
     result.wall = time.perf_counter() - begun
     return result
@@ -287,8 +102,10 @@ def _searched(
     begun: float,
 ) -> Diagnosis:
     problem = search.raw
-    result = Diagnosis(problem, "", "", search, base, findings=findings)
+    result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
     result.warnings = lines(findings)
+    result.withheld = tuple(sorted(search.withheld))
+    search.note(base)
     current = base
     winners: list[Round] = []
     for number in range(ROUNDS):
@@ -328,19 +145,51 @@ def _searched(
         current = reconsidered(search, current, winners)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
-    if len(current.effects) > 1:
-        current = search.eliminated(current)
-        winners = [w for w in winners if w.winner and w.winner.effects[-1] in current.effects]
-    if not search.lacking(current):
-        sudden = bursts(search.fit_data - current.fit, search.fitting)
+    _judged(result, search, current)
+    assert result.after is not None
+    if not search.lacking(result.after):
+        sudden = bursts(search.fit_data - result.after.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
-    result.after = current
-    _verdict(result, winners)
+    _tested(result)
     _look_further(result)
-    if out is not None and current.effects:
+    if out is not None and result.answer.laws:
         result.files += _leave_fmus(result, out)
     result.wall = time.perf_counter() - begun
     return result
+
+
+def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
+    """The verdict on all fits; the set that it proposes is fitted to the end before it is named."""
+    rounds, ended = search.rounds, result.ended
+    forces = {frozenset[str](): result.located} if result.located else {}
+    current = search.examined(current, candidates_of(rounds))
+    declared = search.memo.get(frozenset())
+    assert declared is not None
+    for _ in range(TURNS):
+        if current.effects:
+            search.memo.keep(current)
+        result.table = table_of(search, rounds, forces, ended)
+        place = proposal(result.table)
+        if place is None:
+            break
+        best = result.table.models[place]
+        if best.labels != current.labels:
+            known = search.memo.get(best.labels)
+            assert known is not None
+            current = search.sharpened(known, declared)
+        elif above(best) and best.labels not in forces:
+            search.say("does a force at a port explain what is left?")
+            ranked = [s.candidate for s in rounds[0].signatures]
+            forces[best.labels] = localise(search, current, ranked, search.say)
+        else:
+            break
+    result.answer = answer = decide(result.table)
+    result.after = current if answer.laws else result.before
+    if answer.rivals:
+        names = result.table.models[answer.rivals[0][0]].labels
+        rival = search.memo.get(names)
+        assert rival is not None
+        result.experiment = propose(current, rival)
 
 
 def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitted:
@@ -373,9 +222,10 @@ def _tests(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest]:
     return whiteness_tests(search.check_data - fitted.check, search.checking)
 
 
-def _verdict(result: Diagnosis, winners: list[Round]) -> None:
-    search, before, after = result.search, result.before, result.after
-    assert search is not None and before is not None and after is not None
+def _tested(result: Diagnosis) -> None:
+    """Residuals of both models in all runs, and tests on them."""
+    before, after = result.before, result.after
+    assert before is not None and after is not None
     for which, fitted in (("before", before), ("after", after)):
         if which == "after" and after is before:
             result.residuals |= {
@@ -389,61 +239,6 @@ def _verdict(result: Diagnosis, winners: list[Round]) -> None:
                 stack = SampleStack(result.problem, runs)
                 vector = stack.vector([result.residuals[which, r.name] for r in runs])
                 result.structure[which, purpose] = whiteness_tests(vector, stack)
-    left = {
-        s.channel
-        for purpose in PURPOSES
-        for s in result.structure.get(("after", purpose), [])
-        if s.structured
-    }
-    remark = (
-        f" In {', '.join(sorted(left))} the residual still holds more than noise." if left else ""
-    )
-    if result.ended:
-        until = ", ".join(f"{name} up to {time:.1f} s" for name, time in result.ended.items())
-        remark += (
-            f" Further effects were looked for in {until} only: after that, changes of the start "
-            "values that nobody can see decide what the model does."
-        )
-    if winners:
-        different: list[Fitted] = []
-        for stage in winners:
-            assert stage.winner is not None
-            added = stage.winner.effects[-1]
-            for rival in stage.rivals:
-                other = rival.effects[-1]
-                if other.effect == added.effect:
-                    result.places.setdefault(added.label, []).append(other.place)
-                elif other not in after.effects:
-                    different.append(rival)
-            if stage.winner.signature is not None:
-                tried = {f.effects[-1].label for f in stage.fitted}
-                for label in set(stage.winner.signature.same) - tried:
-                    result.places.setdefault(added.label, []).append(label)
-        result.rivals = different
-        names = " and ".join(c.label for c in after.effects)
-        if different:
-            result.verdict = "confounded"
-            others = ", ".join(f.effects[-1].label for f in different)
-            result.experiment = propose(winners[-1].winner or after, different[0])
-            result.reason = f"{names} explains the data, but so does {others}." + remark
-        else:
-            result.verdict = "effect_found"
-            result.reason = (
-                f"{names}: the gain holds on runs that were not used for fitting, and no other "
-                f"effect of the catalogue does as well." + remark
-            )
-    elif left:
-        result.verdict = "unexplained"
-        result.reason = (
-            f"The residual of {', '.join(sorted(left))} holds more than noise, and no effect of "
-            "the catalogue explains it on unused runs."
-        )
-    else:
-        result.verdict = "nothing_missing"
-        result.reason = (
-            "The calibrated system reaches the noise, and no effect of the catalogue improves it "
-            "on unused runs."
-        )
 
 
 def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:

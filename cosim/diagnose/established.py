@@ -11,10 +11,8 @@ from .exchange import challenged
 from .late import LateFitter
 from .models import GATE, Fitted, compare
 from .rounds import Round
+from .verdict import HAIR
 
-HAIR = 0.005
-"""Share of what the winner explains that a simpler law may leave, where nothing that the winner has
-beyond it is determined: fits of laws that stick end that far from their minima."""
 PART = 0.2
 """Share of what a model leaves beyond noise that a further effect must explain where runs may turn
 unstable: moments that come too early are most of that, and any law moves them a little."""

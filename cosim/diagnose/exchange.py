@@ -52,7 +52,7 @@ def nearly(search: LateFitter, base: Fitted, stage: Round) -> frozenset[Candidat
 def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:
     """The model with early choices exchanged where that is better.
 
-    Rounds get the winner and the rivals that the last model shows. One that was not open is asked
+    Rounds get the winner that the last model shows. One that was not open is asked
     again only where later effects have joined its own: beside what lacked these, a law with more
     parameters had made up for them.
 
@@ -70,7 +70,6 @@ def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fit
         if stage.winner.effects[-1] not in effects:
             continue
         present = _seen_last(fitted, stage.winner)
-        rivals: list[Fitted] = []
         trials: list[tuple[Fitted, Fitted | None]] = []
         for item, known in _others(search, stage):
             if item.candidate in fitted.effects:
@@ -89,19 +88,10 @@ def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fit
             alike = not search.apart(present, trial)
             simpler = alike and (more_general(present, trial) or _wider(present, trial))
             if simpler or (not alike and gain > GATE and unused > 0.0):
-                rivals += [] if simpler else [present]
                 present, stage.winner = trial, known or trial
-            elif alike:
-                rivals.append(trial)
         if present.estimate is not fitted.estimate:
             fitted = search.sharpened(present, stage.base)
         stage.compared = frozenset(fitted.effects)
-        stage.rivals = search.rivals(stage.base, present, rivals)
-        stage.scores = [
-            search.gain(present, f)
-            + compare(search.check_data, present.check, f.check, search.checking).gain
-            for f in stage.rivals
-        ]
     return fitted
 
 
@@ -352,6 +342,7 @@ def exchanged(
     result = search.fitted(simulator, start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
     result.signature = replace(item, fixed={**item.fixed, **fixed})
+    search.note(result)
     return result
 
 

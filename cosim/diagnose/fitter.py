@@ -25,6 +25,7 @@ from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
 from .secant import FLOOR, patience
 from .signature import Signature
+from .verdict import wanted
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -41,9 +42,6 @@ DOUBLINGS = 6
 """Times at most that a strength to begin with is doubled."""
 SHARP = 0.01
 """Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
-SUPERFLUOUS = 0.5
-"""An effect that later ones have made superfluous explains less than this share of what the model
-leaves without it, in the runs that were fitted; unused runs may be too few to miss it."""
 AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
@@ -106,6 +104,7 @@ class Fitter(Judge):
         result.effects, result.signature = first.effects, first.signature
         result.p_value = first.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)
+        self.note(result)
         return result
 
     def judged(self, estimate: Estimate) -> Fitted:
@@ -455,26 +454,32 @@ class Fitter(Judge):
         result = self.fitted(less, fitted.estimate.theta[keep], fitted.estimate)
         result.effects = tuple(e for e in fitted.effects if e != effect)
         result.signature = fitted.signature
+        self.note(result)
         return result
 
-    def carries(self, less: Fitted, fitted: Fitted) -> bool:
-        """Whether a model explains a share of what one with fewer effects leaves beyond noise."""
-        beyond = less.estimate.robust - 0.5 * less.estimate.count
-        return self.gain(less, fitted) > max(SUPERFLUOUS * beyond, 10.0 * GATE)
+    def examined(self, fitted: Fitted, candidates: int) -> Fitted:
+        """The model without effects that may be absent, or that unused runs do not miss.
 
-    def eliminated(self, fitted: Fitted) -> Fitted:
-        """The model without effects that later ones have made superfluous."""
-        for effect in fitted.effects[:-1]:
+        What it is without each of the others has been fitted, and is in the memo.
+
+        Args:
+            fitted: the model, with intervals.
+            candidates: number of effects that there were to choose from.
+        """
+        for effect in fitted.effects if len(fitted.effects) > 1 else ():
             try:
                 less = self.without(fitted, effect)
             except CosimError as error:  # it is needed
                 self.say(f"without {effect.label}: {error}")
+                self.memo.failed.add(fitted.labels - {effect.label})
                 continue
-            gate = compare(self.check_data, less.check, fitted.check, self.checking)
-            if gate.passed or self.carries(less, fitted):
+            if self._missed(fitted, effect, candidates):
                 less = self.approached(less, fitted, fitted)
-                gate = compare(self.check_data, less.check, fitted.check, self.checking)
-            if not gate.passed and not self.carries(less, fitted):
+            if not self._missed(fitted, effect, candidates):
                 self.say(f"dropped again: {effect.label}")
-                return self.eliminated(less)
+                return self.examined(self.sharpened(less, fitted), candidates)
         return fitted
+
+    def _missed(self, fitted: Fitted, effect: Candidate, candidates: int) -> bool:
+        law = self.law(fitted, effect)
+        return law.there and wanted(law.missed, candidates)

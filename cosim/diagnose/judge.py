@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
+from .candidates import Candidate
+from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
+from .memo import Memo
 from .models import GATE, Fitted, compare, more_general
 from .whiteness import whiteness_tests
 
@@ -22,8 +25,6 @@ FAR = 4.0
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
 ALIKE = 1e-5
 """Share of what they explain by which models may differ that are one to first order."""
-SAME = 2e-4
-"""The same for one effect at two places, each fitted."""
 EXPLAINED, CONCENTRATED = 0.98, 0.9
 """Share of what a model leaves beyond noise from which a candidate explains nearly all of it; the
 second where much counts by its logarithm (`loss.Windowed`)."""
@@ -39,6 +40,7 @@ class Judge:
 
     def __init__(self, problem: Problem, check: str) -> None:
         self.purpose = check
+        self.memo = Memo()
         self._measured(problem)
 
     def _measured(self, problem: Problem) -> None:
@@ -52,6 +54,63 @@ class Judge:
 
     def _data(self, stack: SampleStack) -> Vector:
         return stack.vector([run.data / self.raw.sigma for run in stack.runs])
+
+    @property
+    def unused(self) -> bool:
+        """Whether there are runs that no fit has used."""
+        return bool(self.raw.chosen(self.purpose))
+
+    def note(self, fitted: Fitted) -> None:
+        """Remember a fit if it is the best one of its set of effects."""
+        self.memo.note(fitted, lambda model: self.fitting.cost(self.fit_data - model))
+
+    def better(self, first: Fitted, second: Fitted) -> Gain:
+        """What the second of two models is better by."""
+        fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
+        change = self.fitting.largest(second.fit - first.fit)
+        if not self.unused:
+            return Gain(fitted.gain, 0.0, fitted.z, 0.0, change)
+        unused = compare(self.check_data, first.check, second.check, self.checking)
+        change = max(change, self.checking.largest(second.check - first.check))
+        return Gain(fitted.gain, unused.gain, fitted.z, unused.z, change)
+
+    def law(
+        self,
+        fitted: Fitted,
+        candidate: Candidate,
+        twins: tuple[str, ...] = (),
+        p_value: float | None = None,
+    ) -> Law:
+        """An effect of a model as the verdict sees it.
+
+        Args:
+            fitted: the model.
+            candidate: the effect.
+            twins: labels of those with the same signature.
+            p_value: of its score.
+        """
+        problem, estimate, prefix = fitted.problem, fitted.estimate, candidate.prefix
+        own = [(i, p) for i, p in enumerate(problem.parameters) if p.name.startswith(prefix)]
+        strength = next(p for _, p in own if p.strength)
+        values = tuple(
+            Value(
+                p.name.removeprefix(prefix), p.unit, float(estimate.theta[i]),
+                float(estimate.low[i]), float(estimate.high[i]), p.minimum, p.maximum,
+                bool(estimate.identifiable[i]),
+            )
+            for i, p in own
+        )  # fmt: skip
+        names = {n for n in (*problem.names, *problem.constants) if n.startswith(prefix)}
+        rest = fitted.labels - {candidate.label}
+        # a model that cannot be simulated without it misses it as much as all effects together
+        less = self.memo.get(frozenset() if rest in self.memo.failed else rest)
+        return Law(
+            candidate.effect, candidate.instance, candidate.port,
+            strength.name.removeprefix(prefix), values, candidate.text,
+            strength.minimum if strength.inverse else 0.0, len(names), candidate.contains, twins,
+            p_value,
+            None if less is None else self.better(less, fitted),
+        )  # fmt: skip
 
     def count_in_full(self, full: bool = True) -> Problem:
         """Let residuals count in full though runs may turn unstable, or not again."""
@@ -140,37 +199,6 @@ class Judge:
         checked = compare(self.check_data, first.check, second.check, self.checking)
         fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
         return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
-
-    def rivals(self, base: Fitted, winner: Fitted, others: list[Fitted]) -> list[Fitted]:
-        """Models that no run tells from the winner, but for more general ones of these or of it.
-
-        The winner's last effect elsewhere counts as such where it does as well but for a hair.
-
-        Friction that may differ between the directions is no rival of friction that does not,
-        wherever the latter is named; nor is a law of the same quantity with more parameters than
-        the winner's at another place, which its freedom may make up for.
-        """
-        near = [
-            f for f in others
-            if f.effects[-1] != winner.effects[-1]
-            and (not self.apart(f, winner) or self.elsewhere(base, f, winner))
-            and not (f.quantity == winner.quantity != "" and f.complexity > winner.complexity)
-        ]  # fmt: skip
-        return [
-            f for f in near
-            if not any(more_general(f, g) for g in (winner, *near) if g is not f)
-        ]  # fmt: skip
-
-    def elsewhere(self, base: Fitted, other: Fitted, winner: Fitted) -> bool:
-        """Whether a model has the winner's last effect elsewhere, and does as well but for a hair.
-
-        A left wheel too large is a right one too small with another mean radius; fits end at
-        different distances from the minimum that they have in common.
-        """
-        last, mine = other.effects[-1], winner.effects[-1]
-        if last.effect != mine.effect or last.place == mine.place:
-            return False
-        return abs(self.gains(other, winner)[0]) < SAME * self.gains(base, winner)[0]
 
     def gains(self, first: Fitted, second: Fitted) -> tuple[float, float]:
         """What a model gains over another one on all runs, and on unused ones [nats]."""

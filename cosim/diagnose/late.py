@@ -94,7 +94,9 @@ class LateFitter(Fitter):
         Returns:
             The model, judged by the rest.
         """
+        before = self.fitting, self.checking
         self._measured(ended(self.raw, sizes))
+        self.memo.cut(before, (self.fitting, self.checking))
         self._own = None
         simulator = fitted.simulator.of(ended(fitted.problem, sizes))
         theta = fitted.estimate.theta
@@ -103,4 +105,5 @@ class LateFitter(Fitter):
             found = self.judged(fit(simulator, theta, effort=CORRECTION))
         found.effects, found.signature = fitted.effects, fitted.signature
         found.gate, found.p_value = fitted.gate, fitted.p_value
+        self.note(found)
         return found

@@ -26,6 +26,7 @@ from ..calibrate.parts import Channel, MeasuredRun, Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError, VariantError
 from .candidates import Candidate, Catalogue, balances, element_of
+from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import Fitted
 from .search import Search
@@ -125,7 +126,7 @@ def localise(
     problem = base.problem
     if not isinstance(problem.provider, Catalogue):
         return []
-    runs = _worst(search, base)
+    runs = worst(search, base, RUNS)
     found: list[Place] = []
     probed = 0
     for instance, port in _places(problem, ranked):
@@ -142,11 +143,12 @@ def localise(
     return found
 
 
-def _worst(search: Search, base: Fitted) -> list[MeasuredRun]:
-    rows = search.fitting.by_run(search.fit_data - base.fit)
+def worst(judge: Judge, base: Fitted, most: int) -> list[MeasuredRun]:
+    """The runs that a model leaves farthest from their noise."""
+    rows = judge.fitting.by_run(judge.fit_data - base.fit)
     sizes = [float(np.nanmean(r**2)) for r in rows]
-    order = np.argsort(sizes)[::-1][:RUNS]
-    return [search.fitting.runs[int(i)] for i in sorted(order)]
+    order = np.argsort(sizes)[::-1][:most]
+    return [judge.fitting.runs[int(i)] for i in sorted(order)]
 
 
 def _places(problem: Problem, ranked: Sequence[Candidate]) -> list[tuple[str, str]]:

@@ -49,6 +49,11 @@ class Fitted:
     p_value: float = 1.0
 
     @property
+    def labels(self) -> frozenset[str]:
+        """Of its effects."""
+        return frozenset(c.label for c in self.effects)
+
+    @property
     def problem(self) -> Problem:
         """What was fitted."""
         return self.estimate.problem

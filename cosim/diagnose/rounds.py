@@ -21,8 +21,6 @@ class Round:
         aside: labels of those that one run ruled out.
         fitted: refitted candidates, best first.
         winner: accepted one.
-        rivals: fitted ones that the data cannot tell from it.
-        scores: of these, their log likelihoods over that of the winner [nats].
         open: whether more was so evidently missing that the choice waits for it.
         probes: all candidates that were simulated, with the systems they were simulated in.
         quick: what the best quick fit gained on all runs [nats].
@@ -37,8 +35,6 @@ class Round:
     aside: tuple[str, ...] = ()
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None
-    rivals: list[Fitted] = field(default_factory=list)
-    scores: list[float] = field(default_factory=list)
     open: bool = False
     probes: dict[Candidate, Probe] = field(default_factory=dict)
     quick: float = 0.0

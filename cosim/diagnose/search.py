@@ -14,7 +14,7 @@ from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import UnbuiltError
+from ..errors import UnbuiltError, UnknownNameError, listing
 from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
@@ -61,6 +61,10 @@ class Search(LateFitter):
         simulator: of the declared system, without limits on time.
         say: told what is done.
         only: candidates to consider, all of the catalogue if not given.
+        without: effects that are left out of the catalogue.
+
+    Raises:
+        UnknownNameError: no effect of that name fits the system.
     """
 
     def __init__(
@@ -68,11 +72,20 @@ class Search(LateFitter):
         simulator: Simulator,
         say: Say = lambda text: None,
         only: list[Candidate] | None = None,
+        without: Iterable[str] = (),
     ) -> None:
         super().__init__(simulator, CHECK, say)
         self.declared = problem = simulator.problem
         self.whole = only is None
+        self.withheld = frozenset(without)
         self.known = candidates(problem) if only is None else only
+        names = {c.effect for c in self.known}
+        for name in sorted(self.withheld - names):
+            raise UnknownNameError(
+                f"{problem.file.path}: no effect {name!r} of the catalogue fits this system; "
+                f"{listing(sorted(names), name)}"
+            )
+        self.known = self._offered(self.known)
         self.rounds: list[Round] = []
         self._builder = ThreadPoolExecutor(1)
 
@@ -89,7 +102,11 @@ class Search(LateFitter):
             self._build(self.declared, _changes(self.known, self.declared))
             return
         with suppress(UnbuiltError):  # the round that asks for them says so
-            self._build(problem, _changes(candidates(problem), problem))
+            self._build(problem, _changes(self._offered(candidates(problem)), problem))
+
+    def _offered(self, known: list[Candidate]) -> list[Candidate]:
+        """Those that are not left out."""
+        return [c for c in known if c.effect not in self.withheld]
 
     def _build(self, problem: Problem, changes: Iterable[Mapping[str, str]]) -> None:
         """Have changed FMUs of a problem built in the background."""
@@ -176,7 +193,7 @@ class Search(LateFitter):
         simulation of all runs.
         """
         if base.effects and self.whole:  # what was added may have balances of its own
-            self.known = candidates(base.problem)
+            self.known = self._offered(candidates(base.problem))
         present = {item.label for item in base.effects}
         chosen = [c for c in self.known if c.label not in present]
         stack = self.telling(base)
@@ -243,10 +260,6 @@ class Search(LateFitter):
             current.follow(self.sharpened(current.winner, base))
             current.follow(grounded(self, current.winner, base))
             settle(self, base, current)
-            wanted = [f for f in current.fitted if f.gate is not None and f.gate.passed]
-            current.rivals = self.rivals(base, current.winner, wanted)
-            mine = self.total(base, current.winner)
-            current.scores = [self.total(base, f) - mine for f in current.rivals]
         return current
 
     def attempted(self, start: Fitted, current: Round, items: list[Signature]) -> Fitted:
@@ -342,6 +355,7 @@ class Search(LateFitter):
         fitted.p_value = current.corrected[item.candidate.label]
         fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
         current.fitted.append(fitted)
+        self.note(fitted)
         self.say(
             f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
             f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"

@@ -46,7 +46,7 @@ class WhitenessTest:
     @property
     def structured(self) -> bool:
         """More than noise, and enough to look for a cause."""
-        return self.p_value < 0.01 and self.lasting > CALIBRATED
+        return structured(self.lasting, self.p_value)
 
     def to_dict(self) -> dict[str, float | bool | str]:
         """As in the JSON."""
@@ -56,6 +56,16 @@ class WhitenessTest:
             "correlation": self.correlation, "effective_samples": self.freedom,
             "p_value": self.p_value, "structured": self.structured,
         }  # fmt: skip
+
+
+def structured(lasting: float, p_value: float) -> bool:
+    """Whether a channel holds more than noise, and enough to look for a cause.
+
+    Args:
+        lasting: RMS over noise without the worst windows.
+        p_value: that noise alone has such slow parts.
+    """
+    return p_value < 0.01 and lasting > CALIBRATED
 
 
 def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]:

@@ -186,6 +186,11 @@ class Builder:
         with naming_errors():
             return list(sources("packaging.catalog").refinements(variant))
 
+    def contained(self, effect: str) -> tuple[str, ...]:
+        """Effects that the law of an effect becomes for some values of its parameters."""
+        with naming_errors():
+            return tuple(sources("packaging.catalog").contained(effect))
+
 
 class Installed:
     """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
@@ -250,6 +255,10 @@ class Installed:
         """Fidelities of which a variant is the limit, see the protocol `Catalogue`."""
         found = self.library.refinements(variant)
         return found if found is not None else self._built(variant).refinements(variant)
+
+    def contained(self, effect: str) -> tuple[str, ...]:
+        """Effects that the law of an effect becomes for some values of its parameters."""
+        return Builder().contained(effect)
 
 
 def default_provider(told: Told | None = None) -> Provider:

@@ -46,6 +46,7 @@ EFFECT = Effect(
     ("rotation",),
     TAU_C,
     source="Janot 2019",
+    contains=("coulomb",),
 )
 
 

@@ -41,6 +41,7 @@ EFFECT = Effect(
     ("rotation",),
     TAU_C,
     source="Dupont 2002",
+    contains=("coulomb",),
 )
 
 

@@ -40,6 +40,7 @@ EFFECT = Effect(
     TAU_C,
     unless=("normal", "radius"),
     source="Hanselman 2006",
+    contains=("unbalance",),
 )
 
 

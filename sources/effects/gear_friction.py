@@ -59,6 +59,7 @@ EFFECT = Effect(
     MU,
     needs=("load", "reaction"),
     source="Duclusaud 2025",
+    contains=("load_friction",),
 )
 
 

@@ -119,6 +119,15 @@ def candidates(name: str) -> list[tuple[str, str, str]]:
     return found
 
 
+def contained(effect: str) -> tuple[str, ...]:
+    """Effects that the law of an effect becomes for some values of its parameters; () if unknown.
+
+    Refinements and effects of other sources declare none.
+    """
+    known = effects().get(effect)
+    return known.EFFECT.contains if known is not None else ()
+
+
 def _has_place(effect: str) -> bool:
     """Whether an effect sits at a point in the world."""
     values = vars(effects()[effect]).values()

@@ -11,6 +11,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from cosim.calibrate import Problem
+from cosim.calibrate.checks.clipped import check_clipped
 from cosim.calibrate.checks.examine import check_data, check_model, examine
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding, Source, lines
 from cosim.calibrate.checks.late import check_late
@@ -336,3 +337,51 @@ def test_many_runs_with_one_finding_are_one_line() -> None:
     found = [Finding("warning", "gaps", f"r{k}", "x", f"lacks {k} %") for k in range(9)]
     assert lines(found) == ["warning: run r0 x: lacks 0 % (so, too, in 8 other runs: r1, …, r8)"]
     assert len(lines(found[:3])) == 3
+
+
+@pytest.mark.parametrize(
+    ("made", "model", "named"),
+    [
+        (lambda x, noise: np.clip(x + noise, -2.0, 2.0), lambda x: x, ["largest", "smallest"]),
+        (lambda x, noise: np.minimum(x + noise, 2.0), lambda x: 0.9 * x, ["largest"]),
+        (lambda x, noise: x + noise, lambda x: x, []),
+        # the machine has a limit, and its sensor noise
+        (lambda x, noise: np.clip(x, -2.0, 2.0) + noise, lambda x: x, []),
+        # a command that its controller limits, as in the model
+        (lambda x, noise: np.clip(x + noise, -2.0, 2.0), lambda x: np.clip(x, -2.0, 2.0), []),
+        # rounding hides the noise
+        (lambda x, noise: np.round(2.0 * (x + noise)) / 2.0, lambda x: 1.2 * x, []),
+    ],
+    ids=["both sides", "one side", "none", "the machine's", "the model's too", "rounded"],
+)
+def test_a_column_that_ends_at_a_limit_which_the_model_goes_beyond(made, model, named) -> None:
+    true = 3.0 * np.sin(np.linspace(0.0, 30.0, 3000))
+    noise = 0.05 * np.random.default_rng(4).standard_normal(true.size)
+    run: Any = SimpleNamespace(name="A", data=made(true, noise)[:, None])
+    channel = SimpleNamespace(name="current", unit="A", sigma=0.05)
+    problem: Any = SimpleNamespace(runs=[run], channels=[channel])
+    found = list(check_clipped(problem, {"A": model(true)[:, None]}))
+    assert [f.text.split()[3] for f in found] == named
+    assert all("limit = 1.999998 " in f.text for f in found)
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_a_column_of_another_run(noisy, both: bool) -> None:
+    """Exchanged between two runs, or taken from one that keeps it."""
+    problem = noisy(0)
+    column = [c.name for c in problem.channels].index("current")
+    data = {run.name: run.data.copy() for run in problem.runs}
+    data["stairs"][:, column] = problem.run("sines").data[:, column]
+    if both:
+        data["sines"][:, column] = problem.run("stairs").data[:, column]
+    found = [f for f in examine(simulator(problem.with_data(data))) if f.severity == "error"]
+    expected = ("swapped", "sines") if both else ("mixed", "stairs")
+    assert [(f.kind, f.run, f.column) for f in found] == [(*expected, "current")]
+    assert ("run stairs" if both else "that of run sines") in found[0].text
+
+
+def test_a_motion_that_comes_again_has_noise_of_its_own(noisy) -> None:
+    first, second = noisy(0), noisy(1)
+    data = {**{r.name: r.data for r in first.runs}, "check": second.run("sines").data}
+    found = findings(first.with_data(data))
+    assert not {f.kind for f in found} & {"mixed", "copy"}

@@ -173,45 +173,6 @@ def test_start_values_stay_where_a_joint_fit_loses_them(
     assert len(said) == 1 + kept
 
 
-def test_a_law_more_general_than_a_rival_is_none() -> None:
-    def model(label: str, place: str, parameters: int, quantity: str = "") -> Any:
-        signature = SimpleNamespace(same=())
-        effect = SimpleNamespace(label=label, place=place)
-        return SimpleNamespace(
-            effects=(effect,), signature=signature, complexity=parameters, quantity=quantity
-        )
-
-    winner = model("coulomb", "load.flange", 9)
-    elsewhere = model("coulomb", "gearbox.flange_a", 9)
-    general = model("asymmetric_coulomb", "gearbox.flange_a", 10)
-    other = model("bearing_drag", "motor.shaft", 10)
-    judge: Any = SimpleNamespace(
-        apart=lambda first, second: False, elsewhere=lambda base, first, second: False
-    )
-
-    def rivals(mine: Any, others: list[Any]) -> list[Any]:
-        return Search.rivals(judge, mine, mine, others)
-
-    assert rivals(winner, [winner, elsewhere, general, other]) == [
-        elsewhere,
-        other,
-    ]
-    assert rivals(winner, [general]) == [general]  # nothing simpler was fitted there
-    judge.apart = lambda first, second: first is other
-    assert rivals(winner, [elsewhere, other]) == [elsewhere]
-    judge.apart = lambda first, second: True
-    assert rivals(winner, [elsewhere, other]) == []
-    judge.elsewhere = lambda base, first, second: first is elsewhere
-    assert rivals(winner, [elsewhere, other]) == [elsewhere]
-    simple = model("coulomb", "base.left.axle", 9, "tau_c")
-    free = model("bristle", "gearbox.flange_a", 12, "tau_c")
-    spring = model("hose_spring", "motor.shaft", 12, "k")
-    same = model("coulomb", "gearbox.flange_a", 9, "tau_c")
-    judge.apart = lambda first, second: False
-    assert rivals(simple, [free, spring, same]) == [spring, same]
-    assert rivals(free, [simple, free]) == [simple]
-
-
 def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -240,10 +201,14 @@ def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
         raise CosimError("unstable")
 
     said: list[str] = []
-    search: Any = SimpleNamespace(without=without, say=said.append)
-    model: Any = SimpleNamespace(effects=(needed, last))
-    assert Search.eliminated(search, model) is model
-    assert said == ["without delay at motor.command: unstable"]
+    memo = SimpleNamespace(failed=set())
+    search: Any = SimpleNamespace(without=without, say=said.append, memo=memo)
+    model: Any = SimpleNamespace(
+        effects=(needed, last), labels=frozenset((needed.label, last.label))
+    )
+    assert Search.examined(search, model, 80) is model
+    assert memo.failed == {frozenset({needed.label}), frozenset({last.label})}
+    assert said == ["without delay at motor.command: unstable", "without b: unstable"]
 
 
 def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
@@ -349,38 +314,3 @@ def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others
     search.lacking = lambda base: Search.lacking(search, base)
     base: Any = SimpleNamespace(fit=np.zeros_like(vector))
     assert Search.telling(search, base).names == expected
-
-
-@pytest.mark.parametrize(
-    ("effect", "place", "worse", "alike"),
-    [
-        ("gain", "right", 10.0, True),  # of 100000 nats, fits are not exacter than that
-        ("gain", "right", 100.0, False),
-        ("gain", "left", 0.0, False),  # no other place
-        ("bias", "right", 10.0, False),  # another law must not be told apart at all
-    ],
-)
-def test_the_same_effect_elsewhere_may_be_worse_by_a_hair(
-    effect: str, place: str, worse: float, alike: bool
-) -> None:
-    def model(effect: str, place: str, cost: float) -> Any:
-        return SimpleNamespace(
-            effects=(SimpleNamespace(effect=effect, place=place),), cost=cost, check=None
-        )
-
-    judge: Any = SimpleNamespace(gains=lambda first, second: (first.cost - second.cost, 0.0))
-    base, winner = model("", "", 1e5), model("gain", "left", 0.0)
-    assert Search.elsewhere(judge, base, model(effect, place, worse), winner) == alike
-
-
-@pytest.mark.parametrize(("without", "kept"), [(60000.0, True), (20.0, False)])
-def test_what_explains_most_of_the_rest_is_not_superfluous(without: float, kept: bool) -> None:
-    """Though unused runs are too few to miss it (a slope beside a cable that pulls)."""
-
-    def model(cost: float) -> Any:
-        return SimpleNamespace(estimate=SimpleNamespace(robust=cost, count=20000))
-
-    judge: Any = SimpleNamespace(
-        gain=lambda first, second: first.estimate.robust - second.estimate.robust
-    )
-    assert Search.carries(judge, model(10000.0 + without), model(10000.0)) == kept

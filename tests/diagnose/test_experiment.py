@@ -10,10 +10,14 @@ import pytest
 from benchmarks.own_plant import example, made
 from cosim.calibrate.parts import MeasuredRun
 from cosim.calibrate.problem import Problem
+from cosim.diagnose.answer import Verdict
 from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.experiment import propose, scaled
+from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
+from cosim.diagnose.table import table_of
+from cosim.diagnose.verdict import decide
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
@@ -28,11 +32,18 @@ def varied(run: MeasuredRun, factor: float, name: str, purpose: str) -> Measured
     return replace(found, name=name, purpose=purpose)
 
 
-def attributed(problem: Problem, known: list[Candidate]) -> Round:
-    """One round over these candidates."""
+def attributed(
+    problem: Problem, known: list[Candidate]
+) -> tuple[Round, Verdict, list[Fitted | None]]:
+    """One round over these candidates, the verdict, and the rivals that it names."""
     search = Search(simulator(problem), only=known)
     try:
-        return search.round(search.calibrated())
+        base = search.calibrated()
+        search.note(base)
+        stage = search.round(base)
+        table = table_of(search, search.rounds, {}, {})
+        verdict = decide(table)
+        return stage, verdict, [search.memo.get(table.models[i].labels) for i, _ in verdict.rivals]
     finally:
         search.close()
 
@@ -49,9 +60,10 @@ def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
     known = [c for c in candidates(rig) if c.label in labels]
     (item,) = [c for c in known if c.effect == truth]
 
-    first = attributed(made(rig, item, size, 5).problem, known)
-    assert first.winner is not None and len(first.rivals) == 1
-    proposal = propose(first.winner, first.rivals[0])
+    first, verdict, rivals = attributed(made(rig, item, size, 5).problem, known)
+    (rival,) = rivals
+    assert first.winner is not None and rival is not None and verdict.kind == "confounded"
+    proposal = propose(first.winner, rival)
     assert proposal is not None and proposal["distance"] > 4.0
 
     run = next(run for run in slow if run.name == proposal["run"])
@@ -59,9 +71,9 @@ def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
         varied(run, proposal["input_factor"], f"P{i}", "identification")
         for i in range(proposal["repetitions"])
     ]
-    second = attributed(made(rig.changed(runs=[*slow, *more]), item, size, 5).problem, known)
-    assert second.winner is not None and second.rivals == []
-    assert second.winner.effects[-1].effect == truth
+    more_runs = made(rig.changed(runs=[*slow, *more]), item, size, 5).problem
+    second, verdict, _ = attributed(more_runs, known)
+    assert verdict.kind == "effect_found" and [x.effect for x in verdict.laws] == [truth]
     costs = {f.effects[-1].effect: f.estimate.cost for f in second.fitted}
     gain = max(costs.values()) - min(costs.values())
     # noise alone moves a gain of d^2 / 2 by d: 4 of these, on a distance of 16 and more

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
 from cosim.calibrate.problem import Problem
 from cosim.cli.diagnose import _spread
+from cosim.diagnose import Diagnosis
+from cosim.diagnose.answer import Verdict
 from cosim.diagnose.candidates import Candidate
-from cosim.diagnose.diagnosis import Diagnosis, _look_further
+from cosim.diagnose.diagnosis import _look_further
 from cosim.diagnose.further import carried, judged
 from cosim.diagnose.story.facts import Facts
 from cosim.errors import ScenarioError, VariantError
@@ -150,11 +153,17 @@ def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
     def broken() -> Problem:
         raise ScenarioError("warm.toml: there is no entry 'x'")
 
-    result = Diagnosis(replace_further(raw, broken), "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    def found(problem: Problem) -> Diagnosis:
+        it: Any = search
+        return Diagnosis(
+            problem, Verdict("nothing_missing"), search=it, before=before, after=before
+        )
+
+    result = found(replace_further(raw, broken))
     _look_further(result)
     assert result.further == []
     assert result.warnings == ["further runs are not judged: warm.toml: there is no entry 'x'"]
-    result = Diagnosis(raw, "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    result = found(raw)
     _look_further(result)
     assert [run.name for run in result.further[0].problem.runs] == ["MX1"]
     assert said == ["further runs: MX1"]
@@ -165,7 +174,7 @@ def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
         stuck = {run.name: np.where(np.isnan(run.data), np.nan, 0.5) for run in other.runs}
         return other.with_data(stuck)
 
-    result = Diagnosis(replace_further(raw, frozen), "nothing_missing", "", search, before, before)  # type: ignore[arg-type]
+    result = found(replace_further(raw, frozen))
     _look_further(result)
     assert result.further == []
     assert "further runs are not judged: error: run MX1 speed:" in result.warnings[0]

@@ -14,7 +14,9 @@ from cosim.calibrate.loss import WINDOW
 from cosim.calibrate.parts import MeasuredRun, Parameter
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
-from cosim.diagnose.diagnosis import Diagnosis, _shortened, _verdict
+from cosim.diagnose import Diagnosis
+from cosim.diagnose.answer import Verdict
+from cosim.diagnose.diagnosis import _shortened, _tested
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
@@ -114,7 +116,7 @@ def found_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Found]:
     def found(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Found:
         search = Search(simulator(problem), say, only=[])
         model = search.judged(fit(simulator(problem), problem.nominal, effort=POLISH))
-        result = Diagnosis(problem, "", "", search, model)
+        result = Diagnosis(problem, Verdict(""), search=search, before=model)
         return result, search, model, Round(model, [], {}, winner=model)
 
     return found
@@ -134,7 +136,7 @@ def test_further_effects_are_looked_for_before_that(
     middle = float(first.times[first.times.size // 2])
     assert result.ended == ({first.name: pytest.approx(middle, abs=0.02)} if gone else {})
     result.after = found
-    _verdict(result, [])
+    _tested(result)
     # tables have the runs in full
     assert result.residuals["after", first.name].shape == first.data.shape
     assert (">1.00 s</td>" in sections.ended(result.ended)) == gone

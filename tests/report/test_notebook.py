@@ -11,6 +11,7 @@ from cosim import Recording
 from cosim.calibrate.checks.finding import Finding
 from cosim.calibrate.mapping import read_problem
 from cosim.data.comparison import Reference, compare
+from cosim.diagnose.answer import Verdict
 from cosim.diagnose.diagnosis import Diagnosis
 from cosim.display.chart import POINTS, Line, lines, thinned
 from tests.report.marked import Marked
@@ -52,7 +53,9 @@ def test_a_comparison_gives_its_figures() -> None:
 def test_a_finding_and_a_refused_diagnosis_show_what_is_wrong() -> None:
     finding = Finding("error", "spikes", "ST1", "current", "has 3 <single> samples that stand out")
     assert "<single>" in Marked(finding._repr_html_()).text
-    result = Diagnosis(read_problem(DATA), "bad_data", str(finding), findings=[finding])
+    result = Diagnosis(
+        read_problem(DATA), Verdict("bad_data", errors=(str(finding),)), findings=[finding]
+    )
     text = Marked(result._repr_html_()).text
     assert "The data cannot be used" in text and "Run ST1, current: has 3 <single> samples" in text
 

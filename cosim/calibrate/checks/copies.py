@@ -1,4 +1,4 @@
-"""Runs that are copies of each other, whole or in part, and at whatever offset."""
+"""Runs that are copies of each other, whole or in part, at whatever offset, or in one column."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .finding import Finding
+from .smooth import noise
 from .times import SHORT
 
 if TYPE_CHECKING:
     from ..problem import Problem
 
 Vector = NDArray[np.float64]
+SAME = 0.9
+"""Share of a column's samples that two runs have in common for it to be one."""
 SHARE = 0.2
 """Share of the shorter run's samples that two runs have in common to be copies."""
 
@@ -56,6 +59,38 @@ def check_copies(problem: Problem) -> Iterator[Finding]:
             f"same{shifted}; {what}. Take one of the two out"
         )
         yield Finding("error", "copy", b.name, "", text)
+
+
+def check_columns(problem: Problem) -> Iterator[Finding]:
+    """Single columns that two runs have in common: one of them was taken from the other run.
+
+    Only columns with noise finer than their resolution are looked at (`smooth.noise`): of two
+    measurements a share of 0.28 of the samples is then the same at most (`still.HELD`), and `SAME`
+    of `SHORT` and more has a probability below 1e-20.
+    """
+    for index, channel in enumerate(problem.channels):
+        if noise([run.data[:, index] for run in problem.runs]) is None:
+            continue
+        for a, first in enumerate(problem.runs):
+            for second in problem.runs[a + 1 :]:
+                same = _same(first.data, second.data)
+                if same[index] < SAME or np.nanmin(same) >= SAME:
+                    continue  # whole runs: `check_copies`
+                text = (
+                    f"is that of run {first.name}: {same[index]:.0%} of its samples are the same, "
+                    "and those of other columns are not; one of the two belongs to another run"
+                )
+                yield Finding("error", "mixed", second.name, channel.name, text)
+
+
+def _same(first: Vector, second: Vector) -> Vector:
+    """Share of samples that two runs have in common, by column; 0 where too few are measured."""
+    size = min(len(first), len(second))
+    one, two = first[:size], second[:size]
+    good = np.isfinite(one) & np.isfinite(two)
+    count = good.sum(axis=0)
+    equal = np.sum(good & (one == two), axis=0)
+    return np.asarray(np.where(count >= SHORT, equal / np.maximum(count, 1), 0.0))
 
 
 def _rows(data: Vector) -> list[tuple[int, bytes]]:

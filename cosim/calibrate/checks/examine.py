@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
-from .copies import check_copies
+from .clipped import check_clipped
+from .copies import check_columns, check_copies
 from .finding import Finding, passed
 from .gaps import check_gaps
 from .lags import check_lags
@@ -17,7 +18,7 @@ from .smooth import check_smooth
 from .spiking import check_spikes
 from .starts import check_starts
 from .still import check_still
-from .swaps import check_channels, check_inputs
+from .swaps import check_channels, check_inputs, check_runs
 from .times import check_times
 from .wraps import check_wraps
 
@@ -54,7 +55,7 @@ def check_data(problem: Problem) -> list[Finding]:
     found = list(problem.source.findings)
     if not problem.chosen("identification"):
         found.append(Finding("error", "purpose", "", "", "no run is for identification"))
-    for check in (check_times, check_still, check_gaps, check_copies, check_smooth):
+    for check in (check_times, check_still, check_gaps, check_copies, check_columns, check_smooth):
         found += check(problem)
     return found
 
@@ -81,12 +82,15 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
         return [Finding("error", "simulation", "", "", f"the model does not run: {error}")]
     found += check_spikes(problem, models)
     found += check_wraps(problem, models)
+    found += check_clipped(problem, models)
     for index in range(len(problem.channels)):
         found += check_scale(problem, models, index)
     swaps = list(check_channels(problem, models, {f.column for f in found if not f.run}))
     # exchanged columns of two sides have the other sign where the sides move against each other
     pairs = {name for f in swaps for name in f.column.split(" and ")}
     found = [f for f in found if f.run or f.column not in pairs] + swaps
+    if not found:
+        found += check_runs(problem, models)
     found += check_lags(problem, models, evident)
     found += check_inputs(simulator, models, theta)
     if not any(f.severity == "error" for f in found):

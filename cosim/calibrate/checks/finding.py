@@ -15,6 +15,7 @@ from ...errors import ScenarioError, listing
 
 KINDS = {
     "absent": "a channel whose column a log does not have",
+    "clipped": "a column that ends at a limit which the model goes beyond",
     "clock": "sample times that do not rise, or columns that are late",
     "constant": "a column or an input that never changes",
     "copy": "runs that are copies of each other",
@@ -24,6 +25,7 @@ KINDS = {
     "gaps": "cells without a number",
     "held": "a column whose values stand for several samples each",
     "jitter": "sample times that are not even",
+    "mixed": "a column that two runs have in common",
     "noise": "a column with more noise than it is said to have",
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import comb
 from typing import TYPE_CHECKING
 
@@ -35,10 +35,37 @@ def roughness(values: Vector, order: int) -> float:
         s = median |D^n x| / (0.6745 sqrt(C(2 n, n)))
 
     Motion that a polynomial of degree n - 1 follows over n + 1 samples does not count, and by the
-    median, nor do steps and jolts: what is not noise can only add.
+    median, nor do steps and jolts: what is not noise can only add. Gaps do not count.
     """
     steps = np.diff(values, order)
+    steps = steps[np.isfinite(steps)]
+    if not steps.size:
+        return 0.0
     return float(np.median(np.abs(steps))) / (0.6745 * float(np.sqrt(comb(2 * order, order))))
+
+
+def noise(columns: Sequence[Vector]) -> float | None:
+    """Deviation of a column's white noise, None if it has none, or none finer than its resolution.
+
+    Noise that falls towards half the sample rate is motion or a filter (`FALLS`). What may
+    be a limit does not count.
+    """
+    sizes, falls, steps = [], [], []
+    everything = np.concatenate([v[np.isfinite(v)] for v in columns])
+    low, high = np.min(everything, initial=np.inf), np.max(everything, initial=-np.inf)
+    for column in columns:
+        values = np.where((column > low) & (column < high), column, np.nan)
+        if int(np.isfinite(values).sum()) <= ENOUGH:
+            continue
+        own, twice = roughness(values, ORDER), roughness(values, 2 * ORDER)
+        if own > 0.0:
+            sizes.append(own)
+            falls.append(twice / own)
+            moves = np.abs(np.diff(values))
+            steps.append(float(np.min(moves[moves > 0.0])))
+    if not sizes or float(np.median(falls)) < FALLS or min(steps) > float(np.median(sizes)):
+        return None
+    return float(np.median(sizes))
 
 
 def check_smooth(problem: Problem) -> Iterator[Finding]:

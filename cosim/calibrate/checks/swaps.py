@@ -1,4 +1,4 @@
-"""Columns that are exchanged: of two channels, or of two inputs."""
+"""Columns that are exchanged: of two channels, of two inputs, or of two runs."""
 
 from __future__ import annotations
 
@@ -71,6 +71,42 @@ def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> 
             if abs(correlation) > FOLLOWS:
                 signs.append(correlation)
     return sum(c < 0.0 for c in signs) > 0.5 * max(len(signs), 1)
+
+
+def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
+    """Columns that two runs have exchanged: each fits the other's signal ten times better.
+
+    As for two channels, over all samples; no other column of the two runs does.
+    """
+    every = range(len(problem.channels))
+    for a, first in enumerate(problem.runs):
+        for second in problem.runs[a + 1 :]:
+            straight = [_between(problem, models, first, first, second, i) for i in every]
+            crossed = [
+                _between(problem, models, second, first, second, i) < 0.1 * straight[i]
+                for i in every
+            ]
+            if sum(crossed) != 1 or len(crossed) < 2:
+                continue  # none, or whole runs
+            channel = problem.channels[crossed.index(True)]
+            text = (
+                f"and run {second.name}: each follows {channel.signal} as it is in the other one, "
+                "and no other column does: exchanged between the runs"
+            )
+            yield Finding("error", "swapped", first.name, channel.name, text)
+
+
+def _between(
+    problem: Problem, models: Mapping[str, Vector], model: MeasuredRun, first: MeasuredRun,
+    second: MeasuredRun, index: int,
+) -> float:  # fmt: skip
+    """Misfit of a column of two runs: that of the first against a model, and the other's."""
+    size = min(len(first.data), len(second.data))
+    total = 0.0
+    for run, other in ((first, model), (second, first if model is second else second)):
+        apart = run.data[:size, index] - models[other.name][:size, index]
+        total += float(np.nansum((apart / problem.channels[index].sigma) ** 2))
+    return total
 
 
 def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: int) -> float:

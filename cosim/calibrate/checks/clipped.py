@@ -1,0 +1,60 @@
+"""Columns that end at the limit of their sensor, or of the number that keeps them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .finding import Finding
+from .smooth import noise
+from .times import SHORT
+
+if TYPE_CHECKING:
+    from ..problem import Problem
+
+Vector = NDArray[np.float64]
+BAND = 3.0
+"""Deviations of the noise below its largest value in which a column is looked at."""
+MOST = 0.5
+"""Share of these samples that have the largest value itself, from which it is a limit."""
+
+
+def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
+    """Channels that stand at their own largest or smallest value where the model goes beyond it.
+
+    A column with noise finer than its resolution has ever fewer samples towards its largest value:
+    noise is unimodal, and so is what a smooth signal adds to it near its top. Half of all samples
+    within three deviations having that very value is no noise: the top one of four or more steps of
+    a falling histogram has a quarter at most, so half of `SHORT` (50) samples and more have a
+    probability below 1e-4. And the model must go beyond the value at most of them: a machine that
+    stops at a limit which its model has as well is no such case, nor is a command without noise.
+    """
+    for index, channel in enumerate(problem.channels):
+        columns = {run.name: run.data[:, index] for run in problem.runs}
+        sigma = noise(list(columns.values()))
+        if sigma is None:
+            continue
+        for side, word in ((1.0, "largest"), (-1.0, "smallest")):
+            edge = side * max(float(np.nanmax(side * v, initial=-np.inf)) for v in columns.values())
+            at = {name: v == edge for name, v in columns.items()}
+            count = sum(int(np.sum(a)) for a in at.values())
+            near = sum(int(np.sum(side * (edge - v) <= BAND * sigma)) for v in columns.values())
+            if count < SHORT or count < MOST * near:
+                continue
+            beyond = [
+                side * (models[name][a, index] - edge) > BAND * channel.sigma
+                for name, a in at.items()
+            ]
+            if not float(np.mean(np.concatenate(beyond))) > MOST:
+                continue
+            runs = [name for name, a in at.items() if a.any()]
+            text = (
+                f"stands at its {word} value of {edge:.6g} {channel.unit} for {count} samples, "
+                f"without the noise that it has elsewhere, where the model goes beyond it (runs "
+                f"{', '.join(runs)}): the sensor or its number ends there; make gaps of them with "
+                f"limit = {(1.0 - 1e-6) * abs(edge):.7g} in [columns]"
+            )
+            yield Finding("error", "clipped", "", channel.name, text)

@@ -1,0 +1,196 @@
+"""What a diagnosis says: the facts of its verdict, as sentence, tables and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .facts import Force, Law, Left
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A set of laws near the data that cannot be named.
+
+    Attributes:
+        laws: with the strengths that they would take.
+        explained: share of what the declared model leaves beyond noise.
+        left: the channel that stays farthest above its noise, None if none does, or not known.
+        why: why it is no name.
+        rough: told by a first order alone.
+    """
+
+    laws: tuple[Law, ...]
+    explained: float
+    left: Left | None
+    why: tuple[str, ...]
+    rough: bool = False
+
+    def __str__(self) -> str:
+        sizes = ", ".join(f"{law.label} ({_size(law)})" for law in self.laws)
+        text = f"{sizes} would explain {100.0 * self.explained:.3g} %"
+        if self.rough:
+            text += " to first order"
+        if self.left is not None:
+            text += f" and leave {self.left.channel} at {self.left.rms:.3g} times its noise"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the JSON."""
+        return {
+            "effects": [
+                {"effect": law.effect, "component": law.component, "port": law.port,
+                 "place": law.place, "parameters": parameters(law)}
+                for law in self.laws
+            ],
+            "explained": self.explained,
+            "left": None if self.left is None else {
+                "channel": self.left.channel, "purpose": self.left.purpose,
+                "times_noise": self.left.rms,
+            },
+            "why": list(self.why),
+            "first_order": self.rough,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict and what it says.
+
+    Attributes:
+        kind: effect_found, nothing_missing, confounded, unexplained or bad_data.
+        model: place of the named set in the table, else that of the declared model (0).
+        laws: named ones.
+        explained: share of what the declared model leaves beyond noise that the named set explains.
+        shares: law -> share of the excess that the model without it leaves.
+        rivals: sets that explain the data as well, by their places in the table, with their log
+            likelihood over that of the named set [nats].
+        others: laws of these that the named set has not, by rival.
+        places: named law -> other places (or laws) with which it would do the same.
+        left: channels above their noise, worst first.
+        hints: nearest sets, of `unexplained`.
+        force: the free force that explains most of the rest.
+        unused: whether there were unused runs.
+        errors, ended: see `Table`.
+    """
+
+    kind: str
+    model: int = 0
+    laws: tuple[Law, ...] = ()
+    explained: float = 0.0
+    shares: dict[str, float] = field(default_factory=dict)
+    rivals: tuple[tuple[int, float], ...] = ()
+    others: tuple[tuple[str, ...], ...] = ()
+    places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    left: tuple[Left, ...] = ()
+    hints: tuple[Hint, ...] = ()
+    force: Force | None = None
+    unused: bool = True
+    errors: tuple[str, ...] = ()
+    ended: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Two or three sentences."""
+        if self.kind == "bad_data":
+            return "; ".join(self.errors)
+        names = " and ".join(law.label for law in self.laws)
+        tail = f" More than noise is left in {over(self.left)}." if self.left else ""
+        if self.kind == "effect_found":
+            text = (
+                f"{names} explains {percent(self.explained)} of what the declared model leaves "
+                "beyond noise. The gain holds on runs that were not used for fitting, and no other "
+                "effect of the catalogue does as well."
+            )
+            return text + tail + self._ended()
+        if self.kind == "confounded":
+            others = ", ".join(" and ".join(labels) for labels in self.others)
+            return f"{names} explains the data, but so does {others}.{tail}{self._ended()}"
+        if self.kind == "nothing_missing":
+            return (
+                "The calibrated model leaves noise in all channels, and no effect of the catalogue "
+                "does better on runs that were not used for fitting."
+                if self.unused
+                else "The calibrated model leaves noise in all channels; no run was kept to judge "
+                "effects by."
+            )
+        text = f"{tail.strip()} No effect of the catalogue can be named".strip()
+        text += "." if self.unused else ": no run was kept unused to judge by."
+        if self.hints:
+            text += f" Nearest, but no name: {self.hints[0]}"
+            text += "." if self.hints[0].left else f"; {self.hints[0].why[0]}."
+        if self.force is not None:
+            text += (
+                f" A free force at {self.force.label} would explain "
+                f"{percent(self.force.explained)} of it in the worst run."
+            )
+        return text + self._ended()
+
+    def _ended(self) -> str:
+        if not self.ended:
+            return ""
+        until = ", ".join(f"{name} up to {time:.1f} s" for name, time in self.ended)
+        return (
+            f" Further effects were looked for in {until} only: after that, changes of the start "
+            "values that nobody can see decide what the model does."
+        )
+
+    def effects(self) -> list[dict[str, Any]]:
+        """The named laws, as in the JSON and in the tables."""
+        return [
+            {
+                "effect": law.effect,
+                "component": law.component,
+                "port": law.port,
+                "place": law.place,
+                "text": law.text,
+                "parameters": parameters(law),
+                "p_value": law.p_value,
+                "explained": self.shares[law.label],
+                "gain_nats": law.missed.fitted if law.missed else None,
+                "validation_gain_nats": law.missed.unused if law.missed else None,
+                "other_places": list(self.places.get(law.label, ())),
+            }
+            for law in self.laws
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its part of the JSON."""
+        return {
+            "verdict": self.kind,
+            "reason": self.reason,
+            "effects": self.effects(),
+            "alternatives": [
+                {"effects": list(labels), "score": score}
+                for labels, (_, score) in zip(self.others, self.rivals, strict=True)
+            ],
+            "hints": [hint.to_dict() for hint in self.hints],
+        }
+
+
+def parameters(law: Law) -> dict[str, dict[str, Any]]:
+    """A law's parameters, as in the JSON."""
+    return {
+        v.name: {"value": v.value, "ci95": [v.low, v.high], "unit": v.unit,
+                 "identifiable": v.identifiable}
+        for v in law.values
+    }  # fmt: skip
+
+
+def over(left: Sequence[Left]) -> str:
+    """Channels above their noise, for people."""
+    worst: dict[str, float] = {}
+    for x in left:
+        worst.setdefault(x.channel, x.rms)
+    return ", ".join(f"{name} ({rms:.3g} times its noise)" for name, rms in worst.items())
+
+
+def _size(law: Law) -> str:
+    value = law.size
+    return f"{value.name} = {value.value:.4g} [{value.low:.4g}, {value.high:.4g}] {value.unit}"
+
+
+def percent(share: float) -> str:
+    """A share, for people."""
+    return f"{100.0 * share:.3g} %"

@@ -1,0 +1,165 @@
+"""The result of a diagnosis: the verdict and all that tables and pages show of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.checks.finding import Finding
+from ..calibrate.clocks import offsets
+from ..calibrate.nuisance import late_values
+from ..calibrate.problem import Problem
+from .adding import made_of
+from .answer import Verdict
+from .facts import Table
+from .further import Further
+from .localise import Place
+from .models import Fitted
+from .search import Search
+from .whiteness import WhitenessTest
+
+Vector = NDArray[np.float64]
+PURPOSES = ("identification", "validation")
+
+
+@dataclass
+class Diagnosis:
+    """Verdict and evidence.
+
+    Attributes:
+        problem: the declared system with the data as measured.
+        answer: the verdict, and the facts that its sentence says.
+        table: of models, which the verdict is a function of.
+        search: all rounds.
+        before, after: calibrated models without effects, and with those that are named.
+        located: where an unknown input would have to enter the declared system, the best first.
+        residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
+        structure: (`before`/`after`, purpose) -> tests.
+        power: see `power.power`.
+        withheld: effects that were left out of the catalogue.
+        experiment: proposed to separate rivals.
+        ended: run -> time from which it does not count: what happens there hangs on small changes
+            of start values (see `unstable`).
+        further: the models on runs that need another system.
+        bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
+        files: written ones.
+        findings: on the data.
+    """
+
+    problem: Problem
+    answer: Verdict
+    table: Table = field(default_factory=Table)
+    search: Search | None = None
+    before: Fitted | None = None
+    after: Fitted | None = None
+    located: list[Place] = field(default_factory=list)
+    residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
+    structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
+    power: dict[str, dict[str, Any]] = field(default_factory=dict)
+    experiment: dict[str, Any] | None = None
+    ended: dict[str, float] = field(default_factory=dict)
+    further: list[Further] = field(default_factory=list)
+    bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    files: list[Path] = field(default_factory=list)
+    withheld: tuple[str, ...] = ()
+    wall: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    def _repr_html_(self) -> str:
+        from .notebook import shown
+
+        return shown(self.to_dict(), self.problem, self.residuals)
+
+    @property
+    def verdict(self) -> str:
+        """One of effect_found, nothing_missing, confounded, unexplained, bad_data."""
+        return self.answer.kind
+
+    @property
+    def reason(self) -> str:
+        """The verdict in sentences."""
+        return self.answer.reason
+
+    def rms(self, which: str, purpose: str) -> dict[str, float | None]:
+        """Channel -> RMS residual in its unit over the runs of a purpose."""
+        rows = [
+            self.residuals[which, run.name]
+            for run in self.problem.runs
+            if run.purpose == purpose and (which, run.name) in self.residuals
+        ]
+        if not rows:
+            return {c.name: None for c in self.problem.channels}
+        stacked = np.concatenate(rows)
+        found: dict[str, float | None] = {}
+        for column, channel in enumerate(self.problem.channels):
+            values = stacked[:, column]
+            values = values[np.isfinite(values)]
+            found[channel.name] = (
+                float(np.sqrt(np.mean(values**2))) * channel.sigma if values.size else None
+            )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """As of `cosim diagnose --json`."""
+        table: dict[str, Any] = {
+            "dataset": self.problem.name,
+            "system": self.problem.file.path.stem,
+            **self.answer.to_dict(),
+            "warnings": self.warnings,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "model": made_of(self.problem, self.after),
+            "withheld": list(self.withheld),
+            "localisation": [place.to_dict() for place in self.located],
+            "power": self.power,
+            "proposed_experiment": self.experiment,
+            "channels": {},
+            "further_runs": [item.to_dict() for item in self.further],
+            "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
+            "start_values": self.start_values(),
+            "bursts": self.bursts,
+            "unstable_from": self.ended,
+            "structure": {
+                f"{which} {purpose}": [s.to_dict() for s in tests]
+                for (which, purpose), tests in self.structure.items()
+            },
+            "evaluations": self.search.evaluations if self.search else 0,
+            "wall_s": self.wall,
+            "files": [str(path) for path in self.files],
+        }
+        for channel in self.problem.channels:
+            table["channels"][channel.name] = {
+                "unit": channel.unit,
+                "noise_rms": channel.sigma,
+                **{
+                    which: {p: self.rms(which, p)[channel.name] for p in PURPOSES}
+                    for which in ("before", "after")
+                },
+            }
+        return table
+
+    def parameters(self) -> dict[str, Any]:
+        """Calibrated parameters before and after."""
+        table: dict[str, Any] = {}
+        for which, fitted in (("before", self.before), ("after", self.after)):
+            if fitted is None:
+                continue
+            estimate = fitted.estimate
+            for i, p in enumerate(estimate.problem.parameters):
+                if p.role == "nuisance":
+                    continue
+                table.setdefault(p.name, {"unit": p.unit})[which] = {
+                    "value": float(estimate.theta[i]),
+                    "ci95": [float(estimate.low[i]), float(estimate.high[i])],
+                    "identifiable": bool(estimate.identifiable[i]),
+                }
+        return table
+
+    def start_values(self) -> dict[str, dict[str, float]]:
+        """Late values that were estimated, by run."""
+        return late_values(self.after.problem) if self.after is not None else {}

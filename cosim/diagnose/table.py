@@ -1,0 +1,160 @@
+"""The table of models of a search, for the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .facts import Comparison, Force, Law, Left, Model, Table, Value
+from .judge import Judge
+from .linear import SampleStack
+from .localise import Place, worst
+from .models import Fitted
+from .rounds import Round
+from .whiteness import whiteness_tests
+
+Vector = NDArray[np.float64]
+NEAR, MOST = 0.9, 12
+"""Models that are compared with each other: those that explain this share of what the best one
+does, and how many at most. Others differ by more than any run could leave open."""
+FIRST_ORDERS = 3
+"""Candidates without a fit that are kept as hints."""
+NORMAL = 1.96
+"""Standard deviations of a 95 % interval."""
+
+
+def table_of(
+    judge: Judge,
+    rounds: Sequence[Round],
+    forces: dict[frozenset[str], list[Place]],
+    ended: dict[str, float],
+) -> Table:
+    """All that the verdict needs of a search.
+
+    Args:
+        judge: the data, and the fits that were made.
+        rounds: scores of the candidates.
+        forces: what free forces explain of what a set of effects leaves.
+        ended: see `Table`.
+    """
+    declared = judge.memo.get(frozenset())
+    assert declared is not None
+    fits = [declared, *(f for f in judge.memo if f.effects)]
+    same = {s.candidate: s.same for stage in reversed(rounds) for s in stage.signatures}
+    chance = {label: p for stage in reversed(rounds) for label, p in stage.corrected.items()}
+    unused = judge.unused
+    run = worst(judge, declared, 1)[0].name
+    models = []
+    for f in fits:
+        models.append(
+            Model(
+                tuple(judge.law(f, c, same.get(c, ()), chance.get(c.label)) for c in f.effects),
+                f.complexity,
+                -judge.fitting.cost(judge.fit_data - f.fit),
+                -judge.checking.cost(judge.check_data - f.check) if unused else 0.0,
+                _left(judge, f),
+                judge.better(declared, f) if f.effects else None,
+                tuple(map(_force, forces[f.labels])) if f.labels in forces else None,
+                _excess(judge, f, run),
+            )
+        )
+    rough = _first_orders(models, rounds) if rounds else []
+    return Table(
+        (*models, *rough),
+        tuple(_compared(judge, fits, models)),
+        candidates_of(rounds),
+        judge.fitting.size,
+        judge.checking.size if unused else 0,
+        ended=tuple(ended.items()),
+    )
+
+
+def candidates_of(rounds: Sequence[Round]) -> int:
+    """Number of distinct candidates that there were to choose from."""
+    return max((len(r.signatures) + len(r.aside) for r in rounds), default=0)
+
+
+def _excess(judge: Judge, fitted: Fitted, run: str) -> float:
+    """Sum of squares over sigma beyond noise that a model leaves in a run."""
+    rows = judge.fitting.by_run(judge.fit_data - fitted.fit)
+    values = rows[judge.fitting.names.index(run)]
+    values = values[np.isfinite(values)]
+    return float(values @ values) - values.size
+
+
+def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
+    found = []
+    parts = [("identification", judge.fitting, judge.fit_data - fitted.fit)]
+    if judge.unused:
+        parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
+    for purpose, stack, residual in parts:
+        farthest = _farthest(stack, residual)
+        for test in whiteness_tests(residual, stack):
+            run, size = farthest[test.channel]
+            found.append(
+                Left(test.channel, purpose, test.rms, test.lasting, test.p_value, run, size)
+            )
+    return tuple(found)
+
+
+def _farthest(stack: SampleStack, residual: Vector) -> dict[str, tuple[str, float]]:
+    """Channel -> run in which its RMS over noise is largest, and that."""
+    found: dict[str, tuple[str, float]] = {}
+    for run, rows in zip(stack.runs, stack.by_run(residual), strict=True):
+        for channel, values in zip(stack.problem.channels, rows.T, strict=True):
+            good = values[np.isfinite(values)]
+            if good.size:
+                size = float(np.sqrt(np.mean(good**2)))
+                if size >= found.get(channel.name, ("", 0.0))[1]:
+                    found[channel.name] = run.name, size
+    return found
+
+
+def _force(place: Place) -> Force:
+    best = max(place.curves, key=lambda curve: curve.explained)
+    return Force(
+        place.instance, place.port, place.element, place.unit, best.driver, best.run,
+        best.explained, place.evidence,
+    )  # fmt: skip
+
+
+def _compared(judge: Judge, fits: list[Fitted], models: list[Model]) -> list[Comparison]:
+    """Comparisons of models that explain nearly as much as the best one."""
+    most = max((m.score for m in models[1:]), default=0.0)
+    least = models[0].score + NEAR * (most - models[0].score)
+    near = [i for i, m in enumerate(models) if i and m.score >= least]
+    near = sorted(near, key=lambda i: -models[i].score)[:MOST]
+    return [Comparison(i, k, judge.better(fits[i], fits[k])) for i, k in combinations(near, 2)]
+
+
+def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:
+    """What the first round's best candidates without a fit would take, to first order."""
+    known = {law.label for m in models for law in m.laws}
+    found: list[Model] = []
+    for item in rounds[0].signatures:
+        if len(found) == FIRST_ORDERS:
+            break
+        if item.unseen or item.candidate.label in known or not item.score.gain > 0.0:
+            continue
+        p, prefix = item.strength, item.candidate.prefix
+        value, half = item.value * item.score.amplitude, NORMAL * item.score.spread
+        half *= abs(item.value) / item.score.size
+        size = Value(
+            p.name.removeprefix(prefix), p.unit, value, max(value - half, p.minimum),
+            min(value + half, p.maximum), p.minimum, p.maximum, True,
+        )  # fmt: skip
+        law = Law(
+            item.candidate.effect, item.candidate.instance, item.candidate.port, size.name, (size,),
+            item.candidate.text, p.minimum if p.inverse else 0.0, max(item.probe.own, 1),
+            item.candidate.contains, item.same,
+            rounds[0].corrected.get(item.candidate.label),
+        )  # fmt: skip
+        declared = models[0]
+        found.append(
+            Model((law,), declared.free + 1, declared.fitted + item.score.gain, declared.unused,
+                  (), rough=True)
+        )  # fmt: skip
+    return found

@@ -1,0 +1,337 @@
+"""The verdict: a pure function of the table of models.
+
+    bad_data         the data cannot be used
+    effect_found     the best set of laws stands up: unused runs want it, each of its laws is there
+                     and is missed if left out, and it leaves noise, or so little that no law does
+    confounded       so does another set that the data do not tell from it
+    nothing_missing  no set stands up, and the declared model leaves noise
+    unexplained      anything else, with the nearest laws as hints; a hint is not a name
+
+Sentence, tables and JSON are written from the same facts: `answer.Verdict`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .answer import Hint, Verdict, over, percent
+from .facts import Force, Gain, Law, Left, Model, Table
+from .linear import MATERIAL
+from .models import GATE_Z, LEVEL
+from .whiteness import CALIBRATED, structured
+
+FITTED = "identification"
+TENTH = 0.1
+"""An order of magnitude, of RMS: that is what the tables show."""
+HALF = 0.5
+"""Share of what is left from which a free force at a port explains most of it: then something that
+acts there is still missing."""
+SAME = 2e-4
+"""Share of what a law explains by which the same law elsewhere may do worse: fits end that far from
+the minimum that both have in common."""
+HAIR = 0.005
+"""The same for its special case, where nothing that it has beyond that is determined: fits of laws
+that stick end that far from their minima."""
+HINTS, LEAST = 3, 0.01
+"""Nearest sets that are listed, and the share of the excess that a hint must explain: what does not
+show in the percentage that is printed helps nobody."""
+
+
+def gate(candidates: int) -> float:
+    """Log likelihood that unused runs must gain where there were so many candidates [nats].
+
+    The likelihood ratio of two fixed models has mean 1 if the simpler one is true, so for any of
+    N candidates it exceeds N / LEVEL with at most the probability LEVEL (Markov).
+    """
+    return math.log(max(candidates, 1) / LEVEL)
+
+
+def decide(table: Table) -> Verdict:
+    """The verdict on a table."""
+    if table.errors:
+        return Verdict("bad_data", errors=table.errors)
+    declared, unused = table.models[0], table.unused_count > 0
+    best = proposal(table)
+    if best is not None and stands(table, best):
+        return _named(table, best)
+    left = above(declared)
+    if best is None and not left:
+        return Verdict("nothing_missing", unused=unused, ended=table.ended)
+    force = declared.forces[0] if declared.forces else None
+    return Verdict("unexplained", left=left, hints=_hints(table), force=force, unused=unused,
+                   ended=table.ended)  # fmt: skip
+
+
+def proposal(table: Table) -> int | None:
+    """The best set of those that unused runs want and whose laws are all there and missed.
+
+    A law whose other parameters show nothing gives way to its special case.
+    """
+    able = [i for i, model in enumerate(table.models) if not doubts(table, model)]
+    if not able:
+        return None
+    best = max(able, key=lambda i: (table.models[i].score, sorted(table.models[i].labels)))
+    while (simple := _special(table, best, able)) is not None:
+        best = simple
+    alike = [i for i in able if i == best or not _apart(table, best, i)]
+    one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
+    return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
+
+
+def doubts(table: Table, model: Model) -> list[str]:
+    """Why a set cannot be named whatever it leaves; nothing for one that can."""
+    if not model.laws:
+        return ["it is the declared model"]
+    found = []
+    if model.rough:
+        found.append("it was not worth a fit")
+    elif not table.unused_count:
+        found.append("no run was kept unused to judge by")
+    elif not wanted(model.gain, table.candidates):
+        gain, z = (model.gain.unused, model.gain.unused_z) if model.gain else (0.0, 0.0)
+        found.append(
+            f"unused runs do not want it ({gain:.3g} nats by {z:.2g} standard deviations; "
+            f"{gate(table.candidates):.3g} by {GATE_Z:g} are needed)"
+        )
+    for law in model.laws:
+        if not law.there:
+            edge = max(law.absent, law.size.minimum)
+            found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
+        if model.rough or not table.unused_count:
+            continue
+        if law.missed is None:
+            found.append(f"what it is without {law.label} was not asked")
+        elif not wanted(law.missed, table.candidates):
+            if len(model.laws) > 1:
+                found.append(f"unused runs do not miss {law.label} if it is left out")
+        elif law.missed.change <= MATERIAL:
+            found.append(f"{law.label} changes no channel by {MATERIAL:g} of its noise")
+    return list(dict.fromkeys(found))
+
+
+def wanted(gain: Gain | None, candidates: int) -> bool:
+    """Whether unused runs want the better one of two models, and fitted runs do not speak against.
+
+    Args:
+        gain: of one over the other.
+        candidates: number of laws that there were to choose from.
+    """
+    return (
+        gain is not None
+        and gain.unused > gate(candidates)
+        and gain.unused_z > GATE_Z
+        and gain.fitted > 0.0
+    )
+
+
+def above(model: Model) -> tuple[Left, ...]:
+    """Channels that a model leaves above their noise, the worst first."""
+    return tuple(
+        sorted((x for x in model.left if structured(x.lasting, x.p_value)), key=lambda x: -x.rms)
+    )
+
+
+def stands(table: Table, place: int) -> bool:
+    """Whether what a set leaves is noise, or nothing that another law could explain.
+
+    That is: its RMS is a tenth of what was explained, and no more in unused runs than in fitted
+    ones; no free force at a port would have left less of the declared model's rest, and none
+    explains half of its own.
+    """
+    model, declared = table.models[place], table.models[0]
+    if not above(model):
+        return True
+    if not model.forces or _most(model.forces).explained >= HALF:
+        return False
+    if not declared.forces or _by_force(declared, model) > 0.0 or not carries_over(model):
+        return False
+    left = _excess(table, model)
+    return left <= TENTH**2 * (_excess(table, declared) - left)
+
+
+def carries_over(model: Model) -> bool:
+    """Whether no channel is farther above its noise in unused runs than in those that were fitted.
+
+    Parameters make the best of a wrong law, but in the runs that they are fitted to alone.
+    """
+    fitted = {x.channel: x.lasting for x in model.left if x.purpose == FITTED}
+    return all(
+        x.lasting <= CALIBRATED * max(fitted.get(x.channel, 1.0), 1.0)
+        for x in above(model) if x.purpose != FITTED
+    )  # fmt: skip
+
+
+def _by_force(declared: Model, model: Model) -> float:
+    """What a model leaves of the worst run more than a free force on the declared one would."""
+    share = _most(declared.forces).explained if declared.forces else 0.0
+    return model.worst - (1.0 - share) * declared.worst
+
+
+def _most(forces: Sequence[Force]) -> Force:
+    return max(forces, key=lambda force: force.explained)
+
+
+def _excess(table: Table, model: Model) -> float:
+    """Sum of squares over sigma beyond what noise has, on all runs."""
+    return -2.0 * (model.fitted + model.unused) - table.fitted_count - table.unused_count
+
+
+def _explained(table: Table, model: Model, less: Model) -> float:
+    """Share of what a model leaves beyond noise that another one takes away."""
+    excess = _excess(table, less)
+    if model.rough:  # of unused runs a first order says nothing
+        excess = -2.0 * less.fitted - table.fitted_count
+    taken = 2.0 * (model.fitted + model.unused - less.fitted - less.unused)
+    return min(max(taken / excess, 0.0), 1.0) if excess > 0.0 else 0.0
+
+
+def _size_of(model: Model) -> tuple[int, int, int]:
+    """How simple a set is."""
+    return len(model.laws), sum(law.own for law in model.laws), model.free
+
+
+def _apart(table: Table, first: int, second: int) -> bool:
+    """Whether the data tell two models apart; those that were not compared are."""
+    if first == second:
+        return False
+    for c in table.comparisons:
+        if {c.first, c.second} == {first, second}:
+            need = gate(table.candidates)
+            told = any(
+                abs(nats) > need and abs(z) > GATE_Z
+                for nats, z in ((c.gain.fitted, c.gain.fitted_z), (c.gain.unused, c.gain.unused_z))
+            )
+            return told and not _elsewhere(table, first, second)
+    return True
+
+
+def _differ(first: Model, second: Model) -> tuple[list[Law], list[Law]]:
+    """Laws that only one of two sets has."""
+    return (
+        [law for law in first.laws if law.label not in second.labels],
+        [law for law in second.laws if law.label not in first.labels],
+    )
+
+
+def _elsewhere(table: Table, first: int, second: int) -> bool:
+    """Whether two sets differ by the place of one law and are equal but for a hair."""
+    one, two = table.models[first], table.models[second]
+    mine, other = _differ(one, two)
+    if len(mine) != 1 or len(other) != 1 or mine[0].effect != other[0].effect:
+        return False
+    gain = mine[0].missed or one.gain
+    most = abs(gain.fitted + gain.unused) if gain is not None else 0.0
+    return abs(one.fitted + one.unused - two.fitted - two.unused) < SAME * most
+
+
+def _one_answer(first: Model, second: Model) -> bool:
+    """Whether two sets differ by one law, and one has the other's, or a special case of it."""
+    mine, other = _differ(first, second)
+    if len(mine) != 1 or len(other) != 1:
+        return False
+    one, two = mine[0], other[0]
+    return one.effect in (two.effect, *two.contains) or two.effect in one.contains
+
+
+def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
+    """A set with the special case of a law of which nothing else is determined, if it does as well.
+
+    A bristle that gives way by nothing is dry friction.
+    """
+    model, declared = table.models[place], table.models[0]
+    least = (1.0 - HAIR) * (model.fitted + model.unused - declared.fitted - declared.unused)
+    found = []
+    for i in able:
+        mine, other = _differ(model, table.models[i])
+        if len(mine) != 1 or len(other) != 1:
+            continue
+        general, simple = mine[0], other[0]
+        further = [v for v in general.values if v.name != general.strength]
+        if (
+            further and not any(v.determined for v in further)
+            and simple.place == general.place and simple.effect in general.contains
+            and table.models[i].fitted + table.models[i].unused
+            - declared.fitted - declared.unused >= least
+        ):  # fmt: skip
+            found.append(i)
+    return max(found, key=lambda i: table.models[i].score, default=None)
+
+
+def _named(table: Table, best: int) -> Verdict:
+    """The verdict that names a set, or says what it is confounded with."""
+    model, declared = table.models[best], table.models[0]
+    places: dict[str, list[str]] = {
+        law.label: [t for t in law.twins if t not in _fitted(table)] for law in model.laws
+    }
+    rivals: list[tuple[int, float]] = []
+    others: list[tuple[str, ...]] = []
+    for i, rival in enumerate(table.models):
+        if i == best or not rival.laws or rival.rough or _apart(table, best, i):
+            continue
+        mine, other = _differ(model, rival)
+        if not mine or not other or len(rival.laws) > len(model.laws):
+            continue  # more than is missed
+        if not all(law.there for law in rival.laws):
+            continue  # a smaller set
+        if len(mine) == len(other) == 1 and mine[0].effect == other[0].effect:
+            places[mine[0].label].append(other[0].place)
+        elif not _one_answer(model, rival):
+            rivals.append((i, rival.score - model.score))
+            others.append(tuple(law.label for law in other))
+    order = sorted(range(len(rivals)), key=lambda k: (-rivals[k][1], others[k]))
+    shares = {}
+    for law in model.laws:
+        gain = law.missed
+        beyond = _excess(table, model) + (2.0 * (gain.fitted + gain.unused) if gain else 0.0)
+        taken = 2.0 * (gain.fitted + gain.unused) if gain else 0.0
+        shares[law.label] = min(max(taken / beyond, 0.0), 1.0) if beyond > 0.0 else 0.0
+    return Verdict(
+        "confounded" if rivals else "effect_found",
+        best,
+        model.laws,
+        _explained(table, model, declared),
+        shares,
+        tuple(rivals[k] for k in order),
+        tuple(others[k] for k in order),
+        {label: tuple(sorted(found)) for label, found in places.items() if found},
+        above(model),
+        force=model.forces[0] if model.forces else None,
+        ended=table.ended,
+    )
+
+
+def _fitted(table: Table) -> set[str]:
+    """Labels of all laws that were fitted."""
+    return {law.label for model in table.models if not model.rough for law in model.laws}
+
+
+def _hints(table: Table) -> tuple[Hint, ...]:
+    """Sets that are nearest to the data, the best first, and why they are no names."""
+    declared, found, seen = table.models[0], [], set()
+
+    def order(model: Model) -> tuple[bool, bool, float]:
+        return model.rough, not all(law.there for law in model.laws), -model.score
+
+    for model in sorted(table.models[1:], key=order):
+        explained = _explained(table, model, declared)
+        if not model.laws or model.labels in seen or explained < LEAST:
+            continue
+        seen.add(model.labels)
+        left = above(model)
+        why = doubts(table, model)
+        if left:
+            why.append(f"it leaves more than noise in {over(left)}")
+        if left and not carries_over(model):
+            why.append("it leaves more in unused runs than in those that were fitted")
+        if left and declared.forces and not model.rough and _by_force(declared, model) > 0.0:
+            force = _most(declared.forces)
+            why.append(f"a free force at {force.label} would explain more of the worst run")
+        if left and model.forces and _most(model.forces).explained >= HALF:
+            force = _most(model.forces)
+            share = percent(force.explained)
+            why.append(f"a free force at {force.label} explains {share} of what it leaves")
+        found.append(
+            Hint(model.laws, explained, left[0] if left else None, tuple(why), model.rough)
+        )
+    return tuple(hint for hint in found if hint.why)[:HINTS]
