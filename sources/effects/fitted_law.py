@@ -1,6 +1,6 @@
 """Law given by numbers: a smooth curve of one signal, or a smooth surface over two.
 
-    u = g sum_k sum_m c_km N_k(x) P_m(y),   x = x_time t + sum_i x_i s_i,   y likewise
+    u = g sum_k sum_m c_km N_k(x) P_m(y),   x = wx_time t + sum_i wx_i s_i,   y likewise
 
 s_i are the scalar signals of the balance (speed, angle, load, ...). N_1 ... N_12 are cubic B-splines
 on knots that are equally spaced in asinh(x / x_scale) from `x_first` to `x_last`: dense around 0
@@ -108,7 +108,7 @@ def law(e: EffectModel) -> None:
 
 
 def _weight(axis: str, signal: str, default: bool) -> Quantity:
-    return Quantity(f"{axis}_{signal}", "1", f"weight of {signal} in {axis}", start=float(default))
+    return Quantity(f"w{axis}_{signal}", "1", f"weight of {signal} in {axis}", start=float(default))
 
 
 def _spline(away: SX) -> SX:

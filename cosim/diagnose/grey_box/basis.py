@@ -97,6 +97,10 @@ class Shape:
         names = [axis.signal for axis in self.axes]
         return (" x " if self.form == "x * y" else " + ").join(names)
 
+    def narrowed(self, form: str) -> Shape:
+        """The same in a form that is a special case of its own."""
+        return Shape(form, self.x if "x" in form else None, self.y if "y" in form else None)
+
     @cached_property
     def expansion(self) -> Vector:
         """Coefficients c (rows) of the free ones (columns)."""

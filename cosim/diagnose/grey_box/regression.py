@@ -93,7 +93,8 @@ class Regression:
 
     Attributes:
         prior: with t and rho.
-        value, covariance: of the free coefficients, declared parameters integrated out.
+        matrix: information on the free coefficients, declared parameters integrated out.
+        value, covariance: of the free coefficients.
         declared: change of the declared parameters that goes with them, scaled.
         evidence: log evidence against no law [nats].
         expected: log likelihood that runs gain which were left out one by one [nats]; `evidence`
@@ -101,6 +102,7 @@ class Regression:
     """
 
     prior: Prior
+    matrix: Vector
     value: Vector
     covariance: Vector
     declared: Vector
@@ -130,8 +132,8 @@ def regress(grams: Sequence[Gram], penalties: Sequence[Vector], declared: Vector
             for held in grams
         )
     return Regression(
-        prior, value, cho_solve(factor, np.eye(free)), back @ np.append(-value, 1.0), evidence,
-        float(expected),
+        prior, matrix, value, cho_solve(factor, np.eye(free)), back @ np.append(-value, 1.0),
+        evidence, float(expected),
     )  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""A law from data where the catalogue has none: smooth curves at a place, through the FMU."""

@@ -1,0 +1,265 @@
+"""Laws of different shapes at one place, tried to first order and fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from ...calibrate.fit import CORRECTION, Effort, fit
+from ...calibrate.normal import BOUNDS
+from ...calibrate.parts import MeasuredRun, Parameter, Sensitivity
+from ...calibrate.problem import Problem
+from ...calibrate.simulator import Simulator
+from ...errors import CosimError
+from ...system.variants import component
+from ..candidates import Candidate
+from ..deferred import corrected
+from ..models import Fitted, compare
+from .basis import Shape
+from .bench import EFFECT, LawBench
+from .regression import Gram, Regression, regress
+
+Vector = NDArray[np.float64]
+DIRECTIONS = 20
+"""Directions of the coefficients that are fitted at most, those that gain most first."""
+GAINS = 0.5
+"""Least gain of a direction that is fitted [nats]: what one parameter gains on noise."""
+SHARES = (1.0, 0.5, 0.2, 0.05)
+"""Of the law that first orders ask for, where a fit begins: whichever is best."""
+WIDE = 100.0
+"""Span of a direction in its standard deviations: differences take a hundredth of it."""
+FARTHEST = 1e4
+"""Bound on a direction in its prior standard deviations: none."""
+QUICK = Effort("near", "draft", iterations=4)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A law to first order around a point.
+
+    Attributes:
+        shape: of the law.
+        grams: of the runs, for the free coefficients, the residual being that of no law.
+        regression: their values.
+        expansion: the coefficients c by the free ones.
+        words: name of each free coefficient of a law of named terms, () of a smooth one.
+    """
+
+    shape: Shape
+    grams: tuple[Gram, ...]
+    regression: Regression
+    expansion: Vector
+    words: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> float:
+        """See `Regression.expected`."""
+        return self.regression.expected
+
+
+@dataclass(frozen=True)
+class Law:
+    """A fitted law.
+
+    Attributes:
+        trial: its shape, and what it came from.
+        fitted: the model with it.
+        directions: free coefficients (rows) by what was fitted (columns).
+        rest: directions that were not fitted, each as long as its standard deviation.
+    """
+
+    trial: Trial
+    fitted: Fitted
+    directions: Vector
+    rest: Vector
+
+    @property
+    def shape(self) -> Shape:
+        """What it depends on."""
+        return self.trial.shape
+
+    @property
+    def fits(self) -> slice:
+        """Where what was fitted of it is among the model's parameters."""
+        return slice(self.fitted.free - self.directions.shape[1], self.fitted.free)
+
+    @property
+    def free(self) -> Vector:
+        """Free coefficients."""
+        return np.asarray(self.directions @ self.fitted.estimate.theta[self.fits])
+
+    @property
+    def coefficients(self) -> Vector:
+        """The 13 x 8 of the effect."""
+        return np.asarray(self.trial.expansion @ self.free)
+
+    def values(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
+        """The law at points, and its standard deviations there."""
+        design = self.design(x, y)
+        covariance = self.fitted.estimate.covariance[self.fits, self.fits]
+        known = design @ self.directions
+        variance = np.einsum("ij,jk,ik->i", known, covariance, known)
+        variance += np.sum((design @ self.rest) ** 2, axis=1)
+        return design @ self.free, np.sqrt(variance)
+
+    def design(self, x: Vector, y: Vector) -> Vector:
+        """Functions of the free coefficients (columns) at points."""
+        columns = self.shape.design(x, y)
+        return np.asarray(columns @ np.linalg.pinv(self.shape.expansion) @ self.trial.expansion)
+
+
+class Maker:
+    """Tries and fits laws at a place.
+
+    Args:
+        bench: the model with a law there.
+    """
+
+    def __init__(self, bench: LawBench) -> None:
+        self.bench = bench
+        self.search = bench.search
+        base = bench.base.problem
+        self.count = len(base.parameters)
+        self.declared = np.array(
+            [(s / p.prior) ** 2 if p.prior else BOUNDS
+             for s, p in zip(base.scale.tolist(), base.parameters, strict=True)]
+        )  # fmt: skip
+
+    def point(
+        self, fitted: Fitted
+    ) -> tuple[Vector, dict[str, Vector], list[Sensitivity], tuple[str, ...]]:
+        """Declared parameters, residuals by run, derivatives and held parameters of a model."""
+        rows = self.search.fitting.by_run(self.search.fit_data - fitted.fit)
+        residual = dict(zip(self.search.fitting.names, rows, strict=True))
+        slopes = []
+        for item in fitted.estimate.jacobian:
+            if item.run in residual:
+                mine = item.columns < self.count
+                slopes.append(
+                    item._replace(columns=item.columns[mine], values=item.values[:, :, mine])
+                )
+        held = tuple(n for n in fitted.estimate.at_bound if n in self.bench.base.problem.names)
+        return fitted.estimate.theta[: self.count], residual, slopes, held
+
+    def tried(
+        self, shape: Shape, around: Law | None = None, directions: Vector | None = None,
+        forms: Sequence[str] = (),
+    ) -> list[Trial]:  # fmt: skip
+        """Laws of a shape to first order, around a model without one or with one.
+
+        Args:
+            shape: the widest one.
+            around: a law of part of the shape.
+            directions: of its free coefficients, all if not given.
+            forms: narrower ones that the same responses tell, too.
+        """
+        bench = self.bench
+        fitted = bench.base if around is None else around.fitted
+        theta, residual, slopes, held = self.point(fitted)
+        now = np.zeros(shape.expansion.shape[0]) if around is None else around.coefficients
+        directions = np.eye(shape.expansion.shape[1]) if directions is None else directions
+        asked = shape.expansion @ directions
+        grams = bench.grams(shape, asked, theta, now, residual, slopes, held)
+        inner = np.linalg.pinv(asked)
+        found = []
+        for one in (shape, *(shape.narrowed(form) for form in forms)):
+            turn, penalties = one.expansion, one.penalties()
+            if one is shape:
+                turn, penalties = asked, [directions.T @ p @ directions for p in penalties]
+            mine = tuple(g.form(inner @ turn, inner @ now) for g in grams)
+            found.append(Trial(one, mine, regress(mine, penalties, self.declared), turn))
+        return found
+
+    def fitted(self, trial: Trial, around: Law | None = None, *, final: bool = False) -> Law:
+        """A law fitted through the FMU together with all declared parameters.
+
+        Args:
+            trial: where it begins.
+            around: the law around which that was taken, if one.
+            final: with intervals.
+
+        Raises:
+            CosimError: it cannot be simulated.
+        """
+        bench, base, regression = self.bench, self.bench.base, trial.regression
+        precision = regression.prior.law
+        values, vectors = eigh(regression.matrix, precision)
+        values = np.maximum(values, 0.0)
+        start = vectors.T @ precision @ regression.value
+        gains = 0.5 * start**2 * (1.0 + values)
+        order = np.argsort(-gains)
+        kept = order[: max(min(DIRECTIONS, int(np.sum(gains > GAINS))), 1)]
+        if trial.words:
+            kept = order
+        others = np.setdiff1d(order, kept)
+        deviation = 1.0 / np.sqrt(1.0 + values)
+        targets = trial.expansion @ vectors[:, kept]
+        prefix = bench.site.prefix
+        parameters = [
+            Parameter(
+                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
+                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
+                "effect", prior=1.0, span=float(min(WIDE * deviation[kept[i]], 1.0)),
+            )
+            for i, column in enumerate(targets.T)
+        ]  # fmt: skip
+        problem = Summed.of(bench.shaped(trial.shape, parameters))
+        simulator = self.search.simulator.of(problem).limited(bench.limits)
+        theta = (base if around is None else around.fitted).estimate.theta[: self.count]
+        change = regression.declared * base.problem.scale
+        starts = [
+            np.concatenate(
+                [theta + share * change, (share if around is None else 1.0) * start[kept]]
+            )
+            for share in (SHARES if around is None else (1.0, 0.0))
+        ]
+        starts = [np.clip(one, problem.lower, problem.upper) for one in starts]
+        costs = [self._cost(simulator, one) for one in starts]
+        if not np.isfinite(min(costs)):
+            raise CosimError(f"{bench.site.label}: no share of the law can be simulated")
+        result = fit(simulator, starts[int(np.argmin(costs))], effort=QUICK)
+        if final:
+            right = corrected(simulator, result.theta, self.search.raw)
+            result = fit(right, result.theta, effort=CORRECTION)
+        found = self.search.judged(result)
+        found.effects = (*base.effects, self.candidate)
+        found.gate = compare(self.search.check_data, base.check, found.check, self.search.checking)
+        rest = vectors[:, others] * deviation[others]
+        return Law(trial, found, vectors[:, kept], rest)
+
+    def _cost(self, simulator: Simulator, theta: Vector) -> float:
+        try:
+            return self.search.cost(simulator, theta)
+        except CosimError:  # too strong to be simulated: a smaller share is tried
+            return np.inf
+
+    @property
+    def candidate(self) -> Candidate:
+        """The law as what was added to the model."""
+        site = self.bench.site
+        kind = component(self.bench.base.problem.instances[site.instance])
+        return Candidate(site.instance, kind, EFFECT, site.port, "Law given by numbers.")
+
+
+class Summed(Problem):
+    """A problem of which a variable that several parameters set gets their sum."""
+
+    @classmethod
+    def of(cls, problem: Problem) -> Summed:
+        """The same problem."""
+        return cls(**{f.name: getattr(problem, f.name) for f in fields(problem)})
+
+    def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
+        """See `Problem.values`."""
+        run = self.run(run) if isinstance(run, str) else run
+        found = super().values(theta, run)
+        sums: dict[str, float] = {}
+        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
+            if parameter.run in ("", run.name):
+                for name, part in parameter.set(value).items():
+                    sums[name] = sums.get(name, 0.0) + part
+        return found | sums
