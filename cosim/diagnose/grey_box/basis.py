@@ -73,6 +73,11 @@ def spline(away: Vector) -> Vector:
     return np.asarray((far**3 - 4.0 * near**3) / 6.0)
 
 
+def kron(first: Vector, second: Vector) -> Vector:
+    """Kronecker product."""
+    return np.asarray(np.kron(first, second), dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class Shape:
     """What a law depends on and in which form.
@@ -105,8 +110,8 @@ class Shape:
     def expansion(self) -> Vector:
         """Coefficients c (rows) of the free ones (columns)."""
         ones = np.ones((ALONG_Y, 1)), np.ones((ALONG_X + 1, 1))
-        only_x = np.kron(np.eye(ALONG_X + 1), ones[0])
-        only_y = np.kron(ones[1], np.eye(ALONG_Y))
+        only_x = kron(np.eye(ALONG_X + 1), ones[0])
+        only_y = kron(ones[1], np.eye(ALONG_Y))
         only_y[ALONG_X * ALONG_Y :] = 0.0  # a jump of x is none of y
         if self.form == "x":
             return only_x
@@ -135,7 +140,7 @@ class Shape:
             none = np.zeros((ALONG_X + 1, ALONG_Y))
             return [np.block([[x, none], [none.T, 0.0 * y]]),
                     np.block([[0.0 * x, none], [none.T, y]])]  # fmt: skip
-        return [np.kron(x, np.eye(ALONG_Y)), np.kron(np.eye(ALONG_X + 1), y)]
+        return [kron(x, np.eye(ALONG_Y)), kron(np.eye(ALONG_X + 1), y)]
 
     def design(self, x: Vector, y: Vector) -> Vector:
         """Values of the free coefficients' functions (columns) at points."""

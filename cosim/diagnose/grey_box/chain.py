@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..models import LEVEL, Fitted
+from ..models import GATE, LEVEL, Fitted
 from ..search import Search
-from .basis import Shape
+from ..whiteness import whiteness_tests
+from .basis import ALONG_Y, Shape
 from .bench import ANGLES, LawBench, Site
 from .trial import Law, Maker, Trial
 
@@ -47,28 +48,107 @@ def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]
     needed = math.log(len(trials) / LEVEL)
     if best.expected < needed:
         return None
-    law = maker.fitted(best)
-    say(f"law of {best.shape.label} fitted: {_left(search, law)}")
+    law = improved(maker, best, say)
+    if law.fitted.gate is None:
+        return None
+    others = pairs(maker, law) if lacking(search, law.fitted) else []
+    needed = math.log((len(trials) + len(others)) / LEVEL)
+    gain, better = max(others, key=lambda item: item[0], default=(0.0, best))
+    if gain > needed:
+        say(f"a law of {better.shape.label} gains {gain:.0f} nats more, to first order")
+        law = improved(maker, better, say, law)
     (again,) = maker.tried(law.shape, law)
     law = maker.fitted(again, law, final=True)
     say(f"law of {law.shape.label}: {_left(search, law)}")
     return law
 
 
+def improved(
+    maker: Maker, trial: Trial, say: Callable[[str], None], around: Law | None = None
+) -> Law:
+    """A law fitted roughly, its jump as steep as the data want it."""
+    law = maker.fitted(trial, around)
+    say(f"law of {law.shape.label} fitted: {_left(maker.search, law)}")
+    steep = maker.sharper(law)
+    if steep is not law:
+        (again,) = maker.tried(steep.shape, steep)
+        law = maker.fitted(again, steep)
+        say(f"with a steeper jump: {_left(maker.search, law)}")
+    return law
+
+
+def pairs(maker: Maker, law: Law) -> list[tuple[float, Trial]]:
+    """Laws of another signal beside that of a law, to first order, with what they gain on it.
+
+    A surface over both must do better than a sum of two curves by the gate.
+    """
+    bench, found = maker.bench, []
+    used = {axis.signal for axis in law.shape.axes}
+    for signal in varying(bench):
+        if signal in used:
+            continue
+        if law.shape.x is not None:
+            order = best_order(maker, law) if signal in ANGLES else 1
+            shape = Shape("x * y", law.shape.x, bench.axis_y(signal, order))
+        else:
+            shape = Shape("x * y", bench.axis_x(signal, dense=dense(bench, signal)), law.shape.y)
+        surface, both, *alone = maker.tried(shape, law, forms=("x + y", "x", "y"))
+        (own,) = (t for t in alone if t.shape.form == law.shape.form)
+        (other,) = (t for t in alone if t.shape.form != law.shape.form)
+        found += [
+            (both.expected - own.expected, both),
+            (surface.expected - own.expected - GATE, surface),
+            (other.expected - own.expected, other),
+        ]
+    return found
+
+
+def best_order(maker: Maker, around: Law | None) -> int:
+    """Cycles per turn of the angle that explain most of what a model lacks, to first order."""
+    bench, best = maker.bench, (-math.inf, 1)
+    phases = 2.0 * np.pi * np.arange(ALONG_Y) / ALONG_Y
+    waves = np.column_stack([np.cos(phases), np.sin(phases)])
+    for order in range(1, ORDERS + 1):
+        y = bench.axis_y(ANGLES[0], order)
+        shape = Shape("y", y=y) if around is None else Shape("x * y", around.shape.x, y)
+        directions = waves
+        if around is not None:
+            directions = np.linalg.pinv(shape.expansion) @ shape.narrowed("y").expansion @ waves
+        (trial,) = maker.tried(shape, around, directions, beyond=True)
+        best = max(best, (trial.expected, order), key=lambda item: item[0])
+    return best[1]
+
+
+def dense(bench: LawBench, signal: str) -> float:
+    """Where a signal's knots are dense: at 0 if it crosses it, else nowhere."""
+    low, high = bench.ranges[signal]
+    return DENSE if min(-low, high) > CROSSED * max(-low, high) else math.inf
+
+
+def varying(bench: LawBench) -> list[str]:
+    """Signals that move in the identification runs."""
+    return [
+        signal for signal in bench.signals
+        if np.ptp(bench.ranges[signal]) > 1e-9 * max(*map(abs, bench.ranges[signal]), 1e-9)
+    ]  # fmt: skip
+
+
+def lacking(search: Search, fitted: Fitted) -> bool:
+    """Whether a model leaves more than noise in runs of either purpose."""
+    unused = whiteness_tests(search.check_data - fitted.check, search.checking)
+    return search.lacking(fitted) or any(test.structured for test in unused)
+
+
 def singles(maker: Maker) -> list[Trial]:
     """Laws of one signal of the place, to first order."""
     bench, found = maker.bench, []
-    for signal in bench.signals:
-        low, high = bench.ranges[signal]
-        if not high - low > 1e-9 * max(abs(low), abs(high), 1e-9):
-            continue
-        shapes = []
+    for signal in varying(bench):
         if signal in ANGLES:
-            shapes.append(Shape("y", y=bench.axis_y(signal)))
+            orders = sorted({1, best_order(maker, None)})
+            shapes = [Shape("y", y=bench.axis_y(signal, order)) for order in orders]
         else:
-            shapes.append(Shape("x", x=bench.axis_x(signal)))
-            if min(-low, high) > CROSSED * max(-low, high):
-                shapes.append(Shape("x", x=bench.axis_x(signal, dense=DENSE)))
+            widths = sorted({math.inf, dense(bench, signal)})
+            shapes = [Shape("x", x=bench.axis_x(signal, dense=width)) for width in widths]
         for shape in shapes:
             found += maker.tried(shape)
     return found

@@ -6,7 +6,7 @@ Coefficients have the prior
 
     c ~ N(0, t^2 (1 + sum_a rho_a D_a' D_a)^-1)
 
-(D_a: second differences along axis a); size t and smoothness rho are those of the greatest evidence.
+(D_a: second differences along axis a); size t and smoothness rho are those of greatest evidence.
 Declared parameters have theirs, one span wide.
 
 Source: MacKay, Neural Computation 4, 1992 (evidence); Eilers and Marx, Statistical Science 11, 1996
@@ -143,7 +143,7 @@ def _integrated(total: Vector, free: int, declared: Vector) -> tuple[Vector, Vec
     outer = total[free:-1][:, [*range(free), -1]]
     back = np.linalg.solve(inner, outer) if declared.size else outer
     rest = total[np.ix_([*range(free), -1], [*range(free), -1])] - outer.T @ back
-    return rest[:free, :free], rest[:free, -1], back
+    return rest[:free, :free], rest[:free, -1], np.asarray(back, dtype=np.float64)
 
 
 def _evidence(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from ...errors import CosimError
 from ...system.variants import component
 from ..candidates import Candidate
 from ..deferred import corrected
-from ..models import Fitted, compare
+from ..models import GATE, Fitted, compare
 from .basis import Shape
 from .bench import EFFECT, LawBench
 from .regression import Gram, Regression, regress
@@ -34,6 +34,8 @@ WIDE = 100.0
 """Span of a direction in its standard deviations: differences take a hundredth of it."""
 FARTHEST = 1e4
 """Bound on a direction in its prior standard deviations: none."""
+NARROWER = (0.1, 1e-2, 1e-3)
+"""Widths of the jump that are tried, over the usual one."""
 QUICK = Effort("near", "draft", iterations=4)
 
 
@@ -147,7 +149,7 @@ class Maker:
 
     def tried(
         self, shape: Shape, around: Law | None = None, directions: Vector | None = None,
-        forms: Sequence[str] = (),
+        forms: Sequence[str] = (), *, beyond: bool = False,
     ) -> list[Trial]:  # fmt: skip
         """Laws of a shape to first order, around a model without one or with one.
 
@@ -156,6 +158,7 @@ class Maker:
             around: a law of part of the shape.
             directions: of its free coefficients, all if not given.
             forms: narrower ones that the same responses tell, too.
+            beyond: what is to be added to the law around which it is taken, and not in its place.
         """
         bench = self.bench
         fitted = bench.base if around is None else around.fitted
@@ -170,7 +173,7 @@ class Maker:
             turn, penalties = one.expansion, one.penalties()
             if one is shape:
                 turn, penalties = asked, [directions.T @ p @ directions for p in penalties]
-            mine = tuple(g.form(inner @ turn, inner @ now) for g in grams)
+            mine = tuple(g.form(inner @ turn, None if beyond else inner @ now) for g in grams)
             found.append(Trial(one, mine, regress(mine, penalties, self.declared), turn))
         return found
 
@@ -230,6 +233,27 @@ class Maker:
         found.gate = compare(self.search.check_data, base.check, found.check, self.search.checking)
         rest = vectors[:, others] * deviation[others]
         return Law(trial, found, vectors[:, kept], rest)
+
+    def sharper(self, law: Law) -> Law:
+        """The law with the width of its jump that fits best, all else as it is.
+
+        Friction that holds is one whose jump is steep; first orders around one that creeps do not
+        lead there.
+        """
+        x = law.shape.x
+        if x is None:
+            return law
+        theta = law.fitted.estimate.theta
+        best, least = law.shape, law.fitted.estimate.robust - GATE
+        for jump in (x.jump * factor for factor in NARROWER):
+            shape = replace(law.shape, x=replace(x, jump=jump))
+            problem = law.fitted.problem.changed(
+                constants={**law.fitted.problem.constants, **self.bench.constants(shape)}
+            )
+            cost = self._cost(law.fitted.simulator.of(problem), theta)
+            if cost < least:
+                best, least = shape, cost
+        return replace(law, trial=replace(law.trial, shape=best))
 
     def _cost(self, simulator: Simulator, theta: Vector) -> float:
         try:
