@@ -35,7 +35,7 @@ C = Quantity(
     "c",
     "1",
     "values of the law, c[(k - 1) 8 + m] for spline k of x (13: the jump) and m of y",
-    start=0.01,
+    start=(0.0,) * (ALONG_X * ALONG_Y) + (-0.01,) * ALONG_Y,
     size=(ALONG_X + 1) * ALONG_Y,
 )
 X_FIRST = Quantity("x_first", "1", "x at its first knot", start=-1.0)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibrate.parts import Channel, Parameter, Sensitivity
+from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity
 from ...calibrate.problem import Problem
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError, UnknownNameError, VariantError, listing
@@ -81,6 +81,40 @@ def site(problem: Problem, label: str) -> Site:
     return Site(instance, port, element, unit)
 
 
+@dataclass(frozen=True, eq=False)
+class LawProblem(Problem):
+    """A problem of which a coefficient that several parameters set gets the sum of all.
+
+    Attributes:
+        coefficient: how names of coefficients begin; those that are 0 are left as they are.
+    """
+
+    coefficient: str = ""
+
+    @classmethod
+    def of(cls, problem: Problem, coefficient: str) -> LawProblem:
+        """The same problem."""
+        return cls(
+            **{f.name: getattr(problem, f.name) for f in fields(Problem)}, coefficient=coefficient
+        )
+
+    def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
+        """See `Problem.values`."""
+        run = self.run(run) if isinstance(run, str) else run
+        found = super().values(theta, run)
+        sums: dict[str, float] = {}
+        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
+            if parameter.targets[0][0].startswith(self.coefficient):
+                for name, part in parameter.set(value).items():
+                    sums[name] = sums.get(name, 0.0) + part
+        for name, value in sums.items():
+            if value == 0.0 and name not in self.constants:  # as the FMU has it
+                del found[name]
+            else:
+                found[name] = value
+        return found
+
+
 class LawBench:
     """Simulates a model with a law at a place.
 
@@ -106,7 +140,7 @@ class LawBench:
         inner = place.prefix.removeprefix(f"{place.instance}.")
         own = [n.removeprefix(inner) for n in variables if n.startswith(inner)]
         self.signals = [n[3:] for n in own if n.startswith("wx_")]
-        self.fixed = {place.prefix + f"c[{i + 1}]": 0.0 for i in range(COUNT)}
+        self.fixed = {place.prefix + f"c[{i + 1}]": 0.0 for i in range(COUNT - ALONG_Y, COUNT)}
         self.fixed |= {place.prefix + f"w{a}_{s}": 0.0 for a in "xy" for s in self.signals}
         shares = [n[6:-1] for n in own if n.startswith("share[")]
         if place.element:
@@ -140,8 +174,11 @@ class LawBench:
     def shaped(self, shape: Shape | None, parameters: Sequence[Parameter] = ()) -> Problem:
         """The problem with a law of a shape, and with these parameters for it."""
         constants = {**self.problem.constants, **self.constants(shape)}
-        return self.problem.changed(
-            constants=constants, parameters=[*self.problem.parameters, *parameters]
+        return LawProblem.of(
+            self.problem.changed(
+                constants=constants, parameters=[*self.problem.parameters, *parameters]
+            ),
+            self.site.prefix + "c[",
         )
 
     def coefficients(self) -> list[Parameter]:
@@ -186,17 +223,20 @@ class LawBench:
 
     # -- responses ---------------------------------------------------------------------------------
 
-    def model(self, simulator: Simulator, theta: Vector) -> dict[str, Vector]:
+    def model(
+        self, simulator: Simulator, theta: Vector, names: Sequence[str] = ()
+    ) -> dict[str, Vector]:
         """Model values over sigma, by run."""
         problem = simulator.problem
         return {
             name: problem.run(name).data / problem.sigma - rest
-            for name, rest in simulator.residuals(theta, self.names)
+            for name, rest in simulator.residuals(theta, names or self.names)
         }
 
     def grams(
         self, shape: Shape, directions: Vector, theta: Vector, coefficients: Vector,
         residual: Mapping[str, Vector], slopes: Sequence[Sensitivity], held: Sequence[str] = (),
+        names: Sequence[str] = (),
     ) -> list[Gram]:  # fmt: skip
         """Inner products of responses, derivatives and residuals, by run.
 
@@ -208,6 +248,7 @@ class LawBench:
             residual: there, over sigma, by run.
             slopes: derivatives by the declared parameters there.
             held: declared parameters that a fit left at a bound: they absorb nothing.
+            names: runs, all identification runs if not given.
 
         Raises:
             CosimError: the law cannot be simulated at any size.
@@ -215,19 +256,21 @@ class LawBench:
         simulator = self.search.simulator.of(self.shaped(shape, self.coefficients()))
         simulator = simulator.limited(self.limits)
         whole = np.concatenate([theta, coefficients])
-        start = self.model(simulator, whole)
-        largest = max(float(np.nanmax(np.abs(r))) for r in residual.values())
+        start = self.model(simulator, whole, names)
+        largest = max(float(np.nanmax(np.abs(residual[name]))) for name in start)
         size = self._size(simulator, whole, start, AIM * max(largest, 1.0))
-        columns: dict[str, list[Vector]] = {name: [] for name in self.names}
+        columns: dict[str, list[Vector]] = {name: [] for name in start}
         for direction in directions.T:
             moved = whole.copy()
             moved[theta.size :] += size * direction
-            for name, values in self.model(simulator, moved).items():
+            for name, values in self.model(simulator, moved, names).items():
                 columns[name].append(((values - start[name]) / size).astype(np.float32))
         problem = self.base.problem
         scale = problem.scale * ~np.isin(problem.names, list(held))
         found = []
         for item in slopes:
+            if item.run not in columns:
+                continue
             rest = residual[item.run]
             law = np.stack(columns[item.run], axis=2)
             declared = np.zeros((*rest.shape, scale.size))
@@ -248,11 +291,11 @@ class LawBench:
             moved = whole.copy()
             moved[-COUNT:-ALONG_Y] += size
             try:
-                values = self.model(simulator, moved)
+                values = self.model(simulator, moved, list(start))
             except CosimError:
                 size *= 0.1
                 continue
-            largest = max(float(np.nanmax(np.abs(values[n] - start[n]))) for n in self.names)
+            largest = max(float(np.nanmax(np.abs(values[n] - start[n]))) for n in start)
             if not np.isfinite(largest):
                 size *= 0.1
             elif largest == 0.0:

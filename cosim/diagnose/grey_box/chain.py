@@ -17,8 +17,11 @@ from .trial import Law, Maker, Trial
 DENSE = 0.03
 """Share of the largest speed around which knots are dense at 0, where they are: friction rises and
 falls there, and drag far from it."""
-ORDERS = 24
+ORDERS = 16
 """Cycles per turn that are tried for laws of an angle at most."""
+PASSES, FALL = 8, 0.1
+"""Times at most that first orders are taken again where a fit has ended, and the share of what the
+model then leaves beyond noise that each must remove to be followed by another one."""
 CROSSED = 0.05
 """Share of a signal's largest size that it must reach on both sides of 0 to have a 0 within."""
 
@@ -46,7 +49,7 @@ def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]
             "runs left out, to first order")  # fmt: skip
     best = trials[0]
     needed = math.log(len(trials) / LEVEL)
-    if best.expected < needed:
+    if best.expected < needed and not lacking(search, base):
         return None
     law = improved(maker, best, say)
     if law.fitted.gate is None:
@@ -66,14 +69,20 @@ def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]
 def improved(
     maker: Maker, trial: Trial, say: Callable[[str], None], around: Law | None = None
 ) -> Law:
-    """A law fitted roughly, its jump as steep as the data want it."""
+    """A law fitted roughly, from where first orders lead and then from there again."""
     law = maker.fitted(trial, around)
     say(f"law of {law.shape.label} fitted: {_left(maker.search, law)}")
-    steep = maker.sharper(law)
-    if steep is not law:
-        (again,) = maker.tried(steep.shape, steep)
-        law = maker.fitted(again, steep)
-        say(f"with a steeper jump: {_left(maker.search, law)}")
+    for _ in range(PASSES):
+        before = law.fitted.estimate.robust
+        (again,) = maker.tried(law.shape, law)
+        new = maker.sharper(maker.fitted(again, law))
+        noise = 0.5 * law.fitted.estimate.count
+        enough = max(FALL * (before - noise), GATE)
+        if new.fitted.estimate.robust < before:
+            law = new
+        if before - law.fitted.estimate.robust < enough:
+            break
+        say(f"once more from there: {_left(maker.search, law)}")
     return law
 
 
@@ -106,6 +115,11 @@ def pairs(maker: Maker, law: Law) -> list[tuple[float, Trial]]:
 def best_order(maker: Maker, around: Law | None) -> int:
     """Cycles per turn of the angle that explain most of what a model lacks, to first order."""
     bench, best = maker.bench, (-math.inf, 1)
+    fitted = bench.base if around is None else around.fitted
+    rows = maker.search.fitting.by_run(maker.search.fit_data - fitted.fit)
+    worst = max(
+        zip(rows, bench.names, strict=True), key=lambda item: float(np.nanmean(item[0] ** 2))
+    )
     phases = 2.0 * np.pi * np.arange(ALONG_Y) / ALONG_Y
     waves = np.column_stack([np.cos(phases), np.sin(phases)])
     for order in range(1, ORDERS + 1):
@@ -114,7 +128,7 @@ def best_order(maker: Maker, around: Law | None) -> int:
         directions = waves
         if around is not None:
             directions = np.linalg.pinv(shape.expansion) @ shape.narrowed("y").expansion @ waves
-        (trial,) = maker.tried(shape, around, directions, beyond=True)
+        (trial,) = maker.tried(shape, around, directions, beyond=True, names=worst[1:])
         best = max(best, (trial.expected, order), key=lambda item: item[0])
     return best[1]
 
@@ -144,7 +158,8 @@ def singles(maker: Maker) -> list[Trial]:
     bench, found = maker.bench, []
     for signal in varying(bench):
         if signal in ANGLES:
-            orders = sorted({1, best_order(maker, None)})
+            far = maker.search.lacking(bench.base)
+            orders = sorted({1, best_order(maker, None) if far else 1})
             shapes = [Shape("y", y=bench.axis_y(signal, order)) for order in orders]
         else:
             widths = sorted({math.inf, dense(bench, signal)})

@@ -4,10 +4,11 @@ Everything is decided on Gram matrices of the runs, whose columns are the model'
 coefficients of a law, its derivatives by all declared parameters, and the residual, all over sigma.
 Coefficients have the prior
 
-    c ~ N(0, t^2 (1 + sum_a rho_a D_a' D_a)^-1)
+    c ~ N(0, t^2 (1 - 0.99 Q + sum_a rho_a D_a' D_a)^-1)
 
-(D_a: second differences along axis a); size t and smoothness rho are those of greatest evidence.
-Declared parameters have theirs, one span wide.
+(D_a: second differences along axis a; Q: onto constants, slopes and jumps, which these do not see,
+so that they are known ten times less well beforehand: what declared parameters do as well is left
+to what the sheet says of those). Size t and smoothness rho are those of greatest evidence.
 
 Source: MacKay, Neural Computation 4, 1992 (evidence); Eilers and Marx, Statistical Science 11, 1996
 (splines with a penalty on differences).
@@ -26,6 +27,10 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 Vector = NDArray[np.float64]
 SMOOTH = (0.0, 1.0, 1e2, 1e4)
 """Values of rho: from free coefficients to a straight line, but for what data insist on."""
+STRAIGHT = 1e-9
+"""Second differences of rounding, over the largest there are."""
+FREE = 0.01
+"""Precision of constants, slopes and jumps, over that of curves."""
 SIZES = np.logspace(-3.0, 3.0, 25)
 """Of t, over the size at which the typical coefficient shows as much as the noise."""
 
@@ -153,8 +158,11 @@ def _evidence(
     free = vector.size
     typical = 1.0 / np.sqrt(max(float(np.mean(np.diag(matrix))), 1e-300))
     best: tuple[float, Prior] | None = None
+    kind, plain = np.linalg.eigh(np.sum(penalties, axis=0))
+    plain = plain[:, kind < STRAIGHT * max(float(kind[-1]), 1.0)]
+    known = np.eye(free) - (1.0 - FREE) * plain @ plain.T
     for smooth in product(SMOOTH, repeat=len(penalties)):
-        shape = np.eye(free) + sum(r * p for r, p in zip(smooth, penalties, strict=True))
+        shape = known + sum(r * p for r, p in zip(smooth, penalties, strict=True))
         # in coordinates in which both matrices are diagonal, t costs nothing
         values, vectors = eigh(matrix, shape)
         values, turned = np.maximum(values, 0.0), vectors.T @ vector

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from ...calibrate.estimate import Estimate
 from ...calibrate.fit import CORRECTION, Effort, fit
 from ...calibrate.normal import BOUNDS
-from ...calibrate.parts import MeasuredRun, Parameter, Sensitivity
-from ...calibrate.problem import Problem
+from ...calibrate.parts import Parameter, Sensitivity
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError
 from ...system.variants import component
@@ -30,6 +30,8 @@ GAINS = 0.5
 """Least gain of a direction that is fitted [nats]: what one parameter gains on noise."""
 SHARES = (1.0, 0.5, 0.2, 0.05)
 """Of the law that first orders ask for, where a fit begins: whichever is best."""
+SMALL = 1e-6
+"""Share of a law that need not be kept."""
 WIDE = 100.0
 """Span of a direction in its standard deviations: differences take a hundredth of it."""
 FARTHEST = 1e4
@@ -114,6 +116,17 @@ class Law:
         return np.asarray(columns @ np.linalg.pinv(self.shape.expansion) @ self.trial.expansion)
 
 
+def tempered(grams: Sequence[Gram]) -> list[Gram]:
+    """The same with residuals that count as if the noise were as large as they are.
+
+    Where a model is far off, first orders are wrong by a share of that; as if exact, they would ask
+    for anything.
+    """
+    square = sum(float(g.matrix[-1, -1]) for g in grams)
+    factor = min(sum(g.count for g in grams) / max(square, 1e-300), 1.0)
+    return [replace(g, matrix=factor * g.matrix) for g in grams]
+
+
 class Maker:
     """Tries and fits laws at a place.
 
@@ -149,7 +162,7 @@ class Maker:
 
     def tried(
         self, shape: Shape, around: Law | None = None, directions: Vector | None = None,
-        forms: Sequence[str] = (), *, beyond: bool = False,
+        forms: Sequence[str] = (), *, beyond: bool = False, names: Sequence[str] = (),
     ) -> list[Trial]:  # fmt: skip
         """Laws of a shape to first order, around a model without one or with one.
 
@@ -158,6 +171,7 @@ class Maker:
             around: a law of part of the shape.
             directions: of its free coefficients, all if not given.
             forms: narrower ones that the same responses tell, too.
+            names: runs, all identification runs if not given.
             beyond: what is to be added to the law around which it is taken, and not in its place.
         """
         bench = self.bench
@@ -166,7 +180,8 @@ class Maker:
         now = np.zeros(shape.expansion.shape[0]) if around is None else around.coefficients
         directions = np.eye(shape.expansion.shape[1]) if directions is None else directions
         asked = shape.expansion @ directions
-        grams = bench.grams(shape, asked, theta, now, residual, slopes, held)
+        grams = bench.grams(shape, asked, theta, now, residual, slopes, held, names)
+        grams = tempered(grams)
         inner = np.linalg.pinv(asked)
         found = []
         for one in (shape, *(shape.narrowed(form) for form in forms)):
@@ -200,42 +215,51 @@ class Maker:
             kept = order
         others = np.setdiff1d(order, kept)
         deviation = 1.0 / np.sqrt(1.0 + values)
-        targets = trial.expansion @ vectors[:, kept]
+        chosen = np.eye(order.size)[:, kept]
+        if around is not None:  # what was fitted before can stay as it was
+            now = vectors.T @ precision @ np.linalg.pinv(trial.expansion) @ around.coefficients
+            missed = now - chosen @ (chosen.T @ now)
+            if np.linalg.norm(missed) > SMALL * np.linalg.norm(now):
+                chosen = np.column_stack([chosen, missed / np.linalg.norm(missed)])
+        directions, widths = vectors @ chosen, 1.0 / np.sqrt(1.0 + values @ chosen**2)
+        targets = trial.expansion @ directions
         prefix = bench.site.prefix
         parameters = [
             Parameter(
                 f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
                 tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
-                "effect", prior=1.0, span=float(min(WIDE * deviation[kept[i]], 1.0)),
+                "effect", prior=1.0, span=float(min(WIDE * widths[i], 1.0)),
             )
             for i, column in enumerate(targets.T)
         ]  # fmt: skip
-        problem = Summed.of(bench.shaped(trial.shape, parameters))
+        problem = bench.shaped(trial.shape, parameters)
         simulator = self.search.simulator.of(problem).limited(bench.limits)
         theta = (base if around is None else around.fitted).estimate.theta[: self.count]
         change = regression.declared * base.problem.scale
-        starts = [
-            np.concatenate(
-                [theta + share * change, (share if around is None else 1.0) * start[kept]]
-            )
-            for share in (SHARES if around is None else (1.0, 0.0))
-        ]
-        starts = [np.clip(one, problem.lower, problem.upper) for one in starts]
-        costs = [self._cost(simulator, one) for one in starts]
-        if not np.isfinite(min(costs)):
-            raise CosimError(f"{bench.site.label}: no share of the law can be simulated")
-        result = fit(simulator, starts[int(np.argmin(costs))], effort=QUICK)
+        if around is None:
+            starts = [(theta + share * change, share * (start @ chosen)) for share in SHARES]
+        else:
+            starts = [(theta + change, start @ chosen), (theta, now @ chosen)]
+        best = min(
+            (np.clip(np.concatenate(pair), problem.lower, problem.upper) for pair in starts),
+            key=lambda one: self._cost(simulator, one),
+        )
+        result = fit(simulator, best, effort=QUICK)
         if final:
             right = corrected(simulator, result.theta, self.search.raw)
             result = fit(right, result.theta, effort=CORRECTION)
-        found = self.search.judged(result)
-        found.effects = (*base.effects, self.candidate)
-        found.gate = compare(self.search.check_data, base.check, found.check, self.search.checking)
         rest = vectors[:, others] * deviation[others]
-        return Law(trial, found, vectors[:, kept], rest)
+        return Law(trial, self._judged(result), directions, rest)
+
+    def _judged(self, estimate: Estimate) -> Fitted:
+        base, search = self.bench.base, self.search
+        found = search.judged(estimate)
+        found.effects = (*base.effects, self.candidate)
+        found.gate = compare(search.check_data, base.check, found.check, search.checking)
+        return found
 
     def sharper(self, law: Law) -> Law:
-        """The law with the width of its jump that fits best, all else as it is.
+        """The law with the width of its jump that fits best.
 
         Friction that holds is one whose jump is steep; first orders around one that creeps do not
         lead there.
@@ -243,17 +267,19 @@ class Maker:
         x = law.shape.x
         if x is None:
             return law
-        theta = law.fitted.estimate.theta
-        best, least = law.shape, law.fitted.estimate.robust - GATE
+        estimate = law.fitted.estimate
+        best, least = law, estimate.robust - GATE
         for jump in (x.jump * factor for factor in NARROWER):
             shape = replace(law.shape, x=replace(x, jump=jump))
-            problem = law.fitted.problem.changed(
-                constants={**law.fitted.problem.constants, **self.bench.constants(shape)}
-            )
-            cost = self._cost(law.fitted.simulator.of(problem), theta)
-            if cost < least:
-                best, least = shape, cost
-        return replace(law, trial=replace(law.trial, shape=best))
+            constants = {**estimate.problem.constants, **self.bench.constants(shape)}
+            simulator = estimate.simulator.of(estimate.problem.changed(constants=constants))
+            if self._cost(simulator, estimate.theta) > least:
+                continue
+            found = self._judged(fit(simulator, estimate.theta, effort=QUICK))
+            if found.estimate.robust < least:
+                best = Law(replace(law.trial, shape=shape), found, law.directions, law.rest)
+                least = found.estimate.robust
+        return best
 
     def _cost(self, simulator: Simulator, theta: Vector) -> float:
         try:
@@ -267,23 +293,3 @@ class Maker:
         site = self.bench.site
         kind = component(self.bench.base.problem.instances[site.instance])
         return Candidate(site.instance, kind, EFFECT, site.port, "Law given by numbers.")
-
-
-class Summed(Problem):
-    """A problem of which a variable that several parameters set gets their sum."""
-
-    @classmethod
-    def of(cls, problem: Problem) -> Summed:
-        """The same problem."""
-        return cls(**{f.name: getattr(problem, f.name) for f in fields(problem)})
-
-    def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
-        """See `Problem.values`."""
-        run = self.run(run) if isinstance(run, str) else run
-        found = super().values(theta, run)
-        sums: dict[str, float] = {}
-        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
-            if parameter.run in ("", run.name):
-                for name, part in parameter.set(value).items():
-                    sums[name] = sums.get(name, 0.0) + part
-        return found | sums
