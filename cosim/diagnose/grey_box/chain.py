@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from ..models import GATE, LEVEL, Fitted
+from ..models import GATE, LEVEL, Fitted, is_open
 from ..search import Search
 from ..whiteness import whiteness_tests
 from .basis import ALONG_Y, Shape
 from .bench import ANGLES, LawBench, Site
 from .trial import Law, Maker, Trial
 
-DENSE = 0.03
-"""Share of the largest speed around which knots are dense at 0, where they are: friction rises and
-falls there, and drag far from it."""
+DENSE, WIDTHS = 0.1, (math.inf, 0.01)
+"""Share of the largest size of a signal around which knots are dense at 0, and other shares that
+are tried: friction rises and falls near 0, drag far from it."""
 ORDERS = 16
 """Cycles per turn that are tried for laws of an angle at most."""
+FITTED = 4
+"""Signals of which a law is fitted where first orders do not tell which one carries it."""
 PASSES, FALL = 8, 0.1
 """Times at most that first orders are taken again where a fit has ended, and the share of what the
 model then leaves beyond noise that each must remove to be followed by another one."""
@@ -47,23 +50,39 @@ def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]
     for trial in trials[:3]:
         say(f"{place.label}: a law of {trial.shape.label} gains {trial.expected:.0f} nats on "
             "runs left out, to first order")  # fmt: skip
-    best = trials[0]
     needed = math.log(len(trials) / LEVEL)
-    if best.expected < needed and not lacking(search, base):
+    if trials[0].expected < needed and not lacking(search, base):
         return None
-    law = improved(maker, best, say)
-    if law.fitted.gate is None:
-        return None
+    law = refined(maker, best_of(maker, trials, is_open(base.estimate), say), say)
     others = pairs(maker, law) if lacking(search, law.fitted) else []
-    needed = math.log((len(trials) + len(others)) / LEVEL)
-    gain, better = max(others, key=lambda item: item[0], default=(0.0, best))
-    if gain > needed:
-        say(f"a law of {better.shape.label} gains {gain:.0f} nats more, to first order")
-        law = improved(maker, better, say, law)
+    others = [item for item in others if item[0] > math.log((len(trials) + len(others)) / LEVEL)]
+    if others:
+        others.sort(key=lambda item: -item[0])
+        gain, first = others[0]
+        say(f"a law of {first.shape.label} gains {gain:.0f} nats more, to first order")
+        both = best_of(maker, [t for _, t in others], is_open(law.fitted.estimate), say, law)
+        if search.gain(law.fitted, both.fitted) > GATE:
+            law = both
     (again,) = maker.tried(law.shape, law)
     law = maker.fitted(again, law, final=True)
     say(f"law of {law.shape.label}: {_left(search, law)}")
     return law
+
+
+def best_of(
+    maker: Maker, trials: list[Trial], far: bool, say: Callable[[str], None],
+    around: Law | None = None,
+) -> Law:  # fmt: skip
+    """The best law of some, the best to first order first.
+
+    Where a model is far off, first orders do not tell which: one for each signal is fitted.
+    """
+    firsts: dict[str, Trial] = {}
+    for trial in trials:
+        firsts.setdefault(trial.shape.label, trial)
+    chosen = list(firsts.values())[: FITTED if far else 1]
+    laws = [improved(maker, trial, say, around) for trial in chosen]
+    return min(laws, key=lambda law: law.fitted.estimate.robust + law.fitted.free)
 
 
 def improved(
@@ -86,8 +105,23 @@ def improved(
     return law
 
 
+def refined(maker: Maker, law: Law, say: Callable[[str], None]) -> Law:
+    """The law on knots elsewhere along its first signal, if it lacks something and that helps."""
+    for width in WIDTHS:
+        x = law.shape.x
+        if x is None or not lacking(maker.search, law.fitted):
+            break
+        axis = replace(maker.bench.axis_x(x.signal, dense=width), jump=x.jump)
+        other = maker.redrawn(law, axis)
+        (again,) = maker.tried(other.shape, other)
+        other = improved(maker, again, say, other)
+        if maker.search.gain(law.fitted, other.fitted) > GATE:
+            law = other
+    return law
+
+
 def pairs(maker: Maker, law: Law) -> list[tuple[float, Trial]]:
-    """Laws of another signal beside that of a law, to first order, with what they gain on it.
+    """Laws of a second signal beside that of a law, to first order, with what they gain on it.
 
     A surface over both must do better than a sum of two curves by the gate.
     """
@@ -101,13 +135,10 @@ def pairs(maker: Maker, law: Law) -> list[tuple[float, Trial]]:
             shape = Shape("x * y", law.shape.x, bench.axis_y(signal, order))
         else:
             shape = Shape("x * y", bench.axis_x(signal, dense=dense(bench, signal)), law.shape.y)
-        surface, both, *alone = maker.tried(shape, law, forms=("x + y", "x", "y"))
-        (own,) = (t for t in alone if t.shape.form == law.shape.form)
-        (other,) = (t for t in alone if t.shape.form != law.shape.form)
+        surface, both, own = maker.tried(shape, law, forms=("x + y", law.shape.form))
         found += [
             (both.expected - own.expected, both),
             (surface.expected - own.expected - GATE, surface),
-            (other.expected - own.expected, other),
         ]
     return found
 
@@ -162,8 +193,7 @@ def singles(maker: Maker) -> list[Trial]:
             orders = sorted({1, best_order(maker, None) if far else 1})
             shapes = [Shape("y", y=bench.axis_y(signal, order)) for order in orders]
         else:
-            widths = sorted({math.inf, dense(bench, signal)})
-            shapes = [Shape("x", x=bench.axis_x(signal, dense=width)) for width in widths]
+            shapes = [Shape("x", x=bench.axis_x(signal, dense=dense(bench, signal)))]
         for shape in shapes:
             found += maker.tried(shape)
     return found

@@ -18,8 +18,8 @@ from ...errors import CosimError
 from ...system.variants import component
 from ..candidates import Candidate
 from ..deferred import corrected
-from ..models import GATE, Fitted, compare
-from .basis import Shape
+from ..models import GATE, Fitted, compare, is_open
+from .basis import Axis, Shape
 from .bench import EFFECT, LawBench
 from .regression import Gram, Regression, regress
 
@@ -32,6 +32,8 @@ SHARES = (1.0, 0.5, 0.2, 0.05)
 """Of the law that first orders ask for, where a fit begins: whichever is best."""
 SMALL = 1e-6
 """Share of a law that need not be kept."""
+POINTS = 4000
+"""Points along the runs from which a law is redrawn on other knots."""
 WIDE = 100.0
 """Span of a direction in its standard deviations: differences take a hundredth of it."""
 FARTHEST = 1e4
@@ -39,6 +41,7 @@ FARTHEST = 1e4
 NARROWER = (0.1, 1e-2, 1e-3)
 """Widths of the jump that are tried, over the usual one."""
 QUICK = Effort("near", "draft", iterations=4)
+FAR = Effort("far", "draft", iterations=4)
 
 
 @dataclass(frozen=True)
@@ -132,11 +135,18 @@ class Maker:
 
     Args:
         bench: the model with a law there.
+
+    Attributes:
+        start: the model without a law around which laws are tried; where that is far off with
+            parameters at their bounds, at nominal values: what was calibrated made the best of a
+            wrong law.
     """
 
     def __init__(self, bench: LawBench) -> None:
         self.bench = bench
         self.search = bench.search
+        far = self.search.far(bench.base)
+        self.start = self.search.unfitted(bench.base) if far else bench.base
         base = bench.base.problem
         self.count = len(base.parameters)
         self.declared = np.array(
@@ -175,7 +185,7 @@ class Maker:
             beyond: what is to be added to the law around which it is taken, and not in its place.
         """
         bench = self.bench
-        fitted = bench.base if around is None else around.fitted
+        fitted = self.start if around is None else around.fitted
         theta, residual, slopes, held = self.point(fitted)
         now = np.zeros(shape.expansion.shape[0]) if around is None else around.coefficients
         directions = np.eye(shape.expansion.shape[1]) if directions is None else directions
@@ -223,18 +233,9 @@ class Maker:
                 chosen = np.column_stack([chosen, missed / np.linalg.norm(missed)])
         directions, widths = vectors @ chosen, 1.0 / np.sqrt(1.0 + values @ chosen**2)
         targets = trial.expansion @ directions
-        prefix = bench.site.prefix
-        parameters = [
-            Parameter(
-                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
-                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
-                "effect", prior=1.0, span=float(min(WIDE * widths[i], 1.0)),
-            )
-            for i, column in enumerate(targets.T)
-        ]  # fmt: skip
-        problem = bench.shaped(trial.shape, parameters)
+        problem = bench.shaped(trial.shape, self._parameters(targets, WIDE * widths))
         simulator = self.search.simulator.of(problem).limited(bench.limits)
-        theta = (base if around is None else around.fitted).estimate.theta[: self.count]
+        theta = (self.start if around is None else around.fitted).estimate.theta[: self.count]
         change = regression.declared * base.problem.scale
         if around is None:
             starts = [(theta + share * change, share * (start @ chosen)) for share in SHARES]
@@ -244,12 +245,41 @@ class Maker:
             (np.clip(np.concatenate(pair), problem.lower, problem.upper) for pair in starts),
             key=lambda one: self._cost(simulator, one),
         )
-        result = fit(simulator, best, effort=QUICK)
+        far = around is None and is_open(self.start.estimate)
+        result = fit(simulator, best, effort=FAR if far else QUICK)
         if final:
             right = corrected(simulator, result.theta, self.search.raw)
             result = fit(right, result.theta, effort=CORRECTION)
         rest = vectors[:, others] * deviation[others]
         return Law(trial, self._judged(result), directions, rest)
+
+    def redrawn(self, law: Law, x: Axis) -> Law:
+        """The same law on other knots, as near as these come, fitted from there."""
+        shape = replace(law.shape, x=x)
+        points = self.bench.recorded(law.shape, law.fitted.estimate.theta[: self.count],
+                                     law.coefficients)  # fmt: skip
+        points = [values[:: max(values.size // POINTS, 1)] for values in points]
+        design = shape.design(*points)
+        ridge = 1e-6 * np.trace(design.T @ design) / design.shape[1]
+        normal = design.T @ design + ridge * np.eye(design.shape[1])
+        near = np.linalg.solve(normal, design.T @ law.values(*points)[0])
+        trial = replace(law.trial, shape=shape, expansion=shape.expansion, words=())
+        problem = self.bench.shaped(shape, self._parameters(shape.expansion, np.ones(near.size)))
+        theta = np.concatenate([law.fitted.estimate.theta[: self.count], near])
+        found = self._judged(fit(self.search.simulator.of(problem), theta, effort=QUICK))
+        return Law(trial, found, np.eye(near.size), np.zeros((near.size, 0)))
+
+    def _parameters(self, targets: Vector, spans: Vector) -> list[Parameter]:
+        """Parameters of a law, each setting the coefficients as a column says."""
+        prefix = self.bench.site.prefix
+        return [
+            Parameter(
+                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
+                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
+                "effect", prior=1.0, span=float(min(spans[i], 1.0)),
+            )
+            for i, column in enumerate(targets.T)
+        ]  # fmt: skip
 
     def _judged(self, estimate: Estimate) -> Fitted:
         base, search = self.bench.base, self.search
