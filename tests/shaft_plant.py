@@ -24,7 +24,7 @@ from cosim.system.toml import SystemFile
 Law = Callable[[float, float], float]
 INERTIA, FRICTION = 0.1, 0.1
 SAMPLE, LENGTH = 1e-2, 401
-SIGMA = {"w": 0.05, "phi": 0.01}
+SIGMA = {"w": 0.1, "phi": 0.05}
 NAMES = {"first": "identification", "second": "identification", "third": "identification",
          "unused": "validation"}  # fmt: skip
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -73,6 +73,11 @@ class Builder:
         with naming_errors():
             return Path(self._build(variant, out=self.out))
 
+    def written(self, variant: str, starts: Mapping[str, float], path: Path) -> Path:
+        """Write the variant's FMU with start values (by variable) of its own; returns the path."""
+        with naming_errors():
+            return Path(sources("packaging.build").build_with(variant, starts, path))
+
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""
         with naming_errors():
@@ -99,6 +104,10 @@ class Installed:
                 return Builder().path(variant)
             except VariantError as error:
                 raise error from missing
+
+    def written(self, variant: str, starts: Mapping[str, float], path: Path) -> Path:
+        """Write the variant's FMU with start values (by variable) of its own; returns the path."""
+        return Builder().written(variant, starts, path)
 
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""

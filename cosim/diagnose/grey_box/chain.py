@@ -8,11 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..models import GATE, LEVEL, Fitted, is_open
+from ..models import GATE, GATE_Z, LEVEL, Fitted, is_open
 from ..search import Search
 from ..whiteness import whiteness_tests
 from .basis import ALONG_Y, Shape
 from .bench import ANGLES, LawBench, Site
+from .nearest import nearest
+from .result import LawFromData
 from .trial import Law, Maker, Trial
 
 DENSE, WIDTHS = 0.1, (math.inf, 0.01)
@@ -29,33 +31,42 @@ CROSSED = 0.05
 """Share of a signal's largest size that it must reach on both sides of 0 to have a 0 within."""
 
 
-def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]) -> Law | None:
-    """The law that the data want at a place, None if unused runs want none.
+def law_from_data(
+    search: Search, base: Fitted, site: Site, say: Callable[[str], None]
+) -> LawFromData:
+    """The law that the data want at a place, with all that is said about it.
 
     Args:
         search: the data.
         base: fitted model that lacks it.
-        place: where.
+        site: where.
         say: told what is done.
 
     Raises:
-        CosimError: no law can enter there.
+        UnknownNameError: the place has no such element.
+        VariantError: no law can enter there.
+        CosimError: the system with a law there cannot be simulated.
     """
-    maker = Maker(LawBench(search, base, place))
-    trials = singles(maker)
+    maker = Maker(LawBench(search, base, site))
+    trials = sorted(singles(maker), key=lambda t: -t.expected)
+    result = LawFromData(site, False, "", search, base, maker)
     if not trials:
-        say(f"{place.label}: no signal there varies")
-        return None
-    trials.sort(key=lambda t: -t.expected)
+        result.reason = f"No signal of {site.label} moves, so a law there would be a constant."
+        return result
     for trial in trials[:3]:
-        say(f"{place.label}: a law of {trial.shape.label} gains {trial.expected:.0f} nats on "
+        say(f"{site.label}: a law of {trial.shape.label} gains {trial.expected:.0f} nats on "
             "runs left out, to first order")  # fmt: skip
-    needed = math.log(len(trials) / LEVEL)
-    if trials[0].expected < needed and not lacking(search, base):
-        return None
+    result.needed = math.log(len(trials) / LEVEL)
+    if trials[0].expected < result.needed and not lacking(search, base):
+        result.reason = (
+            f"The model reaches the noise, and no law of a signal of {site.label} tells more about "
+            "runs that it was not made from."
+        )
+        return result
     law = refined(maker, best_of(maker, trials, is_open(base.estimate), say), say)
     others = pairs(maker, law) if lacking(search, law.fitted) else []
-    others = [item for item in others if item[0] > math.log((len(trials) + len(others)) / LEVEL)]
+    result.needed = math.log((len(trials) + len(others)) / LEVEL)
+    others = [item for item in others if item[0] > result.needed]
     if others:
         others.sort(key=lambda item: -item[0])
         gain, first = others[0]
@@ -64,9 +75,36 @@ def law_at(search: Search, base: Fitted, place: Site, say: Callable[[str], None]
         if search.gain(law.fitted, both.fitted) > GATE:
             law = both
     (again,) = maker.tried(law.shape, law)
-    law = maker.fitted(again, law, final=True)
+    result.law = law = maker.fitted(again, law, final=True)
     say(f"law of {law.shape.label}: {_left(search, law)}")
-    return law
+    _judged(result, law)
+    if result.made:
+        result.named = nearest(maker, law, say)
+    return result
+
+
+def _judged(result: LawFromData, law: Law) -> None:
+    """Whether unused runs want it."""
+    search, gate = result.search, law.fitted.gate
+    assert gate is not None
+    unused = any(run.purpose != "identification" for run in search.checking.runs)
+    wanted = gate.gain > result.needed and gate.z > GATE_Z
+    material = search.material(result.base, law.fitted)
+    result.made = wanted and material
+    where = f"a law of {law.shape.label} at {result.site.label}"
+    if not result.made:
+        result.reason = (
+            f"Runs that were not used for fitting do not want {where}: they gain {gate.gain:.1f} "
+            f"nats of {result.needed:.1f} that they should (z {gate.z:.1f})."
+            if not wanted else f"What {where} changes is too small to be told from errors of the "
+            "sheet's noise."
+        )  # fmt: skip
+        return
+    result.reason = f"{where[0].upper()}{where[1:]} holds on runs that were not used for fitting."
+    if not unused:
+        result.reason = f"{where[0].upper()}{where[1:]} explains the runs; none was kept unused."
+    if lacking(search, law.fitted):
+        result.reason += " The residual with it still holds more than noise."
 
 
 def best_of(

@@ -104,6 +104,16 @@ class Law:
         """The 13 x 8 of the effect."""
         return np.asarray(self.trial.expansion @ self.free)
 
+    @property
+    def formula(self) -> str:
+        """As a line of text: named terms with their numbers, or what kind of curve it is."""
+        if not self.trial.words:
+            kind = {"x + y": "sum of two curves", "x * y": "surface"}.get(self.shape.form, "curve")
+            return f"smooth {kind} over {self.shape.label}"
+        parts = [f"{value:+.4g} {word}" for value, word in zip(self.free, self.trial.words,
+                                                               strict=True)]  # fmt: skip
+        return " ".join(parts).removeprefix("+")
+
     def values(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
         """The law at points, and its standard deviations there."""
         design = self.design(x, y)
@@ -253,12 +263,15 @@ class Maker:
         rest = vectors[:, others] * deviation[others]
         return Law(trial, self._judged(result), directions, rest)
 
+    def visited(self, law: Law) -> list[Vector]:
+        """x and y of a law along the identification runs."""
+        theta = law.fitted.estimate.theta[: self.count]
+        return self.bench.recorded(law.shape, theta, law.coefficients)
+
     def redrawn(self, law: Law, x: Axis) -> Law:
         """The same law on other knots, as near as these come, fitted from there."""
         shape = replace(law.shape, x=x)
-        points = self.bench.recorded(law.shape, law.fitted.estimate.theta[: self.count],
-                                     law.coefficients)  # fmt: skip
-        points = [values[:: max(values.size // POINTS, 1)] for values in points]
+        points = [values[:: max(values.size // POINTS, 1)] for values in self.visited(law)]
         design = shape.design(*points)
         ridge = 1e-6 * np.trace(design.T @ design) / design.shape[1]
         normal = design.T @ design + ridge * np.eye(design.shape[1])
