@@ -14,6 +14,8 @@ from ..files import make_folder, write_text
 from .streams import print_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..diagnose import Diagnosis
     from ..diagnose.further import Further
 
@@ -27,6 +29,14 @@ def diagnose_command(
         Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
+    law_from_data: Annotated[
+        str,
+        typer.Option(
+            metavar="PLACE",
+            help="Make a law from the data at a place, load.flange or arm.joint[2], "
+            "and ask no catalogue.",
+        ),
+    ] = "",
     workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON value to stdout.")
@@ -46,7 +56,7 @@ def diagnose_command(
     result = diagnose(
         problem, folder,
         lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
-        workers=workers,
+        workers=workers, law_at=law_from_data,
     )  # fmt: skip
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)
@@ -68,6 +78,8 @@ def _print(result: Diagnosis) -> None:
     for effect in result.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
+    if (law := result.to_dict()["law_from_data"]) is not None:
+        _print_law(law, console)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip
@@ -83,6 +95,27 @@ def _print(result: Diagnosis) -> None:
     for item in result.further:
         console.print(_spread(item), soft_wrap=True)
     console.print(f"in {result.files[-1].parent}", soft_wrap=True)
+
+
+def _print_law(law: dict[str, Any], console: Console) -> None:
+    """A law made from the data: what it is, what it changes, which named laws are near."""
+    if not law["made"]:
+        console.print(f"  no law at {law['place']}: {law['reason']}", soft_wrap=True)
+        return
+    console.print(f"  law at {law['place']}: {law['formula']}", soft_wrap=True)
+    for name, row in law["error"].items():
+        sizes = [row[which].get("validation") for which in ("before", "after")]
+        if None not in sizes:
+            console.print(
+                f"    {name}: {sizes[0]:.4g} -> {sizes[1]:.4g} {row['unit']} on validation runs, "
+                f"noise {row['noise_rms']:.4g}", soft_wrap=True,
+            )  # fmt: skip
+    for named in law["nearest"]:
+        console.print(
+            f"    near it: {named['effect']}, {named['rms_difference']:.3g} {law['unit']} away "
+            f"(RMS), worse by {named['unused_runs_prefer_the_law_by_nats']:.0f} nats on unused "
+            "runs", soft_wrap=True,
+        )  # fmt: skip
 
 
 def _spread(further: Further) -> str:

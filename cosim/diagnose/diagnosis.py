@@ -26,6 +26,7 @@ from .deferred import step_error
 from .exchange import reconsidered
 from .experiment import propose
 from .further import Further, judged
+from .grey_box import LawFromData, Site, site, unnamed
 from .linear import SampleStack
 from .localise import Place, localise
 from .models import Fitted, is_open
@@ -59,6 +60,7 @@ class Diagnosis:
         ended: run -> time from which it does not count: what happens there hangs on small changes
             of start values (see `unstable`).
         further: the models on runs that need another system.
+        law: made from the data where something enters that has no name.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
     """
@@ -78,6 +80,7 @@ class Diagnosis:
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
     further: list[Further] = field(default_factory=list)
+    law: LawFromData | None = None
     bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
@@ -116,6 +119,7 @@ class Diagnosis:
                 for f in self.rivals
             ],
             "localisation": [place.to_dict() for place in self.located],
+            "law_from_data": None if self.law is None else self.law.to_dict(),
             "power": self.power,
             "proposed_experiment": self.experiment,
             "channels": {},
@@ -232,6 +236,7 @@ def diagnose(
     say: Callable[[str], None] = lambda text: None,
     *,
     workers: int | None = None,
+    law_at: str = "",
 ) -> Diagnosis:
     """Close the loop on one data set.
 
@@ -240,16 +245,18 @@ def diagnose(
         out: folder for the FMUs with the effects.
         say: told what is done.
         workers: threads, one per core if not given.
+        law_at: make a law from the data there (`load.flange`), and do not ask the catalogue.
 
     Raises:
-        CosimError: the declared system cannot be simulated.
+        CosimError: the declared system cannot be simulated, or no law can enter there.
+        UnknownNameError: there is no such place.
     """
-    begun = time.perf_counter()
+    begun, asked = time.perf_counter(), site(problem, law_at) if law_at else None
     simulator = Simulator(problem, workers=workers)
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
-    search = Search(simulator, say)
+    search = Search(simulator, say, only=None if asked is None else [])
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
@@ -259,7 +266,7 @@ def diagnose(
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, begun)
-            return _searched(search, base, findings, out, say, begun)
+            return _searched(search, base, findings, out, say, begun, asked)
     finally:
         search.close()
 
@@ -280,13 +287,14 @@ def _searched(
     out: Path | None,
     say: Callable[[str], None],
     begun: float,
+    asked: Site | None,
 ) -> Diagnosis:
     problem = search.raw
     result = Diagnosis(problem, "", "", search, base)
     result.warnings = lines(findings)
     current = base
     winners: list[Round] = []
-    for number in range(ROUNDS):
+    for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         stage = search.round(current)
         if number == 0:
@@ -324,6 +332,11 @@ def _searched(
         result.bursts = times(sudden, list(search.fitting.runs))
     result.after = current
     _verdict(result, winners)
+    if asked is not None or result.verdict == "unexplained":
+        result.law = unnamed(search, current, result.located, asked)
+    if result.law is not None:
+        result.files += result.law.leave_fmu(out)
+        result.reason += f" {result.law.reason}"
     _look_further(result)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)

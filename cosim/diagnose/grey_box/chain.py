@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from ...errors import CosimError
+from ..localise import Place
 from ..models import GATE, GATE_Z, LEVEL, Fitted, is_open
 from ..search import Search
 from ..whiteness import whiteness_tests
@@ -31,23 +33,47 @@ CROSSED = 0.05
 """Share of a signal's largest size that it must reach on both sides of 0 to have a 0 within."""
 
 
-def law_from_data(
-    search: Search, base: Fitted, site: Site, say: Callable[[str], None]
-) -> LawFromData:
+def unnamed(
+    search: Search, base: Fitted, located: Sequence[Place], asked: Site | None = None
+) -> LawFromData | None:
+    """A law from the data at the place that was asked for, else where something enters clearly.
+
+    Args:
+        search: the data.
+        base: fitted model that lacks it.
+        located: places where an unknown input would explain the residual, the best first.
+        asked: the place; errors are raised then, else they are the law's reason.
+    """
+    if asked is not None:
+        return law_from_data(search, base, asked)
+    if not located or located[0].evidence < GATE:
+        return None
+    first = located[0]
+    search.say(f"a law from the data at {first.label}")
+    place = Site(first.instance, first.port, first.element, first.unit)
+    try:
+        found = law_from_data(search, base, place)
+    except CosimError as error:  # an extra: the verdict stands without it
+        return LawFromData(place, False, f"No law at {place.label}: {error}.", search, base)
+    if len(located) > 1 and first.evidence - located[1].evidence < GATE:
+        found.reason += f" It may as well act at {located[1].label}."
+    return found
+
+
+def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
     """The law that the data want at a place, with all that is said about it.
 
     Args:
         search: the data.
         base: fitted model that lacks it.
         site: where.
-        say: told what is done.
 
     Raises:
         UnknownNameError: the place has no such element.
         VariantError: no law can enter there.
         CosimError: the system with a law there cannot be simulated.
     """
-    maker = Maker(LawBench(search, base, site))
+    maker, say = Maker(LawBench(search, base, site)), search.say
     trials = sorted(singles(maker), key=lambda t: -t.expected)
     result = LawFromData(site, False, "", search, base, maker)
     if not trials:
@@ -119,7 +145,11 @@ def best_of(
     for trial in trials:
         firsts.setdefault(trial.shape.label, trial)
     chosen = list(firsts.values())[: FITTED if far else 1]
-    laws = [improved(maker, trial, say, around) for trial in chosen]
+    laws = []
+    for trial in chosen:
+        laws.append(improved(maker, trial, say, around))
+        if not lacking(maker.search, laws[-1].fitted):
+            break
     return min(laws, key=lambda law: law.fitted.estimate.robust + law.fitted.free)
 
 

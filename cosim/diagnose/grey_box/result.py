@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from ...errors import CosimError
 from ...files import make_folder
 from ..linear import SampleStack
 from ..models import Fitted, compare
@@ -170,18 +171,20 @@ class LawFromData:
                     table[name][which][purpose] = value
         return table
 
-    def leave_fmu(self, out: Path) -> Path | None:
+    def leave_fmu(self, out: Path | None) -> list[Path]:
         """Write the FMU of the component with the law built in, calibrated values as well.
 
-        Args:
-            out: folder below which it goes.
+        Where it cannot be built, the reason says so.
 
-        Raises:
-            CosimError: it cannot be built.
+        Args:
+            out: folder below which it goes, None for nowhere.
+
+        Returns:
+            its path, if there is one.
         """
         law, provider = self.law, self.base.problem.provider
-        if law is None or not self.made or not isinstance(provider, Writer):
-            return None
+        if out is None or law is None or not self.made or not isinstance(provider, Writer):
+            return []
         problem, instance = law.fitted.problem, self.site.instance
         runs = {name for run in problem.runs for name in run.starts}
         runs |= {name for p in problem.parameters if p.run for name, _ in p.targets}
@@ -191,8 +194,13 @@ class LawFromData:
             if name.partition(".")[0] == instance and name not in runs
         }
         folder = make_folder(out / "fmus")
-        self.fmu = folder / f"{instance}-law_from_data.fmu"
-        return provider.written(problem.instances[instance], starts, self.fmu)
+        path = folder / f"{instance}-law_from_data.fmu"
+        try:
+            self.fmu = provider.written(problem.instances[instance], starts, path)
+        except CosimError as error:
+            self.reason += f" Its FMU could not be built: {error}."
+            return []
+        return [self.fmu]
 
 
 def rms(vector: Vector, stack: SampleStack) -> dict[str, float | None]:
