@@ -12,7 +12,6 @@ from ...errors import CosimError
 from ..localise import Place
 from ..models import GATE, GATE_Z, LEVEL, Fitted, is_open
 from ..search import Search
-from ..whiteness import whiteness_tests
 from .basis import ALONG_Y, Shape
 from .bench import ANGLES, LawBench, Site
 from .nearest import nearest
@@ -83,14 +82,14 @@ def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
         say(f"{site.label}: a law of {trial.shape.label} gains {trial.expected:.0f} nats on "
             "runs left out, to first order")  # fmt: skip
     result.needed = math.log(len(trials) / LEVEL)
-    if trials[0].expected < result.needed and not lacking(search, base):
+    if trials[0].expected < result.needed and not search.lacking(base):
         result.reason = (
             f"The model reaches the noise, and no law of a signal of {site.label} tells more about "
             "runs that it was not made from."
         )
         return result
     law = refined(maker, best_of(maker, trials, is_open(base.estimate), say), say)
-    others = pairs(maker, law) if lacking(search, law.fitted) else []
+    others = pairs(maker, law) if search.lacking(law.fitted) else []
     result.needed = math.log((len(trials) + len(others)) / LEVEL)
     others = [item for item in others if item[0] > result.needed]
     if others:
@@ -105,7 +104,7 @@ def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
     say(f"law of {law.shape.label}: {_left(search, law)}")
     _judged(result, law)
     if result.made:
-        result.named = nearest(maker, law, say)
+        result.named = nearest(maker, law)
     return result
 
 
@@ -129,7 +128,7 @@ def _judged(result: LawFromData, law: Law) -> None:
     result.reason = f"{where[0].upper()}{where[1:]} holds on runs that were not used for fitting."
     if not unused:
         result.reason = f"{where[0].upper()}{where[1:]} explains the runs; none was kept unused."
-    if lacking(search, law.fitted):
+    if search.lacking(law.fitted):
         result.reason += " The residual with it still holds more than noise."
 
 
@@ -148,7 +147,7 @@ def best_of(
     laws = []
     for trial in chosen:
         laws.append(improved(maker, trial, say, around))
-        if not lacking(maker.search, laws[-1].fitted):
+        if not maker.search.lacking(laws[-1].fitted):
             break
     return min(laws, key=lambda law: law.fitted.estimate.robust + law.fitted.free)
 
@@ -177,7 +176,7 @@ def refined(maker: Maker, law: Law, say: Callable[[str], None]) -> Law:
     """The law on knots elsewhere along its first signal, if it lacks something and that helps."""
     for width in WIDTHS:
         x = law.shape.x
-        if x is None or not lacking(maker.search, law.fitted):
+        if x is None or not maker.search.lacking(law.fitted):
             break
         axis = replace(maker.bench.axis_x(x.signal, dense=width), jump=x.jump)
         other = maker.redrawn(law, axis)
@@ -246,12 +245,6 @@ def varying(bench: LawBench) -> list[str]:
     ]  # fmt: skip
 
 
-def lacking(search: Search, fitted: Fitted) -> bool:
-    """Whether a model leaves more than noise in runs of either purpose."""
-    unused = whiteness_tests(search.check_data - fitted.check, search.checking)
-    return search.lacking(fitted) or any(test.structured for test in unused)
-
-
 def singles(maker: Maker) -> list[Trial]:
     """Laws of one signal of the place, to first order."""
     bench, found = maker.bench, []
@@ -269,9 +262,8 @@ def singles(maker: Maker) -> list[Trial]:
 
 def _left(search: Search, law: Law) -> str:
     fitted = law.fitted
-    assert fitted.gate is not None
-    size = float(np.sqrt(np.mean((search.check_data - fitted.check) ** 2)))
-    return (
-        f"unused runs gain {fitted.gate.gain:.0f} nats (z {fitted.gate.z:.1f}), "
-        f"{size:.2f} times the noise left"
+    used, unused = (
+        float(np.sqrt(np.mean((data - model) ** 2)))
+        for data, model in ((search.fit_data, fitted.fit), (search.check_data, fitted.check))
     )
+    return f"{used:.2f} times the noise left, {unused:.2f} in unused runs"

@@ -7,22 +7,27 @@ signals of the law. It holds to first order around that law, so it is exact for 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...calibrate.fit import fit
 from ...errors import CosimError
 from ..candidates import candidates
+from ..linear import Absorber
 from ..models import Fitted
+from ..secant import Bench, model_values
+from ..signature import Signature
 from .regression import regress
-from .trial import Law, Maker
+from .trial import QUICK, Law, Maker
 
 Vector = NDArray[np.float64]
 NAMED = 3
-"""Named laws that are fitted, those that gain most to first order."""
+"""Named laws that are fitted, those that do most of what the law does, to first order."""
+LESS = 0.1
+"""Share by which the law is made weaker to see what it does."""
 
 
 @dataclass(frozen=True)
@@ -82,35 +87,74 @@ def _peaks(ratio: Vector, visits: Vector) -> list[int]:
     return sorted(inner, key=lambda i: -ratio[i])[:3]
 
 
-def nearest(maker: Maker, law: Law, say: Callable[[str], None]) -> list[Named]:
+def nearest(maker: Maker, law: Law) -> list[Named]:
     """Named laws of the place, the most probable first.
 
-    Args:
-        maker: of the law.
-        law: the one from data.
-        say: told what is done.
+    They are sought where the law from data has led: each is added to the model with it and asked
+    how much of what that law does it would do. Around a model without any, which may be far off,
+    first orders do not tell.
     """
-    search, base, site = maker.search, maker.bench.base, maker.bench.site
+    search, site = maker.search, maker.bench.site
     here = [
-        c for c in candidates(base.problem)
+        c for c in candidates(maker.bench.base.problem)
         if (c.instance, c.port) == (site.instance, site.port) and c.refinement is None
     ]  # fmt: skip
-    bench = search.bench(base, search.fitting)
+    bench = _bench(maker, law)
     signatures = bench.followed(bench.begun(here, thorough=True))
     signatures.sort(key=lambda s: -s.score.gain)
     found = []
     for item in signatures[:NAMED]:
-        fitted = search.refit(base, item)
-        if fitted is None:
-            continue
-        fitted = search.refined(base, fitted, quick=True)
-        say(f"beside {item.candidate.effect}")
         try:
+            fitted = _fitted(maker, law, item)
             found.append(Named(fitted, _difference(maker, law, fitted)))
         except CosimError as error:
-            say(f"{item.candidate.label}: {error}")
-    found.sort(key=lambda n: -search.gain(base, n.fitted))
+            search.say(f"{item.candidate.label}: {error}")
+            continue
+        search.say(f"beside {item.candidate.effect}: {search.gain(fitted, law.fitted):.0f} nats")
+    found.sort(key=lambda n: n.fitted.estimate.robust + n.fitted.free)
     return found
+
+
+def _bench(maker: Maker, law: Law) -> Bench:
+    """Simulates candidates beside the law; what it does is what they are to explain."""
+    search, fitted = maker.search, law.fitted
+    stack, theta = search.fitting, fitted.estimate.theta
+    _, _, slopes, held = maker.point(fitted)
+    base = maker.bench.base.problem
+    absorber = Absorber(stack.matrix(slopes, base.scale), base, held)
+    model = model_values(fitted.simulator, theta, stack)
+    less = theta.copy()
+    less[law.fits] *= 1.0 - LESS
+    done = (model - model_values(fitted.simulator, less, stack)) / LESS
+    return Bench(fitted.simulator, theta, stack, model, absorber.rest(done), absorber,
+                 np.ones_like(model))  # fmt: skip
+
+
+def _fitted(maker: Maker, law: Law, item: Signature) -> Fitted:
+    """The model with a named law instead, fitted from where the law from data has led."""
+    search, base = maker.search, maker.bench.base
+    whole = item.candidate.added_to(base.problem)
+    values = {p.name: p.nominal for p in whole.parameters} | item.fixed
+    values |= dict(zip(base.problem.names, law.fitted.estimate.theta.tolist(), strict=False))
+    strength = item.strength
+    asked = item.value * (item.score.amplitude or 1.0)
+    values[strength.name] = float(np.clip(asked, strength.minimum, strength.maximum))
+    if item.probe.second:
+        values[item.probe.second] = item.second
+    known = {*base.problem.names, strength.name, item.probe.second}
+    first = whole.hold({n: values[n] for n in whole.names if n not in known})
+    best: Fitted | None = None
+    for problem in (first, whole):
+        theta = np.array([values[name] for name in problem.names])
+        theta = np.clip(theta, problem.lower, problem.upper)
+        simulator = search.simulator.of(problem).limited(maker.bench.limits)
+        fitted = search.judged(fit(simulator, theta, effort=QUICK))
+        values |= fitted.estimate.values
+        if best is None or search.gain(best, fitted) > 0.0:
+            best = fitted
+    assert best is not None
+    best.effects = (*base.effects, item.candidate)
+    return best
 
 
 def _difference(maker: Maker, law: Law, named: Fitted) -> Vector:

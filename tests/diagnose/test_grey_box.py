@@ -1,0 +1,100 @@
+"""A law that nobody has catalogued is rebuilt, judged on unused runs and put into an FMU."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.calibrate.problem import Problem
+from cosim.diagnose import Diagnosis, diagnose
+from cosim.errors import UnknownNameError
+from tests.shaft_plant import FRICTION, SIGMA, shaft
+
+pytestmark = pytest.mark.slow
+PLACE = "load.flange"
+
+
+def uncatalogued(w: float, _: float) -> float:
+    """Drag that sets in at 2 rad/s and grows with the square from there [N.m]."""
+    return -0.05 * math.copysign(max(abs(w) - 2.0, 0.0) ** 2, w)
+
+
+def friction(w: float, _: float) -> float:
+    """Coulomb friction as the catalogue has it, smoothed over 0.2 rad/s [N.m]."""
+    return -0.25 * math.tanh(w / 0.2)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, Path]:
+    out = tmp_path_factory.mktemp("law")
+    return diagnose(shaft(uncatalogued, 7), out, law_at=PLACE, workers=2), out
+
+
+def test_a_law_outside_the_catalogue_is_rebuilt(made: tuple[Diagnosis, Path]) -> None:
+    law = made[0].to_dict()["law_from_data"]
+    assert law["made"] and law["depends_on"] == "velocity"
+    curve = {
+        name: np.array(law["curve"][name]) for name in ("x", "value", "low", "high", "visited")
+    }
+    seen = curve["visited"] > 0.0
+    # viscous friction is declared, and its slope is the one's or the other's
+    slope = FRICTION - law["declared"]["b"]["value"]
+    truth = np.array([uncatalogued(x, 0.0) for x in curve["x"]]) - slope * curve["x"]
+    half = 0.5 * (curve["high"] - curve["low"])
+    # 95 % bands of a curve with about a dozen independent points: twice as wide for all of them
+    assert np.all(np.abs(curve["value"] - truth)[seen] < 2.0 * half[seen])
+    assert np.average(half, weights=curve["visited"]) < 0.1 * np.max(np.abs(truth))
+
+
+def test_unused_runs_are_explained_to_the_noise(made: tuple[Diagnosis, Path]) -> None:
+    error = made[0].to_dict()["law_from_data"]["error"]
+    for channel, sigma in SIGMA.items():
+        assert error[channel]["before"]["validation"] > 1.5 * sigma
+        # 400 samples tell the noise to 4 %: two and a half standard deviations
+        assert error[channel]["after"]["validation"] < 1.1 * sigma
+
+
+def test_the_fmu_is_the_model_with_the_law(made: tuple[Diagnosis, Path]) -> None:
+    from cosim.calibrate.model import Model
+    from cosim.calibrate.simulator import Simulator
+
+    result, out = made
+    assert result.law is not None and result.law.law is not None
+    file = replace(result.problem.file, instances={"load": str(result.law.fmu)})
+    assert result.law.fmu is not None and result.law.fmu.is_relative_to(out)
+    problem = result.problem.changed(model=Model.of(file, None), parameters=())
+    (row,) = Simulator(problem, workers=1).residuals(np.zeros(0), ["unused"])
+    expected = result.law.law.fitted.simulator.residuals(
+        result.law.law.fitted.estimate.theta, ["unused"]
+    )
+    # the same code with the same numbers
+    assert row[1] == pytest.approx(expected[0][1], abs=1e-9)
+
+
+def test_a_machine_that_lacks_nothing_gets_no_law(tmp_path: Path) -> None:
+    result = diagnose(shaft(lambda w, phi: 0.0, 7), tmp_path, law_at=PLACE, workers=2)
+    law = result.to_dict()["law_from_data"]
+    assert result.verdict == "nothing_missing"
+    assert not law["made"] and "reaches the noise" in law["reason"]
+    assert not list(tmp_path.rglob("*.fmu"))
+
+
+def test_the_nearest_name_of_a_law_that_has_one() -> None:
+    result = diagnose(shaft(friction, 8), law_at=PLACE, workers=2)
+    law = result.to_dict()["law_from_data"]
+    assert law["made"]
+    first = law["nearest"][0]
+    assert first["effect"] == "coulomb"
+    # to the noise, and by no more than one parameter's worth either way
+    assert abs(first["unused_runs_prefer_the_law_by_nats"]) < 5.0
+    assert first["rms_difference"] < 0.1 * 0.25
+
+
+def test_a_place_that_is_none_is_refused_with_those_that_are() -> None:
+    problem: Problem = shaft(lambda w, phi: 0.0, 7)
+    with pytest.raises(UnknownNameError, match=r"load\.flange.*as place of a law"):
+        diagnose(problem, law_at="load.flunge")
