@@ -16,6 +16,7 @@ from .basis import ALONG_Y, Shape
 from .bench import ANGLES, LawBench, Site
 from .nearest import nearest
 from .result import LawFromData
+from .terms import formula
 from .trial import Law, Maker, Trial
 
 DENSE, WIDTHS = 0.1, (math.inf, 0.01)
@@ -100,11 +101,17 @@ def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
         if search.gain(law.fitted, both.fitted) > GATE:
             law = both
     (again,) = maker.tried(law.shape, law)
-    result.law = law = maker.fitted(again, law, final=True)
-    say(f"law of {law.shape.label}: {_left(search, law)}")
-    _judged(result, law)
+    smooth = maker.fitted(again, law, final=True)
+    say(f"law of {smooth.shape.label}: {_left(search, smooth)}")
+    result.law = result.smooth = smooth
+    if (few := formula(maker, law, again)) is not None:
+        short = maker.fitted(few, law, final=True)
+        say(f"{short.formula}: {_left(search, short)}")
+        if search.gain(smooth.fitted, short.fitted) > -GATE:
+            result.law = short
+    _judged(result, result.law)
     if result.made:
-        result.named = nearest(maker, law)
+        result.named = nearest(maker, smooth)
     return result
 
 

@@ -47,6 +47,7 @@ class LawFromData:
         reason: one or two sentences.
         search, base: the data, and the model that lacks the law.
         maker, law: of the law, None where no signal carries one.
+        smooth: the smooth law; `law` is a formula where one does as well.
         named: laws with a name beside it, the most probable first.
         needed: log likelihood that unused runs had to gain [nats].
         fmu: the variant that carries it, once it is written.
@@ -59,6 +60,7 @@ class LawFromData:
     base: Fitted
     maker: Maker | None = None
     law: Law | None = None
+    smooth: Law | None = None
     named: list[Named] = field(default_factory=list)
     needed: float = 0.0
     fmu: Path | None = None
@@ -71,7 +73,7 @@ class LawFromData:
             "reason": self.reason,
         }  # fmt: skip
         law = self.law
-        if law is None or self.maker is None or law.fitted.gate is None:
+        if law is None or self.smooth is None or self.maker is None or law.fitted.gate is None:
             return table
         points, visits, grid = self._points(self.maker, law)
         value, deviation = law.values(*points)
@@ -79,7 +81,7 @@ class LawFromData:
         for item in self.named:
             gate = compare(self.search.check_data, item.fitted.check, law.fitted.check,
                            self.search.checking)  # fmt: skip
-            named.append(item.to_dict(law, gate.gain, points, visits))
+            named.append(item.to_dict(self.smooth, gate.gain, points, visits))
         return table | {
             "form": law.shape.form,
             "depends_on": law.shape.label,
