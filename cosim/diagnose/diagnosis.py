@@ -332,11 +332,12 @@ def _searched(
         result.bursts = times(sudden, list(search.fitting.runs))
     result.after = current
     _verdict(result, winners)
-    if asked is not None or result.verdict == "unexplained":
+    if asked or result.verdict == "unexplained":
         result.law = unnamed(search, current, result.located, asked)
     if result.law is not None:
         result.files += result.law.leave_fmu(out)
-        result.reason += f" {result.law.reason}"
+        said = "The catalogue was not asked." if asked else result.reason
+        result.reason = f"{said} {result.law.reason}"
     _look_further(result)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)

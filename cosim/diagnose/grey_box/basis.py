@@ -121,6 +121,11 @@ class Shape:
             return np.column_stack([only_x, only_y])
         return np.eye((ALONG_X + 1) * ALONG_Y)
 
+    @property
+    def jumps(self) -> NDArray[np.bool_]:
+        """Which of the free coefficients are jumps."""
+        return np.asarray(np.any(self.expansion[ALONG_X * ALONG_Y :] != 0.0, axis=0))
+
     def penalties(self) -> list[Vector]:
         """Squares of second differences along each axis, as matrices over the free coefficients."""
         along_x = np.zeros((ALONG_X - 2, ALONG_X + 1))

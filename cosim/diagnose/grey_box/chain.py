@@ -180,18 +180,19 @@ def improved(
 
 
 def refined(maker: Maker, law: Law, say: Callable[[str], None]) -> Law:
-    """The law on knots elsewhere along its first signal, if it lacks something and that helps."""
+    """The law on the knots along its first signal by which runs left out are predicted best."""
+    x = law.shape.x
+    if x is None or math.isinf(dense(maker.bench, x.signal)):
+        return law
+    (own,) = maker.tried(law.shape, law)
+    best, most = law, own.regression.predicted
     for width in WIDTHS:
-        x = law.shape.x
-        if x is None or not maker.search.lacking(law.fitted):
-            break
         axis = replace(maker.bench.axis_x(x.signal, dense=width), jump=x.jump)
         other = maker.redrawn(law, axis)
-        (again,) = maker.tried(other.shape, other)
-        other = improved(maker, again, say, other)
-        if maker.search.gain(law.fitted, other.fitted) > GATE:
-            law = other
-    return law
+        (trial,) = maker.tried(other.shape, other)
+        if trial.regression.predicted > most + GATE:
+            best, most = improved(maker, trial, say, other), trial.regression.predicted
+    return best
 
 
 def pairs(maker: Maker, law: Law) -> list[tuple[float, Trial]]:

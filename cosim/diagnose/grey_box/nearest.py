@@ -7,6 +7,7 @@ signals of the law. It holds to first order around that law, so it is exact for 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,20 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...calibrate.fit import fit
+from ...calibrate.problem import Problem
 from ...errors import CosimError
-from ..candidates import candidates
-from ..linear import Absorber
+from ..candidates import Candidate, candidates, new_parameters
 from ..models import Fitted
-from ..secant import Bench, model_values
-from ..signature import Signature
 from .regression import regress
 from .trial import QUICK, Law, Maker
 
 Vector = NDArray[np.float64]
 NAMED = 3
-"""Named laws that are fitted, those that do most of what the law does, to first order."""
-LESS = 0.1
-"""Share by which the law is made weaker to see what it does."""
+"""Named laws that are fitted with all their parameters, those that do best with their usual ones."""
+FREE = 1e-6
+"""Share of what is known of declared parameters beforehand that counts where two models are
+compared: what these differ in is no difference of the laws."""
+SIZES = tuple(sign * size for size in (0.03, 0.1, 0.3, 1.0, 3.0) for sign in (1.0, -1.0))
+"""Strengths over the usual one of a law from the best of which its fit begins."""
 
 
 @dataclass(frozen=True)
@@ -90,71 +92,68 @@ def _peaks(ratio: Vector, visits: Vector) -> list[int]:
 def nearest(maker: Maker, law: Law) -> list[Named]:
     """Named laws of the place, the most probable first.
 
-    They are sought where the law from data has led: each is added to the model with it and asked
-    how much of what that law does it would do. Around a model without any, which may be far off,
-    first orders do not tell.
+    Each is fitted in the law's stead, with the declared parameters from where that has led: around
+    a model without any, which may be far off, first orders do not tell.
     """
     search, site = maker.search, maker.bench.site
+    port = f"{site.port}_{site.element}" if site.element else site.port
     here = [
         c for c in candidates(maker.bench.base.problem)
-        if (c.instance, c.port) == (site.instance, site.port) and c.refinement is None
+        if (c.instance, c.port) == (site.instance, port) and c.refinement is None
     ]  # fmt: skip
-    bench = _bench(maker, law)
-    signatures = bench.followed(bench.begun(here, thorough=True))
-    signatures.sort(key=lambda s: -s.score.gain)
-    found = []
-    for item in signatures[:NAMED]:
+    drafts: list[tuple[Fitted, Problem, dict[str, float]]] = []
+    for item in here:
         try:
-            fitted = _fitted(maker, law, item)
+            drafts.append(_draft(maker, law, item))
+        except CosimError as error:
+            search.say(f"{item.label}: {error}")
+    drafts.sort(key=lambda d: d[0].estimate.robust)
+    found = []
+    for draft, whole, values in drafts[:NAMED]:
+        fitted = draft
+        try:
+            if len(whole.names) > draft.free:
+                free = _fitted(maker, whole, values | draft.estimate.values)
+                free.effects = draft.effects
+                fitted = free if search.gain(draft, free) > 0.0 else draft
             found.append(Named(fitted, _difference(maker, law, fitted)))
         except CosimError as error:
-            search.say(f"{item.candidate.label}: {error}")
+            search.say(f"{draft.effects[-1].label}: {error}")
             continue
-        search.say(f"beside {item.candidate.effect}: {search.gain(fitted, law.fitted):.0f} nats")
+        gain = search.gain(fitted, law.fitted)
+        search.say(f"beside {draft.effects[-1].effect}: the law does better by {gain:.0f} nats")
     found.sort(key=lambda n: n.fitted.estimate.robust + n.fitted.free)
     return found
 
 
-def _bench(maker: Maker, law: Law) -> Bench:
-    """Simulates candidates beside the law; what it does is what they are to explain."""
-    search, fitted = maker.search, law.fitted
-    stack, theta = search.fitting, fitted.estimate.theta
-    _, _, slopes, held = maker.point(fitted)
-    base = maker.bench.base.problem
-    absorber = Absorber(stack.matrix(slopes, base.scale), base, held)
-    model = model_values(fitted.simulator, theta, stack)
-    less = theta.copy()
-    less[law.fits] *= 1.0 - LESS
-    done = (model - model_values(fitted.simulator, less, stack)) / LESS
-    return Bench(fitted.simulator, theta, stack, model, absorber.rest(done), absorber,
-                 np.ones_like(model))  # fmt: skip
-
-
-def _fitted(maker: Maker, law: Law, item: Signature) -> Fitted:
-    """The model with a named law instead, fitted from where the law from data has led."""
+def _draft(maker: Maker, law: Law, item: Candidate) -> tuple[Fitted, Problem, dict[str, float]]:
+    """A named law with only its strength fitted, the problem with all of it, and all values."""
     search, base = maker.search, maker.bench.base
-    whole = item.candidate.added_to(base.problem)
-    values = {p.name: p.nominal for p in whole.parameters} | item.fixed
+    whole = item.added_to(base.problem)
+    strengths, others = new_parameters(base.problem, whole)
+    values = {p.name: p.nominal for p in whole.parameters}
     values |= dict(zip(base.problem.names, law.fitted.estimate.theta.tolist(), strict=False))
-    strength = item.strength
-    asked = item.value * (item.score.amplitude or 1.0)
-    values[strength.name] = float(np.clip(asked, strength.minimum, strength.maximum))
-    if item.probe.second:
-        values[item.probe.second] = item.second
-    known = {*base.problem.names, strength.name, item.probe.second}
-    first = whole.hold({n: values[n] for n in whole.names if n not in known})
-    best: Fitted | None = None
-    for problem in (first, whole):
-        theta = np.array([values[name] for name in problem.names])
-        theta = np.clip(theta, problem.lower, problem.upper)
-        simulator = search.simulator.of(problem).limited(maker.bench.limits)
-        fitted = search.judged(fit(simulator, theta, effort=QUICK))
-        values |= fitted.estimate.values
-        if best is None or search.gain(best, fitted) > 0.0:
-            best = fitted
-    assert best is not None
-    best.effects = (*base.effects, item.candidate)
-    return best
+    problem = whole.hold({p.name: p.nominal for p in others})
+    simulator = search.simulator.of(problem).limited(maker.bench.limits)
+    best, least = values, np.inf
+    for strength in strengths:
+        for size in SIZES:
+            trial = float(np.clip(size * strength.span, strength.minimum, strength.maximum))
+            tried = values | {strength.name: trial}
+            cost = maker.cost(simulator, np.array([tried[n] for n in problem.names]))
+            if cost < least:
+                best, least = tried, cost
+    fitted = _fitted(maker, problem, best)
+    fitted.effects = (*base.effects, item)
+    return fitted, whole, values
+
+
+def _fitted(maker: Maker, problem: Problem, values: Mapping[str, float]) -> Fitted:
+    search = maker.search
+    theta = np.array([values[name] for name in problem.names])
+    theta = np.clip(theta, problem.lower, problem.upper)
+    simulator = search.simulator.of(problem).limited(maker.bench.limits)
+    return search.judged(fit(simulator, theta, effort=QUICK))
 
 
 def _difference(maker: Maker, law: Law, named: Fitted) -> Vector:
@@ -170,4 +169,4 @@ def _difference(maker: Maker, law: Law, named: Fitted) -> Vector:
     penalties = [np.zeros((directions.shape[1],) * 2)]
     if not (narrow or law.trial.words):
         penalties = law.shape.penalties()
-    return np.asarray(directions @ regress(grams, penalties, maker.declared).value)
+    return np.asarray(directions @ regress(grams, penalties, FREE * maker.declared).value)

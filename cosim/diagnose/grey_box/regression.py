@@ -25,10 +25,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh
 
 Vector = NDArray[np.float64]
-SMOOTH = (0.0, 1.0, 1e2, 1e4)
+SMOOTH = (0.0, 0.1, 1.0, 10.0, 1e2, 1e3, 1e4)
 """Values of rho: from free coefficients to a straight line, but for what data insist on."""
 STRAIGHT = 1e-9
 """Second differences of rounding, over the largest there are."""
+ABSENT = 1e6
+"""Precision of jumps of a law that has none, over that of curves."""
 FREE = 0.01
 """Precision of constants, slopes and jumps, over that of curves."""
 SIZES = np.logspace(-3.0, 3.0, 25)
@@ -104,6 +106,7 @@ class Regression:
         evidence: log evidence against no law [nats].
         expected: log likelihood that runs gain which were left out one by one [nats]; `evidence`
             where there is one run only.
+        predicted: log likelihood of these runs, the residual being that of no law.
     """
 
     prior: Prior
@@ -113,32 +116,40 @@ class Regression:
     declared: Vector
     evidence: float
     expected: float
+    predicted: float
 
 
-def regress(grams: Sequence[Gram], penalties: Sequence[Vector], declared: Vector) -> Regression:
+def regress(
+    grams: Sequence[Gram],
+    penalties: Sequence[Vector],
+    declared: Vector,
+    jumps: NDArray[np.bool_] | None = None,
+) -> Regression:
     """Coefficients of a law of one form.
 
     Args:
         grams: of the runs, columns of the law being its free coefficients.
         penalties: matrices D'D.
         declared: precision of the declared parameters, scaled.
+        jumps: which coefficients are jumps; a law may be without.
     """
     total = np.sum([g.matrix for g in grams], axis=0)
     free = penalties[0].shape[0]
     matrix, vector, back = _integrated(total, free, declared)
-    evidence, prior = _evidence(matrix, vector, penalties, declared)
+    evidence, prior = _evidence(matrix, vector, penalties, declared, jumps)
     factor = cho_factor(matrix + prior.law)
     value = cho_solve(factor, vector)
-    expected = evidence
+    alone = -0.5 * float(total[-1, -1])
+    expected, predicted = evidence, evidence + alone
     if len(grams) > 1:
-        expected = sum(
-            _gain(held, total - held.matrix, prior, free)
-            - _gain(held, total - held.matrix, prior, 0)
-            for held in grams
+        with_law, without = (
+            sum(_gain(held, total - held.matrix, prior, count) for held in grams)
+            for count in (free, 0)
         )
+        expected, predicted = with_law - without, with_law + alone
     return Regression(
         prior, matrix, value, cho_solve(factor, np.eye(free)), back @ np.append(-value, 1.0),
-        evidence, float(expected),
+        evidence, float(expected), float(predicted),
     )  # fmt: skip
 
 
@@ -152,7 +163,11 @@ def _integrated(total: Vector, free: int, declared: Vector) -> tuple[Vector, Vec
 
 
 def _evidence(
-    matrix: Vector, vector: Vector, penalties: Sequence[Vector], declared: Vector
+    matrix: Vector,
+    vector: Vector,
+    penalties: Sequence[Vector],
+    declared: Vector,
+    jumps: NDArray[np.bool_] | None,
 ) -> tuple[float, Prior]:
     """Greatest log evidence over the priors [nats], and the prior that has it."""
     free = vector.size
@@ -161,8 +176,10 @@ def _evidence(
     kind, plain = np.linalg.eigh(np.sum(penalties, axis=0))
     plain = plain[:, kind < STRAIGHT * max(float(kind[-1]), 1.0)]
     known = np.eye(free) - (1.0 - FREE) * plain @ plain.T
-    for smooth in product(SMOOTH, repeat=len(penalties)):
-        shape = known + sum(r * p for r, p in zip(smooth, penalties, strict=True))
+    none = np.zeros(free) if jumps is None else ABSENT * jumps
+    priors = [known] if jumps is None or not jumps.any() else [known, known + np.diag(none)]
+    for first, *smooth in product(priors, *([SMOOTH] * len(penalties))):
+        shape = first + sum(r * p for r, p in zip(smooth, penalties, strict=True))
         # in coordinates in which both matrices are diagonal, t costs nothing
         values, vectors = eigh(matrix, shape)
         values, turned = np.maximum(values, 0.0), vectors.T @ vector
@@ -170,7 +187,7 @@ def _evidence(
             grown = size**2 * values
             one = 0.5 * float(np.sum(turned**2 * size**2 / (1.0 + grown) - np.log1p(grown)))
             if best is None or one > best[0]:
-                best = one, Prior(shape / size**2, declared, float(size), smooth)
+                best = one, Prior(shape / size**2, declared, float(size), tuple(smooth))
     assert best is not None
     return best
 

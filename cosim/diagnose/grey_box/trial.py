@@ -205,11 +205,12 @@ class Maker:
         inner = np.linalg.pinv(asked)
         found = []
         for one in (shape, *(shape.narrowed(form) for form in forms)):
-            turn, penalties = one.expansion, one.penalties()
+            turn, penalties, jumps = one.expansion, one.penalties(), one.jumps
             if one is shape:
                 turn, penalties = asked, [directions.T @ p @ directions for p in penalties]
+                jumps = np.any(directions[jumps] != 0.0, axis=0)
             mine = tuple(g.form(inner @ turn, None if beyond else inner @ now) for g in grams)
-            found.append(Trial(one, mine, regress(mine, penalties, self.declared), turn))
+            found.append(Trial(one, mine, regress(mine, penalties, self.declared, jumps), turn))
         return found
 
     def fitted(self, trial: Trial, around: Law | None = None, *, final: bool = False) -> Law:
@@ -253,7 +254,7 @@ class Maker:
             starts = [(theta + change, start @ chosen), (theta, now @ chosen)]
         best = min(
             (np.clip(np.concatenate(pair), problem.lower, problem.upper) for pair in starts),
-            key=lambda one: self._cost(simulator, one),
+            key=lambda one: self.cost(simulator, one),
         )
         far = around is None and is_open(self.start.estimate)
         result = fit(simulator, best, effort=FAR if far else QUICK)
@@ -316,7 +317,7 @@ class Maker:
             shape = replace(law.shape, x=replace(x, jump=jump))
             constants = {**estimate.problem.constants, **self.bench.constants(shape)}
             simulator = estimate.simulator.of(estimate.problem.changed(constants=constants))
-            if self._cost(simulator, estimate.theta) > least:
+            if self.cost(simulator, estimate.theta) > least:
                 continue
             found = self._judged(fit(simulator, estimate.theta, effort=QUICK))
             if found.estimate.robust < least:
@@ -324,7 +325,8 @@ class Maker:
                 least = found.estimate.robust
         return best
 
-    def _cost(self, simulator: Simulator, theta: Vector) -> float:
+    def cost(self, simulator: Simulator, theta: Vector) -> float:
+        """Cost over the identification runs, infinite where they cannot be simulated."""
         try:
             return self.search.cost(simulator, theta)
         except CosimError:  # too strong to be simulated: a smaller share is tried
