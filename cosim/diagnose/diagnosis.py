@@ -336,8 +336,7 @@ def _searched(
         result.law = unnamed(search, current, result.located, asked)
     if result.law is not None:
         result.files += result.law.leave_fmu(out)
-        said = "The catalogue was not asked." if asked else result.reason
-        result.reason = f"{said} {result.law.reason}"
+        result.reason = f"{'' if asked else result.reason} {result.law.reason}".strip()
     _look_further(result)
     if out is not None and current.effects:
         result.files += _leave_fmus(result, out)

@@ -45,7 +45,9 @@ def unnamed(
         asked: the place; errors are raised then, else they are the law's reason.
     """
     if asked is not None:
-        return law_from_data(search, base, asked)
+        found = law_from_data(search, base, asked)
+        found.reason = f"The catalogue was not asked. {found.reason}"
+        return found
     if not located or located[0].evidence < GATE:
         return None
     first = located[0]

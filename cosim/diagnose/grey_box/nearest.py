@@ -24,7 +24,7 @@ from .trial import QUICK, Law, Maker
 
 Vector = NDArray[np.float64]
 NAMED = 3
-"""Named laws that are fitted with all their parameters, those that do best with their usual ones."""
+"""Named laws that are fitted with all their parameters: the best with their usual ones."""
 FREE = 1e-6
 """Share of what is known of declared parameters beforehand that counts where two models are
 compared: what these differ in is no difference of the laws."""
@@ -55,7 +55,7 @@ class Named:
         """
         last, values = self.fitted.effects[-1], self.fitted.estimate.values
         away = law.design(*at) @ self.difference
-        own, deviation = law.values(*at)
+        own, deviation = law.values(*at, held=True)
         share = visits / max(float(np.sum(visits)), 1e-300)
         size = float(np.sqrt(np.sum(share * own**2)))
         rms = float(np.sqrt(np.sum(share * away**2)))

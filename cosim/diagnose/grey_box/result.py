@@ -77,6 +77,7 @@ class LawFromData:
             return table
         points, visits, grid = self._points(self.maker, law)
         value, deviation = law.values(*points)
+        narrow = law.values(*points, held=True)[1]
         named = []
         for item in self.named:
             gate = compare(self.search.check_data, item.fitted.check, law.fitted.check,
@@ -96,6 +97,8 @@ class LawFromData:
                 "shape": grid, "x": points[0].tolist(), "y": points[1].tolist(),
                 "value": value.tolist(), "low": (value - BAND * deviation).tolist(),
                 "high": (value + BAND * deviation).tolist(), "visited": visits.tolist(),
+                "low_others_held": (value - BAND * narrow).tolist(),
+                "high_others_held": (value + BAND * narrow).tolist(),
             },
             "gate": {
                 "gain_nats": law.fitted.gate.gain, "z": law.fitted.gate.z,

@@ -114,14 +114,24 @@ class Law:
                                                                strict=True)]  # fmt: skip
         return " ".join(parts).removeprefix("+")
 
-    def values(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
-        """The law at points, and its standard deviations there."""
+    def values(self, x: Vector, y: Vector, *, held: bool = False) -> tuple[Vector, Vector]:
+        """The law at points, and its standard deviations there.
+
+        Args:
+            x, y: points.
+            held: with all other parameters as they were fitted: what these could do as well is no
+                uncertainty then.
+        """
         design = self.design(x, y)
-        covariance = self.fitted.estimate.covariance[self.fits, self.fits]
+        whole = self.fitted.estimate.covariance
+        covariance, first = whole[self.fits, self.fits], self.fits.start
+        if held:
+            across = whole[self.fits, :first]
+            covariance = covariance - across @ np.linalg.pinv(whole[:first, :first]) @ across.T
         known = design @ self.directions
         variance = np.einsum("ij,jk,ik->i", known, covariance, known)
         variance += np.sum((design @ self.rest) ** 2, axis=1)
-        return design @ self.free, np.sqrt(variance)
+        return design @ self.free, np.sqrt(np.maximum(variance, 0.0))
 
     def design(self, x: Vector, y: Vector) -> Vector:
         """Functions of the free coefficients (columns) at points."""
