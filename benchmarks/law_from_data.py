@@ -31,22 +31,23 @@ def draw(path: Path, law: dict[str, Any]) -> None:
     """The law with its band, what is true, the nearest named law, and where the runs were."""
     from matplotlib.figure import Figure
 
-    curve = {
-        name: np.array(law["curve"][name]) for name in ("x", "value", "low", "high", "visited")
-    }
+    curve = {name: np.array(values) for name, values in law["curve"].items()}
     x, seen = curve["x"], curve["visited"]
     slope = law["declared"]["b"]["value"] - FRICTION  # what the law has of the declared friction
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axis = figure.subplots()
-    low, high = curve["low"] - slope * x, curve["high"] - slope * x
-    axis.fill_between(x, low, high, color="tab:blue", alpha=0.2, lw=0, label="95 % band")
+    for kind, shade, label in (
+        ("", 0.15, "95 % band"), ("_others_held", 0.35, "with all else as fitted")
+    ):  # fmt: skip
+        low, high = curve["low" + kind] - slope * x, curve["high" + kind] - slope * x
+        axis.fill_between(x, low, high, color="tab:blue", alpha=shade, lw=0, label=label)
     axis.plot(x, curve["value"] - slope * x, color="tab:blue", label="law from the data")
     axis.plot(x, [late_drag(v, 0.0) for v in x], "k--", lw=1.2, label="true law")
     first = law["nearest"][0]
     named = np.array(first["value"]) - slope * x
     axis.plot(x, named, color="tab:orange", lw=1.2, label=f"nearest name: {first['effect']}")
-    level = np.full(x.size, min(low.min(), -0.8))
-    axis.scatter(x, level, s=400.0 * seen, color="0.5", label="visits", lw=0)
+    level = np.full(x.size, curve["low"].min())
+    axis.scatter(x, level, s=400.0 * seen, color="0.5", label="how often visited", lw=0)
     axis.set(xlabel="speed [rad/s]", ylabel="torque beside the declared friction [N.m]")
     axis.axhline(0.0, color="0.8", lw=0.8, zorder=0)
     axis.legend(frameon=False, fontsize=8)
