@@ -64,6 +64,7 @@ class LawFromData:
     named: list[Named] = field(default_factory=list)
     needed: float = 0.0
     fmu: Path | None = None
+    _seen: list[Vector] = field(default_factory=list, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """As `law_from_data` in the JSON."""
@@ -118,13 +119,12 @@ class LawFromData:
             "fmu": None if self.fmu is None else str(self.fmu),
         }  # fmt: skip
 
-    @staticmethod
-    def _points(maker: Maker, law: Law) -> tuple[list[Vector], Vector, list[int]]:
+    def _points(self, maker: Maker, law: Law) -> tuple[list[Vector], Vector, list[int]]:
         """Points at which the law is shown, how often the runs come near, and their grid."""
-        seen = maker.visited(law)
+        self._seen = self._seen or maker.visited(law)
         axes = [law.shape.x, law.shape.y]
         lines, indices = [], []
-        for axis, values, count in zip(axes, seen, ACROSS, strict=True):
+        for axis, values, count in zip(axes, self._seen, ACROSS, strict=True):
             if axis is None:
                 lines.append(np.zeros(1))
                 indices.append(np.zeros(values.size, dtype=np.intp))

@@ -123,15 +123,18 @@ class Law:
                 uncertainty then.
         """
         design = self.design(x, y)
-        whole = self.fitted.estimate.covariance
-        covariance, first = whole[self.fits, self.fits], self.fits.start
         if held:
-            across = whole[self.fits, :first]
-            covariance = covariance - across @ np.linalg.pinv(whole[:first, :first]) @ across.T
+            count = self.free.size
+            precision = self.trial.regression.prior.law + np.sum(
+                [gram.matrix[:count, :count] for gram in self.trial.grams], axis=0
+            )
+            variance = np.einsum("ij,ji->i", design, np.linalg.solve(precision, design.T))
+            return design @ self.free, np.sqrt(variance)
+        covariance = self.fitted.estimate.covariance[self.fits, self.fits]
         known = design @ self.directions
         variance = np.einsum("ij,jk,ik->i", known, covariance, known)
         variance += np.sum((design @ self.rest) ** 2, axis=1)
-        return design @ self.free, np.sqrt(np.maximum(variance, 0.0))
+        return design @ self.free, np.sqrt(variance)
 
     def design(self, x: Vector, y: Vector) -> Vector:
         """Functions of the free coefficients (columns) at points."""
