@@ -3,13 +3,15 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+RUNS := $(VENV)/.runs
 WORKERS ?= 2
 
-.PHONY: demo test quick check fmus docs fuzz bench wheel clean
+.PHONY: demo test quick check fmus docs site fuzz bench wheel clean
 
-demo: $(STAMP)
-	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
+demo: $(RUNS)
 	$(BIN)/python -m cosim run motor_bench --out out/motor_bench
+	$(BIN)/python -m cosim diagnose scenarios/motor_bench/data/MB-13 --out out/MB-13
+	$(BIN)/python -m cosim run crawler_paper --out out/crawler_paper
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
@@ -29,6 +31,9 @@ docs: $(STAMP)
 	$(BIN)/python -m sources.tables
 	$(BIN)/python -m benchmarks.tables
 
+site: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz --seconds 3600
 
@@ -38,14 +43,22 @@ bench: $(STAMP)
 	$(BIN)/python -m benchmarks.speed
 	$(BIN)/python -m benchmarks.startup
 
-wheel: $(STAMP)
+PLATFORM ?= host
+wheel: $(RUNS)
+	$(BIN)/python -m distribution --platform $(PLATFORM)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
+
+# what runs, builds FMUs and diagnoses; the tools of the tests are three times as much
+$(RUNS): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable ".[build]"
+	touch $(RUNS)
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,study,test,check]"
-	touch $(STAMP)
+	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,gym,live,logs,study,tables,validate,test,check]"
+	touch $(RUNS) $(STAMP)
 
 clean:
 	rm -rf $(VENV) out dist

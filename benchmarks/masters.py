@@ -32,7 +32,7 @@ from rich.table import Table
 
 from benchmarks.chain import DRIVES, EVERY, RECORD, STEP, build_chain
 from cosim import Master, ssp
-from cosim.master.kernel import SOURCE, cache_folder, library_name
+from cosim.master.kernel import SOURCES, cache_folder, library_name
 from cosim.master.session import Session
 from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
@@ -202,7 +202,7 @@ def main() -> None:
     parser.add_argument("--motor", default="ideal", help="fidelity of dc_motor")
     parser.add_argument("--only", action="append", help="only these clients (and the C loop)")
     options = parser.parse_args()
-    build_kernel(SOURCE, cache_folder() / library_name(), host_platform())
+    build_kernel(SOURCES, cache_folder() / library_name(), host_platform())
     with tempfile.TemporaryDirectory() as folder:
         paths = {
             fmi: ssp.write(

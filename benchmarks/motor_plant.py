@@ -44,8 +44,20 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "command_delay": (8e-3, ("delay",)),
     "elastic_gear": (1e-3, ("elastic",)),
     "backlash": (4e-3, ("backlash",)),
+    "cogging": (0.02, ("cogging",)),
+    "torque_ripple": (0.05, ("torque_ripple",)),
 }
 """Name -> size, and the names of the catalogue that are the same law."""
+USUAL = {"winding_heating": 60.0, "stribeck": 0.5, "command_delay": 1.0, "cogging": 12.0,
+         "torque_ripple": 12.0}  # fmt: skip
+"""Name -> shape: time constant [s], Stribeck speed [rad/s, output], factor on the delay, cycles per
+turn of the motor."""
+SHAPES: dict[str, tuple[float, float]] = {
+    "winding_heating": (0.5, 1000.0), "stribeck": (0.02, 10.0), "command_delay": (0.5, 40.0),
+    "cogging": (1.0, 200.0), "torque_ripple": (1.0, 200.0),
+}  # fmt: skip
+"""Name -> range of its shape; whole numbers for cycles per turn."""
+WHOLE = ("cogging", "torque_ripple")
 
 
 @dataclass(frozen=True)
@@ -57,15 +69,33 @@ class Bench:
     size: float = 0.0
     second: str = "none"
     second_size: float = 0.0
+    shape: float = 0.0
+
+    def form(self, name: str) -> float:
+        """Shape of one of its effects, the usual one of an effect that it does not have."""
+        return self.shape if self.shape and self.effect == name else USUAL.get(name, 0.0)
 
 
-def draw(random: np.random.Generator, effect: str = "none", factor: float = 1.0) -> Bench:
-    """A bench with parameters within the sheet's bounds."""
+def draw(
+    random: np.random.Generator, effect: str = "none", factor: float = 1.0, *, wide: bool = False
+) -> Bench:
+    """A bench with parameters within the sheet's bounds.
+
+    Args:
+        random: source of numbers.
+        effect: of `EFFECTS`.
+        factor: on its size.
+        wide: its shape is log-uniform over its range, not the usual one.
+    """
     values = {}
     for name, (low, high) in DECLARED.items():
         margin = 0.15 * (high - low)
         values[name] = float(random.uniform(low + margin, high - margin))
-    return Bench(values, effect, factor * EFFECTS[effect][0])
+    shape = 0.0
+    if wide and effect in SHAPES:
+        shape = float(np.exp(random.uniform(*np.log(SHAPES[effect]))))
+        shape = float(round(shape)) if effect in WHOLE else shape
+    return Bench(values, effect, factor * EFFECTS[effect][0], shape=shape)
 
 
 def commands(random: np.random.Generator, seconds: float) -> dict[str, tuple[str, Vector]]:
@@ -94,8 +124,14 @@ def commands(random: np.random.Generator, seconds: float) -> dict[str, tuple[str
     }
 
 
-def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[str, Vector]:
-    """Speed, current, voltage and angle at 1 kHz, one column per bench, without noise."""
+def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[str, Vector]:
+    """Speed, current, voltage and angle at 1 kHz, one column per bench, without noise.
+
+    Args:
+        benches: one per column; a bench may be there several times, with other commands.
+        w_ref: set speeds at 1 kHz, one column per bench.
+        start_angle: of each bench's motor shaft [rad].
+    """
 
     def of(name: str) -> Vector:
         return np.array([b.parameters[name] for b in benches])
@@ -104,6 +140,9 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
         return np.array(
             [b.size * (b.effect == name) + b.second_size * (b.second == name) for b in benches]
         )
+
+    def form(name: str) -> Vector:
+        return np.array([b.form(name) for b in benches])
 
     resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")
     kp, ki, acc = of("Kp_v"), of("Ki_v"), of("acc_max")
@@ -118,12 +157,16 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
     unbalance, hose, load_mu = size("unbalance"), size("hose_spring"), size("load_friction")
     sag, heating, saturation = size("supply_sag"), size("winding_heating"), size("saturation")
     drop, offset, gain = size("brush_drop"), size("current_offset"), size("current_gain")
-    delay = np.rint(size("command_delay") / 1e-3).astype(int)
+    cogging, ripple = size("cogging"), size("torque_ripple")
+    delay = np.rint(size("command_delay") * form("command_delay") / 1e-3).astype(int)
+    t_th, w_s = form("winding_heating"), form("stribeck")
+    n_cog, n_ripple = form("cogging"), form("torque_ripple")
 
     n = len(benches)
     i, heat = np.zeros(n), np.zeros(n)
     w, w_out = np.zeros(n), np.zeros(n)
-    angle = np.full(n, start_angle / RATIO)
+    angle = start_angle / RATIO
+    column = np.arange(n)
     angle_out = angle.copy()
     speed_integral, current_integral = np.zeros(n), np.zeros(n)
     w_set, i_set, u = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -134,14 +177,15 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
         i: Vector, w: Vector, angle: Vector, w_out: Vector, angle_out: Vector
     ) -> tuple[Vector, Vector, Vector]:
         constant = k_t * (1 - saturation * i**2 / (i**2 + 20.0**2))
+        constant = constant * (1 + ripple * np.cos(n_ripple * RATIO * angle))
         hot = resistance * (1 + 0.00393 * heating * heat)
         supply = u * (1 - sag * (u * i / 48.0) / 48.0)
         i_rate = (supply - hot * i - constant * RATIO * w - drop * np.tanh(i / 0.2)) / L_A
-        torque = RATIO * eta * constant * i
+        torque = RATIO * eta * constant * i - RATIO * cogging * np.sin(n_cog * RATIO * angle + 0.7)
         sign = np.tanh(w_out / 2e-3)
         friction = (
             b * w_out + drag * w_out * np.abs(w_out) + (coulomb + load_mu * np.abs(torque)) * sign
-            + stribeck * np.exp(-((w_out / 0.5) ** 2)) * sign
+            + stribeck * np.exp(-((w_out / w_s) ** 2)) * sign
         )  # fmt: skip
         springs = unbalance * np.sin(angle_out) + hose * angle_out
         twist = angle - angle_out
@@ -155,7 +199,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
             np.where(elastic, (through - friction - springs) / load, together),
         )
 
-    for tick in range(w_ref.size * 20):
+    for tick in range(w_ref.shape[0] * 20):
         if tick % 20 == 0:
             rows["speed"].append((RATIO * angle - last) / 1e-3)
             rows["current"].append(i * (1 + gain) + offset)
@@ -163,7 +207,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
             rows["angle"].append(RATIO * angle)
             last = RATIO * angle
         if tick % 10 == 0:
-            command = w_ref[np.maximum(tick // 20 - delay, 0)]
+            command = w_ref[np.maximum(tick // 20 - delay, 0), column]
             w_set = w_set + np.clip(command - w_set, -acc * 5e-4, acc * 5e-4)
             error = w_set - RATIO * w
             wanted = kp * error + speed_integral
@@ -180,7 +224,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: float) -> dict[st
         i = i + TICK * rates(i + 0.5 * TICK * i_rate, w, angle, w_out, angle_out)[0]
         w, w_out = w + TICK * w_rate, w_out + TICK * out_rate
         angle, angle_out = angle + TICK * w, angle_out + TICK * w_out
-        heat = heat + TICK * (resistance * i**2 - heat) / 60.0
+        heat = heat + TICK * (resistance * i**2 - heat) / t_th
     return {name: np.array(values) for name, values in rows.items()}
 
 
@@ -206,12 +250,26 @@ def drives(seed: int, seconds: float, names: tuple[str, ...] = ()) -> list[Drive
     ]
 
 
+def driven(benches: list[Bench], runs: list[Drive]) -> list[dict[str, Vector]]:
+    """What `simulate` gives for each run, all of them in one loop, which costs as much as one."""
+    count = len(benches)
+    found = simulate(
+        benches * len(runs),
+        np.repeat(np.column_stack([run.w_ref for run in runs]), count, axis=1),
+        np.repeat([run.start for run in runs], count),
+    )
+    return [
+        {name: values[:, k * count : (k + 1) * count] for name, values in found.items()}
+        for k in range(len(runs))
+    ]
+
+
 def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:
     """What each bench's effect changes, without noise: run -> channel -> values."""
     twins = [Bench(bench.parameters) for bench in benches]
     found: list[dict[str, dict[str, Vector]]] = [{} for _ in benches]
-    for drive in drives(seed, seconds):
-        values = simulate([*benches, *twins], drive.w_ref, drive.start)
+    runs = drives(seed, seconds)
+    for drive, values in zip(runs, driven([*benches, *twins], runs), strict=True):
         for column, entry in enumerate(found):
             entry[drive.name] = {
                 channel: both[:, column] - both[:, column + len(benches)]
@@ -246,9 +304,9 @@ def write_sets(
         f"sample_rate_hz = 1000\ncolumns = {columns}\n"
         for place in places
     }
-    for drive in drives(seed, seconds, names):
+    runs = drives(seed, seconds, names)
+    for drive, clean in zip(runs, driven(benches, runs), strict=True):
         w_ref = drive.w_ref
-        clean = simulate(benches, w_ref, drive.start)
         for column, place in enumerate(places):
             table: dict[str, Any] = {"time": np.arange(w_ref.size) * 1e-3, "speed_set": w_ref}
             for channel, sigma, quantum in (

@@ -1,6 +1,7 @@
 """Does the diagnosis name undeclared effects, and stay quiet without? Data of an independent plant.
 
     python -m benchmarks.selftest --repeats 3 --out out/selftest
+    python -m benchmarks.selftest --wide --repeats 4 --out out/wide
     python -m benchmarks.selftest --pairs 20 --repeats 0 --clean 0 --out out/pairs
     python -m benchmarks.selftest --example DATASET --out out/mirror
 
@@ -27,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.motor_plant import EFFECTS, Bench, changes, draw, write_sets
+from benchmarks.motor_plant import EFFECTS, WHOLE, Bench, changes, draw, write_sets
 from benchmarks.own_plant import Made, catalogue, example, made
 from cosim.calibrate.differences import jacobian
 from cosim.calibrate.mapping import read_problem
@@ -46,15 +47,24 @@ EXTREME = 300.0
 """RMS over the noise from which an effect is made smaller: a machine that oscillates is no test."""
 
 
-def benches(repeats: int, clean: int, seed: int, pairs: int = 0) -> list[Bench]:
-    """Effects at 0.5, 1 and 2 times their size, clean ones, and some with two effects."""
+def benches(
+    repeats: int, clean: int, seed: int, pairs: int = 0, *, wide: bool = False
+) -> list[Bench]:
+    """Effects at 0.5, 1 and 2 times their size, clean ones, and some with two effects.
+
+    Args:
+        repeats: benches of each effect.
+        clean: benches without any.
+        seed: of all that is drawn.
+        pairs: benches with two effects.
+        wide: shapes are drawn over their whole range (`SHAPES`), and ripples are among the effects.
+    """
     random = np.random.default_rng(seed)
     found = [draw(random) for _ in range(clean)]
-    for name in EFFECTS:
-        if name != "none":
-            for index in range(repeats):
-                found.append(draw(random, name, (1.0, 2.0, 0.5)[index % 3]))
-    kinds = [name for name in EFFECTS if name != "none"]
+    kinds = [name for name in EFFECTS if name != "none" and (wide or name not in WHOLE)]
+    for name in kinds:
+        for index in range(repeats):
+            found.append(draw(random, name, (1.0, 2.0, 0.5)[index % 3], wide=wide))
     for _ in range(pairs):
         first, second = random.choice(kinds, 2, replace=False).tolist()
         sizes = random.choice([0.5, 1.0, 2.0], 2)
@@ -148,7 +158,9 @@ def judged_pair(row: dict[str, Any], bench: Bench, sizes: list[float]) -> dict[s
 
 def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[str, Any]]:
     """Rows of sets from the independent motor bench."""
-    chosen = benches(arguments.repeats, arguments.clean, arguments.seed, arguments.pairs)
+    chosen = benches(
+        arguments.repeats, arguments.clean, arguments.seed, arguments.pairs, wide=arguments.wide
+    )
     places = write_sets(folder, chosen, SHEET, arguments.seed, arguments.seconds)
     alone = [part for bench in chosen for part in parts(bench)]
     effects = iter(changes(alone, arguments.seed, arguments.seconds))
@@ -158,6 +170,7 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
         size = shown(problem, bench.parameters, both[0])
         result = diagnose(problem, workers=arguments.workers)
         row = judged(result, bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters)
+        row["shape"] = bench.shape
         if bench.second != "none":
             other = shown(problem, bench.parameters, both[1])
             yield judged_pair(row, bench, [size, other])
@@ -235,6 +248,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clean", type=int, default=20)
     parser.add_argument("--pairs", type=int, default=0, help="benches with two effects")
+    parser.add_argument(
+        "--wide", action="store_true", help="shapes of laws over their whole range, ripples too"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--workers", type=int, default=2)

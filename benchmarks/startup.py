@@ -21,6 +21,8 @@ PROGRAMS = {
     "import cosim": ["-c", "import cosim"],
     "from cosim import run": ["-c", "from cosim import run"],
     "cosim --help": ["-m", "cosim", "--help"],
+    "cosim fmus list": ["-m", "cosim", "fmus", "list"],
+    "cosim scenarios": ["-m", "cosim", "scenarios"],
     "cosim run --help": ["-m", "cosim", "run", "--help"],
 }
 

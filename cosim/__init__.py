@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .errors import CosimError
     from .fmu.instance import Instance
     from .master.master import Master
+    from .master.twin import Twin
+    from .running.opening import open
     from .running.runner import Result, RunResult, run
     from .system.provider import FolderProvider
     from .system.system import System
@@ -35,7 +37,9 @@ __all__ = [
     "RunResult",
     "System",
     "Table",
+    "Twin",
     "errors",
+    "open",
     "read_recording",
     "read_system",
     "run",
@@ -53,6 +57,8 @@ _HOMES = {
     "RunResult": "running.runner",
     "System": "system.system",
     "Table": "data.signals",
+    "Twin": "master.twin",
+    "open": "running.opening",
     "read_recording": "data.recording",
     "read_system": "system.toml",
     "run": "running.runner",

@@ -5,6 +5,7 @@
         - FmuFileError              missing, corrupt or truncated .fmu, or not one we can run
         + PlatformError             the FMU has no binary for this machine
         - VariantError              unknown component, fidelity or effect; effect without a balance
+          + UnbuiltError            its FMU is not there, and the compiler is not installed
         - GraphError                the graph is wrong
           + UnknownNameError        no such instance, variable, scenario, file, column
           + ConnectError           causality, type, size or double driver
@@ -51,6 +52,10 @@ class PlatformError(FmuFileError):
 
 class VariantError(InputError):
     """A variant that does not exist or cannot be built."""
+
+
+class UnbuiltError(VariantError):
+    """A variant whose FMU is not there and cannot be built here; the text says what is missing."""
 
 
 class GraphError(InputError):

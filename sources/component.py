@@ -45,6 +45,7 @@ class Component:
         device: name of the default parameter file, `parameters/<device>.toml`; "" if it has none.
         source: paper and section, or book.
         energy: False for blocks that only carry signals (they have no energy balance).
+        like: component with the same balances; effects are catalogued of that one only.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Component:
     device: str = ""
     source: str = ""
     energy: bool = True
+    like: str = ""
 
 
 @dataclass(frozen=True)

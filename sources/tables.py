@@ -187,7 +187,7 @@ def _device(component: str, device: str) -> str:
             (
                 f"`{name}`",
                 numbers,
-                value.unit,
+                value.unit if isinstance(value.unit, str) else ", ".join(value.unit),
                 "" if value.uncertainty is None else _number(value.uncertainty),
                 "assumed" if value.assumed else "",
                 value.origin,

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from cosim.errors import VariantError, listing
+from cosim.spec import devices as own_devices
 from cosim.spec import variant as spec
 from cosim.spec.variant import Name
 
@@ -125,9 +126,30 @@ def effects() -> dict[str, ModuleType]:
     return dict(sorted(found.items()))
 
 
-def devices(component: str) -> dict[str, Path]:
-    """Parameter files of a component by device name."""
+def shipped_devices(component: str) -> dict[str, Path]:
+    """Parameter files of a component that come with cosim, by device name."""
     return {path.stem: path for path in sorted((_ROOT / component / "parameters").glob("*.toml"))}
+
+
+def devices(component: str) -> dict[str, Path]:
+    """Parameter files of a component by device name; the user's own come last.
+
+    Raises:
+        UnknownVariantError: one of the user's has the name of one that comes with cosim.
+    """
+    found = shipped_devices(component)
+    try:
+        own = own_devices.own(component)
+    except VariantError as error:
+        raise UnknownVariantError(str(error)) from error
+    for name, path in own.items():
+        if name in found:
+            raise UnknownVariantError(
+                f"{path}: component {component!r} has a device {name!r} already, which comes with "
+                "cosim; give the file another name"
+            )
+        found[name] = path
+    return found
 
 
 @dataclass(frozen=True)
@@ -136,20 +158,19 @@ class Origin:
 
     Attributes:
         value: number or list of numbers.
-        unit: its unit, checked against the declaration.
+        unit: its unit, checked against the declaration; a list where elements differ.
         origin: where it comes from.
         assumed: True if nobody measured or printed it.
         uncertainty: standard uncertainty in the same unit, None if unknown.
     """
 
     value: Any
-    unit: str
+    unit: str | tuple[str, ...]
     origin: str
     assumed: bool = False
     uncertainty: float | None = None
 
 
-@lru_cache(maxsize=None)
 def device_values(component: str, device: str) -> dict[str, Origin]:
     """Read a device file.
 
@@ -164,20 +185,29 @@ def device_values(component: str, device: str) -> dict[str, Origin]:
         raise UnknownVariantError(
             f"component {component!r} has no device {device!r}; {listing(available, device)}"
         )
-    table = tomllib.loads(available[device].read_text(encoding="utf-8"))
+    path = available[device]
+    return _read_device(component, path, path.read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=None)
+def _read_device(component: str, path: Path, text: str) -> dict[str, Origin]:
+    table = tomllib.loads(text)
+    # a device of several components has what only one of them means in [component.name]
+    for each in table.pop("components", ()):
+        table |= table.pop(each, {}) if each == component else {each: None}
     values = {}
     for name, entry in table.items():
         if not isinstance(entry, dict):
             continue
         missing = {"value", "unit", "origin"} - set(entry)
         if missing:
-            raise ValueError(
-                f"{available[device].name}: {name!r} lacks {', '.join(sorted(missing))}"
-            )
-        coherent(entry["unit"])
+            raise ValueError(f"{path.name}: {name!r} lacks {', '.join(sorted(missing))}")
+        unit = tuple(entry["unit"]) if isinstance(entry["unit"], list) else entry["unit"]
+        for each in (unit,) if isinstance(unit, str) else unit:
+            coherent(each)
         values[name] = Origin(
             tuple(entry["value"]) if isinstance(entry["value"], list) else entry["value"],
-            entry["unit"],
+            unit,
             entry["origin"],
             entry.get("assumed", False),
             entry.get("uncertainty"),
@@ -232,13 +262,18 @@ def build_model(name: Name | str) -> Model:
     equations(model)
     model.finish()
     for key, origin in origins.items():
-        declared = next(
-            (v.quantity for n, v in model.variables.items() if n.partition("[")[0] == key), None
-        )
-        unit = coherent(origin.unit)
-        if declared is not None and coherent(declared.unit).exponents != unit.exponents:
-            raise ValueError(
-                f"device file {name.device or component.device}.toml gives {key!r} in "
-                f"{origin.unit}, but it is declared in {declared.unit}"
-            )
+        _check_units(model, name.device or component.device, key, origin)
     return model
+
+
+def _check_units(model: Model, device: str, key: str, origin: Origin) -> None:
+    """Raise ValueError where a device gives a quantity in units of another kind."""
+    declared = [v.quantity for n, v in model.variables.items() if n.partition("[")[0] == key]
+    given = origin.unit
+    units = (given,) * len(declared) if isinstance(given, str) else given
+    for quantity, unit in zip(declared, units, strict=False):
+        if coherent(quantity.unit).exponents != coherent(unit).exponents:
+            raise ValueError(
+                f"device file {device}.toml gives {key!r} in {unit}, but it is declared in "
+                f"{quantity.unit}"
+            )

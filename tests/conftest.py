@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,21 @@ LONGEST = 60.0
 """[s] What one waits for without doing something else."""
 SLOW_MODULE = re.compile(r"^pytestmark = pytest\.mark\.slow$", flags=re.M)
 BEGIN = pytest.StashKey[float]()
+
+
+ROOT = Path(__file__).resolve().parents[1]
+PRODUCTS = {"out", "dist", "build"}
+"""Folders of the checkout that hold what commands made, and that git ignores."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def checkout_stays_clean() -> Iterator[None]:
+    """Tests, and the tools that they start, write to their own folders only."""
+    before = {path.name for path in ROOT.iterdir()}
+    yield
+    left = {path.name for path in ROOT.iterdir()} - before - PRODUCTS
+    left = {name for name in left if not name.startswith((".", "__pycache__"))}
+    assert not left, f"the tests have left {sorted(left)} in {ROOT}"
 
 
 def pytest_configure(config: pytest.Config) -> None:

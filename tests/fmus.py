@@ -16,10 +16,11 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
+from cosim.spec.cache import cache_folder
 from sources.packaging import catalog
 from sources.packaging.build import build
 
-OUT = Path(__file__).parent.parent / "fmus"
+OUT = cache_folder() / "fmus"
 _KEPT: dict[str, ctypes.CDLL] = {}
 _HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
 

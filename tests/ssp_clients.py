@@ -27,10 +27,14 @@ def environment() -> dict[str, str]:
 
 def run(client: str, path: Path, step: float, count: int, names: list[str]) -> np.ndarray:
     """One row per step, one column per name."""
-    with tempfile.TemporaryDirectory() as folder:  # what ecos unpacks and leaves
+    # ecos leaves there what it unpacks, and OMSimulator writes results to where it runs
+    with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
-            [sys.executable, __file__, client, str(path), repr(step), str(count), *names],
-            capture_output=True, text=True, timeout=120,
+            [
+                sys.executable, str(Path(__file__).resolve()), client, str(path.resolve()),
+                repr(step), str(count), *names,
+            ],
+            capture_output=True, text=True, timeout=120, cwd=folder,
             env={**environment(), "TMPDIR": folder},
         )  # fmt: skip
     if done.returncode:

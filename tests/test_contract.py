@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from cosim.fmu.check import check
 from sources.function import Oracle
 from sources.model import Role
-from sources.packaging.check import check
 from sources.variant import build_model
 from tests.fmus import Slave, catalogue, fmu
 

@@ -68,6 +68,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
             int((clock[-1] - clock[0]) / interval + COINCIDENT) + 1
         )
     columns: dict[str, Vector] = dict(log.columns)
+    own: dict[str, tuple[Vector, Vector]] = {}
     if "resample" in table:
         columns = {"time": time}
     elif main == "time" or "time" not in columns:
@@ -88,7 +89,10 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
                 log, item, clocks, time, clock, turn, where
             )  # fmt: skip
             values = _filtered(time, values, entry, where)
-            columns[name] = values * gain + (offset + float(entry.get("offset", 0.0)))
+            offset += float(entry.get("offset", 0.0))
+            columns[name] = values * gain + offset
+            if (held := _held(log, item, clocks)) is not None and "resample" not in table:
+                own[name] = held[0], held[1] * gain + offset
             units[name] = target.symbol if target else ""
     clock = columns.get("time", time)
     first, last = log.values.get("samples", (1, clock.size))
@@ -104,7 +108,24 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     if entries or main != "time" or main in log.origins or not 0.0 <= clock[0] < LATEST:
         clock = clock - clock[0]
     columns["time"] = clock
-    return replace(log, columns=columns, units=units)
+    if clock.size > 1:
+        raw = time[part]
+        rate = (clock[-1] - clock[0]) / (raw[-1] - raw[0])
+        own = {one: (clock[0] + rate * (t - raw[0]), v) for one, (t, v) in own.items()}
+    return replace(log, columns=columns, units=units, own=own)
+
+
+def _held(log: Log, entry: Mapping[str, Any], clocks: _Clocks) -> tuple[Vector, Vector] | None:
+    """Times and values of a column that is held on a clock of its own; None of any other."""
+    if not entry.get("hold") or {"unwrap", "limit", "despike", "fresh", "gap", "ends"} & set(entry):
+        return None
+    source = str(entry["source"])
+    name = str(entry.get("time", clocks.own(source)))
+    if name == clocks.main:
+        return None
+    values, times = log[source], clocks(name) - float(entry.get("late", 0.0))
+    good = np.isfinite(values) & np.isfinite(times)
+    return times[good], values[good]
 
 
 class _Clocks:

@@ -43,6 +43,9 @@ SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
+LOWER = 1.0
+"""Fall of the cost [nats] from which a point that was met on another errand is worth going to: the
+data prefer it by a factor of e, and fits end that near to their minima."""
 EVEN, ROUGHLY = 1e-3, 1e-2
 """Share of the cost beyond the noise's below which a fall is none: the model is that far off. The
 second for drafts."""
@@ -70,6 +73,7 @@ class Descent:
         self.drawn = drawn(problem)
         self.residuals = simulator.residuals(self.theta, self.purpose)
         self.cost = self.total(self.theta, self.residuals)
+        self._met: tuple[Vector, list[tuple[str, Vector]], float] | None = None
 
     def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
         """Cost with the bounds as a weak prior, which decides where the data are silent."""
@@ -129,6 +133,18 @@ class Descent:
         if not cost < self.cost:
             return False
         self.theta, self.residuals, self.cost = theta, residuals, cost
+        return True
+
+    def meet(self, theta: Vector, residuals: list[tuple[str, Vector]], cost: float) -> None:
+        """Note a point that was simulated on another errand, for `lowered`."""
+        if cost < (self.cost - LOWER if self._met is None else self._met[2]):
+            self._met = theta, residuals, cost
+
+    def lowered(self) -> bool:
+        """Go to the lowest point that was met, if it is lower than here."""
+        if self._met is None:
+            return False
+        (self.theta, self.residuals, self.cost), self._met = self._met, None
         return True
 
     def step(self, normal: Normal, damping: float) -> Vector:

@@ -89,6 +89,31 @@ class Estimate:
         """Parameter -> value."""
         return dict(zip(self.problem.names, self.theta.tolist(), strict=True))
 
+    def _repr_html_(self) -> str:
+        from ..display.bars import within
+        from ..display.html import Cell, explained, number, table, tag, unit
+        from ..display.notebook import view
+
+        rows = [
+            [explained(p.name, p.text), Cell(number(value), value),
+             Cell(f"{number(low)} to {number(high)}{'' if known else ', open'}", low),
+             unit(p.unit), within(value, low, high, p.minimum, p.maximum, p.nominal)]
+            for p, value, low, high, known in zip(
+                self.problem.parameters, self.theta.tolist(), self.low.tolist(),
+                self.high.tolist(), self.identifiable, strict=True,
+            )
+            if p.role != "nuisance"
+        ]  # fmt: skip
+        errors = channel_rms(self.problem, self.residuals)
+        return view(
+            f"Estimate of {self.problem.name}",
+            f"{self.count} residuals, {self.evaluations} simulated runs",
+            table(["parameter", "value", "95 % interval", "unit", "within its bounds"], rows),
+            tag("p", "error over noise: ",
+                ", ".join(f"{name} {size:.2f}×" for name, size in errors.items())),
+            *(tag("p", f"not told apart: {item}") for item in map(str, self.combinations) if item),
+        )  # fmt: skip
+
     @property
     def deviation(self) -> Vector:
         """Standard deviations."""

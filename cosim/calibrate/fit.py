@@ -19,6 +19,9 @@ from .simulator import Simulator
 Vector = NDArray[np.float64]
 APART = 10.0
 """Runs are fitted one half after the other if their mean errors differ by more than this factor."""
+RETURNS = 3
+"""Times that a fit goes on from a lower point that its intervals have met; each costs as many
+simulations as intervals do, and what still falls then has a floor that is flat for a reason."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +88,7 @@ def fit(
     draft = effort.end == "draft"
     if effort.begin == "there":
         run.correct(draft=draft)
-        if not draft:
-            run.smooth()
-        return estimated(run, confirm=not draft)
+        return estimated(run) if draft else _confirmed(run)
     if effort.begin == "far" and _uneven(run):
         run = Descent(simulator, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])
@@ -106,9 +107,23 @@ def fit(
         run.polish()
     elif effort.end == "intervals":
         run.normal(STEPS[-1], central=True)
-    if not draft:
+    return estimated(run) if draft else _confirmed(run, stays=effort.end == "intervals")
+
+
+def _confirmed(run: Descent, *, stays: bool = False) -> Estimate:
+    """Intervals, with long steps along what is known poorly.
+
+    They are those of a minimum: where such a step comes to a lower point, the fit goes on there,
+    unless it `stays`.
+    """
+    run.smooth()
+    for _ in range(RETURNS):
+        found = estimated(run, confirm=True)
+        if stays or not run.lowered():
+            return found
+        run.correct()
         run.smooth()
-    return estimated(run, confirm=not draft)
+    return estimated(run, confirm=True)
 
 
 def _uneven(run: Descent) -> bool:

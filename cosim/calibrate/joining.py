@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 from ..data.logs import Log
 from ..data.segments import relative_pose
 from ..data.signals import Table
-from ..errors import ScenarioError, UnitError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
-from ..spec.units import Unit
-from ..system.provider import Provider
+from ..master.master import Master
+from ..reading.schema import shown
+from ..spec.units import Unit, parse
+from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
+from .clocks import bounds, check_clock, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
-from .parts import COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
 
@@ -39,16 +42,21 @@ def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
     raise ScenarioError(f"{where}: {entry!r} names no variables")
 
 
-def _lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+def lookup(values: Mapping[str, Any], key: str, where: str) -> float:
+    """A number among entries; `key` may be an element, `initial_pose[0]`.
+
+    Raises:
+        ScenarioError: there is none.
+    """
     match = ITEM.fullmatch(key)
     if match is None or match["key"] not in values:
         raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
     value = values[match["key"]]
     try:
         return float(value[int(match["index"])] if match["index"] else value)
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, OverflowError):
         raise ScenarioError(
-            f"{where}: entry {key!r} is no number, it reads {value!r}; name an element as "
+            f"{where}: entry {key!r} is no number, it reads {shown(value)}; name an element as "
             f"{match['key']}[0]"
         ) from None
 
@@ -72,7 +80,14 @@ class Joined(MappedLogs):
         """The problem, on a system."""
         table = self.table
         model = Model.of(file, provider)
+        get_ready(provider, model.instances.values())
         self.system = model.plain({})
+        self.algorithm = str(table.get("algorithm", "jacobi"))
+        self.options = dict(table.get("options", {}))
+        search = self.search()
+        for options in (self.options, {**self.options, **search.options}):
+            with within(str(self.path)):  # what the master refuses is said before data are read
+                Master(self.system, self.algorithm, search.step, options=options).compile([], [])
         constants: dict[str, float] = {}
         for name, value in flatten(table.get("parameters", {})).items():
             if isinstance(value, list):
@@ -81,7 +96,7 @@ class Joined(MappedLogs):
                 constants[name] = float(value)
         fixed = self.data.sheet.get("fixed", {})
         for key, entry in table.get("fixed", {}).items():
-            value = _lookup(fixed, key, f"{self.path}: [fixed]")
+            value = lookup(fixed, key, f"{self.path}: [fixed]")
             constants.update({name: factor * value for name, factor in
                               _targets(entry, f"{self.path}: {key}")})  # fmt: skip
         self.columns: dict[str, str] = {}
@@ -97,6 +112,7 @@ class Joined(MappedLogs):
             raise ScenarioError(f"{self.path}: no channel's column is in the logs")
         stated = [*self.declared(), *self.others()]
         check_parameters(stated)
+        self.late = {name: bounds(stated, name) for name in self.logs}
         parameters = [p for p in stated if not p.late]
         return Problem(
             self.data.name,
@@ -105,9 +121,10 @@ class Joined(MappedLogs):
             present,
             [self.run(name, present) for name in self.logs],
             float(table["step"]),
-            self.search(),
+            search,
             constants=constants,
-            algorithm=str(table.get("algorithm", "jacobi")),
+            algorithm=self.algorithm,
+            options=self.options,
             period=float(table["period"]) if "period" in table else None,
             ticks=bool(table.get("ticks", False)),
             relative=[tuple(names) for names in self.table.get("relative", [])],
@@ -245,7 +262,7 @@ class Joined(MappedLogs):
                     f"{self.path}: [sheet] says nothing about the sheet's parameter {name!r}"
                 )
             where = f"{self.path}: [sheet] {name}"
-            targets = self._set(mapped[name], str(entry.get("unit", "")), where)
+            targets = self.targets(mapped[name], str(entry.get("unit", "")), where)
             found.append(
                 Parameter(
                     name, entry.get("unit", ""), float(entry["nominal"]), float(entry["min"]),
@@ -260,8 +277,13 @@ class Joined(MappedLogs):
         for role, key in (("declared", "parameter"), ("nuisance", "nuisance")):
             for entry in self.table.get(key, []):
                 where = f"{self.path}: {key} {entry.get('name')}"
-                targets = self._set(entry["targets"], str(entry.get("unit", "")), where)
+                targets = self.targets(entry["targets"], str(entry.get("unit", "")), where)
                 runs = list(self.logs) if entry.get("per_run") else [""]
+                if isinstance(entry["nominal"], str) and not entry.get("per_run"):
+                    raise ScenarioError(
+                        f"{where}: nominal {entry['nominal']!r} is another one in each run; "
+                        "write per_run = true, or a number"
+                    )
                 for run in runs:
                     nominal = self.value(entry["nominal"], run, where, str(entry.get("unit", "")))
                     span = float(entry.get("span", 0.0))
@@ -278,7 +300,7 @@ class Joined(MappedLogs):
                     )  # fmt: skip
         return found
 
-    def _set(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
+    def targets(self, entry: Any, unit: str, where: str) -> tuple[tuple[str, float], ...]:
         """Variables that a value in this unit sets, with the factors into theirs.
 
         Those that the system lacks may belong to variants that a diagnosis tries.
@@ -286,10 +308,9 @@ class Joined(MappedLogs):
         found = []
         source = known(unit, where) if unit else None
         for name, factor in _targets(entry, where):
-            try:
-                wanted = self.system.variables(name)[1][0].unit
-            except UnknownNameError:
-                wanted = None
+            if name.startswith(CLOCK):
+                check_clock(name, self.columns, where)
+            wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"
             gain, offset = scaled(source, wanted, given, f"{where}: {name}", "its factor", way)
@@ -297,6 +318,15 @@ class Joined(MappedLogs):
                 raise UnitError(f"{where}: {name}: {unit!r} has another zero; {way}")
             found.append((name, gain))
         return tuple(found)
+
+    def _wanted(self, name: str) -> Unit | None:
+        """Unit of a target, None where that is unknown."""
+        if name.startswith(CLOCK):
+            return parse("s")
+        try:
+            return self.system.variables(name)[1][0].unit
+        except UnknownNameError:
+            return None
 
     def value(self, entry: Any, run: str, where: str, unit: str = "") -> float:
         """A number, an entry of the run (`initial_pose[0]`), or a column's start (`first:x`).
@@ -306,8 +336,13 @@ class Joined(MappedLogs):
         """
         if isinstance(entry, (int, float)):
             return float(entry)
+        if not run:
+            raise ScenarioError(
+                f"{where}: nominal {entry!r} is another value in each run; say per_run = true, or "
+                "give a number"
+            )
         if entry.startswith("begin:"):
-            begun = _lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
+            begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
             log = self.logs[run]
@@ -327,7 +362,7 @@ class Joined(MappedLogs):
                     "",
                 )
             return float(values[np.isfinite(values)][0]) * gain + offset
-        return _lookup(self.logs[run].values, entry, where)
+        return lookup(self.logs[run].values, entry, where)
 
     def run(self, name: str, channels: list[Channel]) -> MeasuredRun:
         """One run."""
@@ -338,10 +373,11 @@ class Joined(MappedLogs):
             value = self.value(key, name, where)
             first = key.startswith("first:")
             own = self.units.get(key.removeprefix("first:"), "") if first else ""
-            starts.update({n: factor * value for n, factor in self._set(entry, own, where)})
+            starts.update({n: factor * value for n, factor in self.targets(entry, own, where)})
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
+        data = masked(log.time[during], data, channels, self.late[name], -lead)
         anchor = 0
         for triple in self.table.get("relative", []):
             place = [[c.name for c in channels].index(one) for one in triple]
@@ -356,9 +392,8 @@ class Joined(MappedLogs):
             log.time[during] + lead,
             data,
             {
-                one: signal
-                for target, entry in self.table.get("inputs", {}).items()
-                for one, signal in self._inputs(log, target, entry, lead).items()
+                target: self._input(log, target, column, entry, lead)
+                for target, column, entry in self.drivers()
             },
             starts,
             log.values,
@@ -376,21 +411,28 @@ class Joined(MappedLogs):
         gain, offset = self.converted[channel.name]
         return values if (gain, offset) == (1.0, 0.0) else values * gain + offset
 
-    def _inputs(self, log: Log, target: str, entry: Any, lead: float) -> dict[str, Table]:
-        """The signals of an input, or of all elements of a vector input."""
-        if isinstance(entry, str):
-            entry = {"column": entry}
-        where = f"{self.path}: input {target}"
-        if "column" in entry:
-            return {target: self._input(log, target, str(entry["column"]), entry, lead)}
-        if "columns" not in entry:
-            raise ScenarioError(f"{where}: lacks 'column'; {listing(entry, 'column')}")
-        columns = entry["columns"]
-        names = expand(columns) if isinstance(columns, str) else list(columns)
-        return {f"{target}[{i}]": self._input(log, target, column, entry, lead)
-                for i, column in enumerate(names, 1)}  # fmt: skip
+    def drivers(self) -> list[tuple[str, str, Mapping[str, Any]]]:
+        """Each driven input, or element of one, with its column and its entry.
 
-    def _conversion(
+        Raises:
+            ScenarioError: an entry names no column.
+        """
+        found: list[tuple[str, str, Mapping[str, Any]]] = []
+        for target, said in self.table.get("inputs", {}).items():
+            entry = {"column": said} if isinstance(said, str) else said
+            if "column" in entry:
+                found.append((target, str(entry["column"]), entry))
+                continue
+            if "columns" not in entry:
+                raise ScenarioError(
+                    f"{self.path}: input {target}: lacks 'column'; {listing(entry, 'column')}"
+                )
+            columns = entry["columns"]
+            names = expand(columns) if isinstance(columns, str) else list(columns)
+            found += [(f"{target}[{i}]", column, entry) for i, column in enumerate(names, 1)]
+        return found
+
+    def conversion(
         self, target: str, column: str, entry: Mapping[str, Any]
     ) -> tuple[float, float, str]:
         """Gain and offset of a column that drives an input, and the unit of what they give."""
@@ -405,17 +447,31 @@ class Joined(MappedLogs):
             return *scaled(source, known(unit, where), factor, where, "gain", way), unit
         return *scaled(source, wanted, factor, where, "gain", way), ""
 
+    def _course(self, log: Log, column: str, lead: float) -> tuple[Vector, Vector]:
+        """Times and values of what drives an input, where they are known.
+
+        What is held on a clock of its own changes at its own times, not at those of the log.
+        """
+        if column not in log.own:
+            good = np.isfinite(log[column])
+            return log.time[good], log[column][good]
+        times, values = log.own[column]
+        first, last = min(float(log.time[0]), -lead), float(log.time[-1])
+        begin = max(int(np.searchsorted(times, first, "right")) - 1, 0)
+        mine = slice(begin, int(np.searchsorted(times, last, "right")))
+        # the last value holds to the end of the log; of several at one time the last one counts
+        times, values = np.append(times[mine], last), np.append(values[mine], values[mine][-1:])
+        counts = np.append(np.diff(times) > 0.0, True)
+        return times[counts], values[counts]
+
     def _input(
         self, log: Log, target: str, column: str, entry: Mapping[str, Any], lead: float
     ) -> Table:
-        values = log[column]
-        good = np.isfinite(values)
-        times = log.time[good]
-        values = values[good]
+        times, values = self._course(log, column, lead)
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
             values = np.rint(values / quantum) * quantum
-        gain, offset, unit = self._conversion(target, column, entry)
+        gain, offset, unit = self.conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))
         how = str(entry.get("interpolation", "hold"))

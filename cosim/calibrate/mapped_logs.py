@@ -118,6 +118,8 @@ class MappedLogs:
         longest = float(self.table.get("gap", LONGEST * usual))
         until, reason = time.size, ""
         for column in self.sources():
+            if column in log.own and log.own[column][0][0] <= time[0]:
+                continue  # held for any time, on a clock of its own
             values = log[column]
             if values.shape != time.shape:
                 raise ScenarioError(f"{self.path}: " + apart(log, column, "time", time.size))

@@ -8,20 +8,53 @@ in the model. It is looked for in the data set's folder, above it, and among the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..data.logs import DataSet, read_data_set, runs_of
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import InputError, ScenarioError, UnknownNameError, listing
 from ..files import read_toml
 from ..installation import builder, places
+from ..installation.examples import example_sets, named_mappings, read_mapping
 from ..system.provider import Provider
 from ..system.toml import SystemFile, read_system
 from .joining import Joined
 from .problem import Problem
 from .schema import check_mapping
+
+
+def _folder(given: Path) -> Path:
+    """The folder of a data set, which may be named as one that comes with cosim."""
+    if given.exists():
+        return given
+    known = example_sets()
+    if str(given) in known:
+        return known[str(given)]
+    here = sorted(path.name for path in given.parent.glob("[!.]*") if path.is_dir())
+    if len(given.parts) > 1:
+        raise ScenarioError(
+            f"{given}: there is no such folder; beside it {listing(here, given.name)}"
+        )
+    raise UnknownNameError(
+        f"{given}: there is no such folder, and no data set of this name comes with cosim; "
+        f"{listing([*known, *here], str(given))}"
+    )
+
+
+def _mapping(given: Path) -> Path:
+    """A mapping file, which may be named as one that comes with cosim."""
+    if given.exists() or given.suffix == ".toml":
+        return given
+    known = named_mappings()
+    if given.as_posix() not in known:
+        raise UnknownNameError(
+            f"there is no mapping {given.as_posix()!r}; {listing(known, given.as_posix())}, or "
+            "give the path of a dataset.toml"
+        )
+    return known[given.as_posix()]
 
 
 def find_mapping(folder: Path, rig: str) -> Path:
@@ -39,11 +72,6 @@ def find_mapping(folder: Path, rig: str) -> Path:
         if name == rig:
             return path
         known.append(name)
-    if not folder.is_dir():
-        near = sorted(item.name for item in folder.parent.glob("[!.]*") if item.is_dir())
-        raise ScenarioError(
-            f"{folder}: there is no such folder; beside it {listing(near, folder.name)}"
-        )
     if not rig:
         raise ScenarioError(
             f"{folder}: has no set.toml that names a rig, and there is no dataset.toml in it nor "
@@ -82,21 +110,38 @@ def read_problem(
     """Read a data set as a calibration problem.
 
     Args:
-        folder: with `set.toml`.
+        folder: with `set.toml`, or the name of a set that comes with cosim.
         provider: where variants come from; builds them if not given.
-        mapping: a `dataset.toml`, looked for if not given.
+        mapping: a `dataset.toml`, or the name of one that comes with cosim; looked for if not
+            given.
         system: another system than the mapping's, with the same instances.
         only: entries that the runs must have, besides those of the mapping's `only`.
 
     Raises:
         ScenarioError, UnknownNameError: a file or a name in it is wrong.
     """
+    return read_joined(folder, provider, mapping=mapping, system=system, only=only)[1]
+
+
+def read_joined(
+    folder: Path | str,
+    provider: Provider | None = None,
+    *,
+    mapping: Path | str | None = None,
+    system: str | None = None,
+    only: Mapping[str, Any] | None = None,
+) -> tuple[Joined, Problem]:
+    """A problem as of `read_problem`, and what made it of mapping and data.
+
+    Raises:
+        ScenarioError, UnknownNameError: as of `read_problem`.
+    """
     if provider is None:
         provider = builder.default_provider()
-    folder = Path(folder)
+    folder = _folder(Path(folder))
     has_set = (folder / "set.toml").is_file()
     rig = str(read_toml(folder / "set.toml").get("rig", "")) if has_set else ""
-    path = Path(mapping) if mapping is not None else find_mapping(folder, rig)
+    path = _mapping(Path(mapping)) if mapping is not None else find_mapping(folder, rig)
     table = read_mapping(path)
     check_mapping(table, path)
     used = _asked(table)
@@ -106,15 +151,20 @@ def read_problem(
         partial(read_problem, folder, provider, mapping=path.parent / name, only=only)
         for name in table.get("further", [])
     ]
-    return Joined(path, table, data, only or {}).problem(file, provider).changed(further=further)
+    with _named(path, folder):
+        joined = Joined(path, table, data, only or {})
+        return joined, joined.problem(file, provider).changed(further=further)
 
 
-def read_mapping(path: Path) -> dict[str, Any]:
-    """A mapping file; what it does not say is as in the file that it names as its `base`."""
-    table = read_toml(path)
-    if "base" not in table:
-        return table
-    return {**read_mapping(path.parent / str(table["base"])), "further": [], **table}
+@contextmanager
+def _named(path: Path, folder: Path) -> Iterator[None]:
+    """Errors that name no file of the data set are about the mapping."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error) or str(folder) in str(error):
+            raise
+        raise type(error)(f"{path}: {error}") from error
 
 
 def _asked(table: Mapping[str, Any]) -> set[str]:

@@ -21,6 +21,9 @@ PURPOSE = "identification"
 COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
+CLOCK = "clock:"
+"""Begins the name of a target that is no variable of the system: `clock:CHANNEL`, how late the
+clock of a channel is [s]."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class Parameter:
     Attributes:
         name, unit, text: for people.
         nominal, minimum, maximum: start value and bounds.
-        targets: (full variable name, factor) that it sets.
+        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`.
         role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
         run: name of the only run that it concerns, "" for all.
         prior: standard deviation around the nominal value that is known beforehand, None if nothing
@@ -111,15 +114,22 @@ class Channel:
     window: float = 0.0
     shift: float = 0.0
 
-    def of(self, sampler: Sampler, values: Vector) -> Vector:
-        """What the channel would read, of a signal that was recorded at the sampler's times."""
+    def of(self, sampler: Sampler, values: Vector, late: float = 0.0) -> Vector:
+        """What the channel would read, of a signal that was recorded at the sampler's times.
+
+        Args:
+            sampler: of the run.
+            values: of the signal.
+            late: how late the channel's clock is [s].
+        """
+        shift = self.shift - late
         if self.transform == "sample":
-            result = sampler.at(self.shift, values)
+            result = sampler.at(shift, values)
         elif self.transform == "difference":
-            before = sampler.at(self.shift - self.window, values)
-            result = (sampler.at(self.shift, values) - before) / self.window
+            before = sampler.at(shift - self.window, values)
+            result = (sampler.at(shift, values) - before) / self.window
         else:
-            times, recorded = sampler.times + self.shift, sampler.recorded
+            times, recorded = sampler.times + shift, sampler.recorded
             steps = np.diff(recorded) * 0.5 * (values[1:] + values[:-1])
             integral = np.concatenate([[0.0], np.cumsum(steps)])
             first = np.maximum(times - self.window, recorded[0])

@@ -45,18 +45,18 @@ class Ran(NamedTuple):
         names: recorded.
         times: at which [s].
         rows: one per time, with a column per name.
-        cost: processor time [s].
+        cost: work that it took (see `Session.run`).
         inputs: what the key identifies, kept alive with it.
     """
 
     names: tuple[str, ...]
     times: Vector
     rows: Vector
-    cost: float
+    cost: int
     inputs: object
 
     def within(self, limit: float) -> bool:
-        """Whether a run with this limit on its processor time would have come to its end too."""
+        """Whether a run with this limit on its work would have come to its end too."""
         calm = math.isinf(limit) or float(np.abs(self.rows).max(initial=0.0)) <= RUNAWAY
         return self.cost <= limit and calm
 
@@ -113,15 +113,20 @@ class SessionPool:
             self._ran.move_to_end((key, frozenset(values.items())))
             return found
 
-    def remember(self, key: Key, values: Mapping[str, float], ran: Ran) -> None:
-        """Keep what was simulated; nobody writes to its rows."""
+    def remember(self, key: Key, values: Mapping[str, float], ran: Ran) -> bool:
+        """Keep what was simulated, nobody writes to its rows; whether it was new.
+
+        Two threads may have simulated the same at once.
+        """
         place = (key, frozenset(values.items()))
         with self._lock:
+            new = place not in self._ran
             self._forget(place)
             self._ran[place] = ran
             self._size += ran.rows.nbytes
             while self._size > KEPT:
                 self._forget(next(iter(self._ran)))
+        return new
 
     def _forget(self, place: tuple[Key, Hashable]) -> None:
         old = self._ran.pop(place, None)

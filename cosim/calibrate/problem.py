@@ -25,7 +25,7 @@ from ..system.system import System
 from ..system.toml import SystemFile
 from .checks.finding import NO_SOURCE, Source
 from .model import Model
-from .parts import Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
+from .parts import CLOCK, Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
 
 Vector = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Problem:
         step: communication step [s].
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         constants: full variable name -> value for all runs.
-        algorithm: of the master.
+        algorithm, options: of the master; a search may have further options.
         period: time between recorded points [s]; the sample interval if not given.
         ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
@@ -60,6 +60,7 @@ class Problem:
     search: Coarse
     constants: Mapping[str, float] = field(default_factory=dict)
     algorithm: str = "jacobi"
+    options: Mapping[str, Any] = field(default_factory=dict)
     period: float | None = None
     ticks: bool = False
     relative: Sequence[Sequence[str]] = ()
@@ -175,9 +176,10 @@ class Problem:
         return self.model.instances
 
     @property
-    def options(self) -> Mapping[str, Any]:
+    def chosen_options(self) -> Mapping[str, Any]:
         """Of the master's algorithm at this step."""
-        return self.search.options if self.step == self.search.step else {}
+        own = self.search.options if self.step == self.search.step else {}
+        return {**self.options, **own}
 
     @property
     def _coarse(self) -> Mapping[str, float]:
@@ -187,7 +189,8 @@ class Problem:
     def kind(self) -> Hashable:
         """What problems have in common that the same prepared simulations serve."""
         return (
-            *(tuple(sorted(i.items())) for i in (self.instances, self._coarse, self.options)),
+            *(tuple(sorted(i.items())) for i in (self.instances, self._coarse)),
+            repr(sorted(self.chosen_options.items())),  # values may be tables
             self.step, self.algorithm, self.period,
             tuple((c.signal, c.shift) for c in self.channels),
         )  # fmt: skip
@@ -214,7 +217,7 @@ class Problem:
     @cached_property
     def _fixed(self) -> dict[str, float]:
         known = {n: v for n, v in self.constants.items() if self._has(n)}
-        if len(known) < len(self.constants):
+        if len(known) < sum(not n.startswith(CLOCK) for n in self.constants):
             self.system()  # says which one it does not know
         return {n: v for n, v in known.items() if n not in self._coarse}
 
@@ -223,6 +226,22 @@ class Problem:
         run = self.run(run) if isinstance(run, str) else run
         found = dict(self._fixed)
         found.update((name, value) for name, value in run.starts.items() if self._has(name))
+        found.update(self._set(theta, run))
+        return {name: value for name, value in found.items() if not name.startswith(CLOCK)}
+
+    def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
+        """How late the clocks of channels are in a run [s], where that is estimated or held."""
+        run = self.run(run) if isinstance(run, str) else run
+        found = {**self.constants, **run.starts, **self._set(theta, run)}
+        return {
+            name.removeprefix(CLOCK): value
+            for name, value in found.items()
+            if name.startswith(CLOCK)
+        }
+
+    def _set(self, theta: Vector, run: MeasuredRun) -> dict[str, float]:
+        """Targets of the parameters that concern a run -> values."""
+        found: dict[str, float] = {}
         for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
             if parameter.run in ("", run.name):
                 found.update(parameter.set(value))
@@ -299,7 +318,7 @@ class Problem:
                     added.append(
                         free_parameter(
                             variable, full, full, strength=variable.name in strengths,
-                            hints=hints.get(variable.name, NO_HINTS).within(name),
+                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                         )
                     )  # fmt: skip
         return changed.changed(parameters=[*self.parameters, *added])

@@ -77,7 +77,7 @@ class Refinement:
                 added.append(
                     free_parameter(
                         variable, prefix + _own(name), full, strength=True,
-                        hints=hints.get(name, NO_HINTS).within(instance),
+                        hints=hints.get(name, NO_HINTS).within(instance, name),
                     )
                 )  # fmt: skip
             elif name in self.others or (

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import ScenarioError, listing
 from ..files import flatten
+from ..master.algorithms import known_options, names
 from ..reading.schema import (
     Check,
     anything,
@@ -140,8 +141,9 @@ def _table_of(keys: Mapping[str, Check]) -> Check:
 
 
 MAPPING: dict[str, Check] = {
-    "description": text, "rig": text, "system": text, "base": text, "further": texts,
-    "step": positive, "algorithm": text, "period": positive, "ticks": flag,
+    "description": text, "origin": text, "rig": text, "system": text, "base": text,
+    "further": texts,
+    "step": positive, "algorithm": text, "options": table, "period": positive, "ticks": flag,
     "search_step": positive, "search": _table_of(SEARCH), "lead": at_least_zero,
     "time": text, "resample": positive, "gap": positive, "only": table,
     "relative": list_of(list_of(text, 3)),
@@ -179,6 +181,12 @@ def check_mapping(content: Mapping[str, Any], path: Path) -> None:
     Raises:
         ScenarioError: with file, key and the way out.
     """
+    for key in content:
+        if key not in MAPPING and any(key in known_options(name) for name in names()):
+            raise ScenarioError(
+                f"{path}: {key!r} is an option of the algorithm; write options.{key} = "
+                f"{content[key]!r} as in a scenario.toml"
+            )
     strict(content, MAPPING, str(path), NEEDED)
     if not content["channels"]:
         raise ScenarioError(f"{path}: [channels] is empty: nothing measured would be compared")

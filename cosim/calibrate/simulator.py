@@ -1,4 +1,4 @@
-"""Simulates a problem: with prepared sessions that are shared, in threads, within limits on time.
+"""Simulates a problem: with prepared sessions that are shared, in threads, within limits on work.
 
 Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
 nothing was measured.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 import threading
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -34,12 +33,12 @@ class Simulator:
     Args:
         problem: what is simulated.
         workers: threads, one per core if not given.
-        limits: processor time that runs may take [s], by run; no limit for others.
+        limits: work that runs may take (see `Session.run`), by run; no limit for others.
         pool: sessions shared with other simulators.
 
     Attributes:
         evaluations: simulated runs so far, without those known from before.
-        costs: processor time that a run took, the last time [s].
+        costs: least work that a run took.
     """
 
     def __init__(
@@ -76,7 +75,9 @@ class Simulator:
     def session(self, run: MeasuredRun) -> Session:
         """A new prepared run."""
         problem = self.problem
-        master = Master(problem.plain(), problem.algorithm, problem.step, options=problem.options)
+        master = Master(
+            problem.plain(), problem.algorithm, problem.step, options=problem.chosen_options
+        )
         interval = problem.period or float(np.median(np.diff(run.times)))
         every = max(round(interval / problem.step), 1)
         size = every * problem.step
@@ -103,11 +104,15 @@ class Simulator:
         run = problem.run(run) if isinstance(run, str) else run
         ran = self._ran(problem.values(theta, run), run)
         with self._lock:
-            self.costs[run.name] = ran.cost
+            # not the last one: threads would decide which that is
+            self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
         place = {name: column for column, name in enumerate(ran.names)}
-        sampler = Sampler(run.times, ran.times)
+        sampler, late = Sampler(run.times, ran.times), problem.lateness(theta, run)
         read = np.column_stack(
-            [c.of(sampler, ran.rows[:, place[c.signal]]) for c in problem.channels]
+            [
+                c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
+                for c in problem.channels
+            ]
         )
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
@@ -119,17 +124,19 @@ class Simulator:
         if (known := self._pool.ran(key, values, limit)) is not None:
             return known
         with self._lock:
-            self.evaluations += 1
             session = self._pool.take(key) or self.session(run)
-        begun = time.thread_time()
         try:
             times, rows = session.run(values, limit=limit)
         except FmuCallError:
             session.close()
+            with self._lock:
+                self.evaluations += 1
             raise
-        ran = Ran(session.names, times, rows, time.thread_time() - begun, run.inputs)
+        ran = Ran(session.names, times, rows, session.work, run.inputs)
         self._pool.give(key, session, run.inputs)
-        self._pool.remember(key, values, ran)
+        if self._pool.remember(key, values, ran):
+            with self._lock:
+                self.evaluations += 1
         return ran
 
     # -- many --------------------------------------------------------------------------------------

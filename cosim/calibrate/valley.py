@@ -153,4 +153,5 @@ def _made_up(run: Descent, inverse: Vector, change: Vector) -> tuple[Vector, flo
                 break
         if before - cost < SLIGHT:
             break
+    run.meet(theta, residuals, cost)
     return theta, cost - run.cost

@@ -13,7 +13,7 @@ import contextlib
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,71 +23,67 @@ import typer
 from ..errors import CheckError, CosimError, InputError
 from ..installation.builder import default_provider
 from ..master import algorithms
+from ..spec import distribution
 from ..system.provider import FolderProvider, Provider
+from .arm import arm_app
 from .calibrate import calibrate_command
+from .data import data_app
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
 from .fmus import fmus_app
+from .guard import applies, guarded
 from .linearize import linearize_command
+from .new import new_app
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
+from .progress import Display
+from .scenarios import scenarios_command
 from .streams import print_json, stdout_for_json
 from .study import study_command
+from .twin import twin_command
+from .view import view_command
 
 if TYPE_CHECKING:
     from ..running.runner import Result
 
 app = typer.Typer(
-    help="Robot subsystems as FMUs, run together and compared with measurements.",
+    invoke_without_command=True,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
 app.add_typer(fmus_app, name="fmus")
+app.add_typer(arm_app, name="arm")
+app.add_typer(data_app, name="data")
+app.add_typer(new_app, name="new")
+app.command("scenarios")(scenarios_command)
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
 app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
 app.command("study")(study_command)
+app.command("twin")(twin_command)
+app.command("view")(view_command)
+
+
+@app.callback()
+def whole(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)
+    ] = False,
+) -> None:
+    """Robot subsystems as FMUs, run together and compared with measurements."""
+    if version:
+        typer.echo(f"cosim {distribution.version()} ({distribution.NAME})")
+        raise typer.Exit
 
 
 SHOWN = 40
 """Comparisons and passed checks that are printed; more are in result.json only."""
 SHOWN_FOLDERS = 8
 """Folders of results that are named one by one."""
-# -- scenarios -------------------------------------------------------------------------------------
-
-
-@app.command("scenarios")
-def list_scenarios(as_json: AsJson = False) -> None:
-    """List what can be run.
-
-    Example: `cosim scenarios`
-    """
-    from ..scenario import scenario
-
-    files = scenario.scenario_files()
-    if as_json:
-        print_json(
-            [
-                {
-                    "scenario": file.name,
-                    "system": file.table.get("system", ""),
-                    "runs": [name for name in file.runs if name],
-                    "description": file.text,
-                }
-                for file in files
-            ]
-        )
-        return
-    table = new_table("scenario", "system", "runs", "description")
-    for file in files:
-        runs = [name for name in file.runs if name]
-        shown = ", ".join(runs[:4]) + (f" … ({len(runs)})" if len(runs) > 4 else "")
-        table.add_row(file.name, str(file.table.get("system", "")), shown, file.text)
-    open_console().print(table)
 
 
 @app.command("run")
@@ -128,9 +124,6 @@ def run_command(
 
     Example: `cosim run motor_bench --set gearbox=elastic+backlash --param gearbox.eta=0.8`
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from ..running.runner import run
 
     changes = pairs(variants, "--set", "INSTANCE=VARIANT")
@@ -138,15 +131,10 @@ def run_command(
     chosen = values(options, "--option", "NAME=VALUE")
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
-    provider: Provider = FolderProvider(fmus) if fmus is not None else default_provider()
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        tasks: dict[str, Any] = {}
-
-        def told(item: str, fraction: float) -> None:
-            if item not in tasks:
-                tasks[item] = progress.add_task(item, total=1.0)
-            progress.update(tasks[item], completed=fraction)
-
+    with Display() as display:
+        provider: Provider = (
+            FolderProvider(fmus) if fmus is not None else default_provider(display.building)
+        )
         result = run(
             name,
             variants=changes,
@@ -157,7 +145,7 @@ def run_command(
             duration=duration,
             provider=provider,
             out=out or Path("out") / _folder_name(name),
-            progress=told,
+            progress=lambda item, fraction: display.update(item, fraction, 1.0),
             isolate=time_limit if isolate else None,
             guard=True,
         )
@@ -260,9 +248,23 @@ def leaving_nothing() -> Iterator[None]:
 
 def main() -> None:
     """Run the command line; one line on stderr per error, no traceback."""
+    if note := distribution.shadowed():
+        say(note)
+    if applies(sys.argv[1:]):
+        _said(lambda: guarded(lambda: _said(_run)))
+    else:
+        _said(_run)
+
+
+def _run() -> None:
+    with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
+        app()
+
+
+def _said(work: Callable[[], None]) -> None:
+    """Do some work; what goes wrong is said."""
     try:
-        with leaving_nothing(), stdout_for_json() if "--json" in sys.argv[1:] else nullcontext():
-            app()
+        work()
     except CosimError as error:
         say(f"error: {error}")
         for note in getattr(error, "__notes__", ()):

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..files import make_folder, write_text
+from ..installation.builder import default_provider
+from .calibrate import clock_lines
+from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -21,12 +24,16 @@ if TYPE_CHECKING:
 
 
 def diagnose_command(
-    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with set.toml.")],
+    dataset: Annotated[
+        Path,
+        typer.Argument(metavar="DATASET", help="Folder of logs, or a set of `cosim scenarios`."),
+    ],
     system: Annotated[
         str | None, typer.Option(help="Another system than that of the mapping.")
     ] = None,
     mapping: Annotated[
-        Path | None, typer.Option(help="A dataset.toml [found by the data set's rig].")
+        Path | None,
+        typer.Option(help="A dataset.toml, or a name of `cosim scenarios` [by the rig]."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
     law_from_data: Annotated[
@@ -44,20 +51,25 @@ def diagnose_command(
 ) -> None:
     """Find what a model lacks: calibrate, test, attribute, add the effect, judge on unused runs.
 
-    Example: `cosim diagnose scenarios/motor_bench/data/MB-12 --out out/MB-12`
+    Example: `cosim diagnose MB-12 --out out/MB-12`
     """
     from ..calibrate.mapping import read_problem
     from ..diagnose import diagnose
     from ..report import write_page
 
-    problem = read_problem(dataset, mapping=mapping, system=system)
-    folder = make_folder(out or Path("out") / problem.name)
-    begun = time.monotonic()
-    result = diagnose(
-        problem, folder,
-        lambda text: typer.echo(f"{time.monotonic() - begun:6.1f} s  {text}", err=True),
-        workers=workers, law_at=law_from_data,
-    )  # fmt: skip
+    begun, stage = time.monotonic(), "checking the data"
+    with Display() as display:
+        provider = default_provider(display.building)
+        problem = read_problem(dataset, provider, mapping=mapping, system=system)
+        folder = make_folder(out or Path("out") / problem.name)
+
+        def told(text: str) -> None:
+            nonlocal stage
+            stage = text
+            display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
+
+        with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
+            result = diagnose(problem, folder, told, workers=workers, law_at=law_from_data)
     page, table = folder / "report.html", folder / "diagnosis.json"
     write_page(result, page)
     result.files += [page, table]
@@ -80,6 +92,8 @@ def _print(result: Diagnosis) -> None:
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
     if (law := result.to_dict()["law_from_data"]) is not None:
         _print_law(law, console)
+    for text in clock_lines(result.to_dict()["clocks"]):
+        console.print(f"  {text}", soft_wrap=True)
     table = Table()
     for head in ("channel", "unit", "noise", "before ident.", "before valid.", "after ident.",
                  "after valid."):  # fmt: skip
@@ -94,7 +108,7 @@ def _print(result: Diagnosis) -> None:
     console.print(table)
     for item in result.further:
         console.print(_spread(item), soft_wrap=True)
-    console.print(f"in {result.files[-1].parent}", soft_wrap=True)
+    console.print(f"report: {result.files[-2]}", soft_wrap=True)
 
 
 def _print_law(law: dict[str, Any], console: Console) -> None:

@@ -10,7 +10,8 @@ import typer
 
 from ..errors import InputError
 from ..files import write_text
-from ..installation import builder
+from ..installation.builder import default_provider
+from .progress import Display
 
 if TYPE_CHECKING:
     from ..scenario.scenario import Scenario
@@ -44,7 +45,8 @@ def export_command(
 
     if ssp_version not in ("1.0", "2.0"):
         raise InputError(f"--ssp-version {ssp_version}: must be 1.0 or 2.0")
-    path = export(_only(name), ssp, builder.default_provider(), version=ssp_version)
+    with Display() as display:
+        path = export(_only(name), ssp, default_provider(display.building), version=ssp_version)
     if names := local_starts(read(path)):
         typer.echo(f"note: libcosim sets no local variables: {', '.join(names)}", err=True)
     print(path)
@@ -59,8 +61,9 @@ def draw_command(
     """
     from ..system.variants import apply
 
-    item, provider = _only(name), builder.default_provider()
-    instances = apply(item.system.instances, item.variants, provider, item.folder)
-    system = replace(item.system, instances=instances).build(provider, item.parameters)
+    with Display() as display:
+        item, provider = _only(name), default_provider(display.building)
+        instances = apply(item.system.instances, item.variants, provider, item.folder)
+        system = replace(item.system, instances=instances).build(provider, item.parameters)
     write_text(out, system.svg())
     print(out)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,10 +11,13 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError, VariantError, listing
+from ..files import atomic, make_folder
 from ..installation import places
 from ..installation.builder import naming_errors, sources
+from ..installation.library import Library
 from .check import check_command
 from .output import AsJson, new_table, open_console, say
+from .progress import Display
 from .streams import print_json
 
 fmus_app = typer.Typer(
@@ -37,31 +40,6 @@ class Platform(StrEnum):
 
     host = "host"
     all = "all"
-
-
-def _describe_file(path: Path) -> dict[str, Any]:
-    """What `fmus list` says, from an FMU instead of the sources."""
-    from ..fmu.archive import open_fmu
-
-    description = open_fmu(path).description
-
-    def listed(causality: Any) -> list[dict[str, str]]:
-        return [
-            {"name": v.name, "unit": v.symbol, "description": v.text}
-            for v in description.of(causality)
-        ]
-
-    return {
-        "variant": description.extra.get("variant", description.name),
-        "component": description.extra.get("component", ""),
-        "fidelity": description.extra.get("fidelity", ""),
-        "effects": description.extra.get("effects", []),
-        "inputs": listed("input"),
-        "outputs": listed("output"),
-        "parameters": listed("parameter"),
-        "states": [],
-        "description": description.text,
-    }
 
 
 @fmus_app.command("list")
@@ -100,34 +78,30 @@ def fmus_list(
     open_console().print(table)
 
 
+def _library() -> Library | None:
+    """What an installed wheel carries; None in a checkout, and in a wheel without FMUs."""
+    found = None if places.in_checkout() else Library(places.root())
+    return found if found is not None and found.content else None
+
+
 def _components() -> list[dict[str, Any]]:
-    """The catalogue by component: from the sources, else from the installed FMUs."""
-    try:
-        found: list[dict[str, Any]] = sources("packaging.catalog").overview()
-        return found
-    except VariantError:
-        if places.in_checkout():
-            raise
-    grouped: dict[str, dict[str, Any]] = {}
-    for entry in map(_describe_file, sorted(places.fmus().rglob("*.fmu"))):
-        group = grouped.setdefault(
-            entry["component"],
-            {"component": entry["component"], "description": entry["description"],
-             "fidelities": [], "devices": []},
-        )  # fmt: skip
-        if entry["fidelity"] not in group["fidelities"]:
-            group["fidelities"].append(entry["fidelity"])
-    return list(grouped.values())
+    """The catalogue by component: as the wheel says, else from the sources."""
+    library = _library()
+    if library is not None:
+        return library.components()
+    found: list[dict[str, Any]] = sources("packaging.catalog").overview()
+    return found
 
 
 def _variants(component: str, containing: str) -> list[dict[str, Any]]:
-    try:
-        catalog = sources("packaging.catalog")
-    except VariantError:
-        if places.in_checkout():
-            raise
-        found = [_describe_file(path) for path in sorted(places.fmus().rglob("*.fmu"))]
-        return [entry for entry in found if _is_of(entry["variant"], component)]
+    library = _library()
+    if library is not None:
+        return [
+            entry
+            for entry in library.variants()
+            if component in ("", entry["component"]) and containing in entry["variant"]
+        ]
+    catalog = sources("packaging.catalog")
     known = [entry["component"] for entry in catalog.overview()]
     if component and component not in known:
         return []
@@ -142,12 +116,6 @@ def _print_components(entries: list[dict[str, Any]]) -> None:
         table.add_row(entry["component"], *lists, entry["description"])
     open_console().print(table)
     say("'cosim fmus list COMPONENT' has the variants of one with their inputs and outputs")
-
-
-def _is_of(variant: str, component: str) -> bool:
-    from ..system import variants
-
-    return not component or variants.component(variant) == component
 
 
 @fmus_app.command("build")
@@ -168,30 +136,58 @@ def fmus_build(
 
     Example: `cosim fmus build gearbox/elastic+backlash --fmi 3 --out fmus`
     """
-    build_many = sources("packaging.build").build_many
     folder = out or (places.fmus() if places.in_checkout() else Path("fmus"))
-    with naming_errors():
-        names = _asked(variants or ())
-        for name in names if variants else ():  # bad names are found before anything is built
-            sources("variant").build_model(name)
     if kind is Kind.python and fmi == 3:
         raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
-    done = itertools.count(1)
+    if kind is Kind.native and platform is Platform.host and (library := _library()) is not None:
+        paths = _copied(library, variants or (), fmi, folder)
+    else:
+        paths = _compiled(variants or (), fmi, kind, platform, folder)
+    if as_json:
+        built = [{"variant": name, "file": str(path)} for name, path in paths.items()]
+        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": built})
+    else:
+        for path in paths.values():
+            typer.echo(str(path))
+
+
+def _compiled(
+    variants: Sequence[str], fmi: int, kind: Kind, platform: Platform, folder: Path
+) -> dict[str, Path]:
+    """FMUs made from the sources."""
+    build_many = sources("packaging.build").build_many
     with naming_errors():
+        names = _asked(variants)
+        for name in names if variants else ():  # bad names are found before anything is built
+            sources("variant").build_model(name)
+    done = itertools.count(1)
+    with naming_errors(), Display() as display:
         built = build_many(
             names,
             out=folder,
             fmi=fmi,
             kind=kind.value,
             platform=platform.value,
-            progress=lambda name, path: say(f"{next(done)}/{len(names)} {name}: {path}"),
+            progress=lambda name, path: display.building(name, next(done), len(names)),
         )
-    paths = [{"variant": name, "file": str(path)} for name, path in zip(names, built, strict=True)]
-    if as_json:
-        print_json({"fmi": fmi, "kind": kind.value, "platform": platform.value, "built": paths})
-    else:
-        for item in paths:
-            typer.echo(item["file"])
+    return dict(zip(names, built, strict=True))
+
+
+def _copied(library: Library, variants: Sequence[str], fmi: int, folder: Path) -> dict[str, Path]:
+    """FMUs that an installed wheel carries, those that it lacks made from the sources."""
+    fidelities = {entry["component"]: entry["fidelities"] for entry in library.components()}
+    names = _spread(variants, fidelities) if variants else list(library.names())
+    found = {name: library.find(name, fmi) for name in names}
+    paths: dict[str, Path] = {}
+    for name, path in found.items():
+        if path is None:
+            paths |= _compiled([name], fmi, Kind.native, Platform.host, folder)
+            continue
+        target = make_folder(folder / f"fmi{fmi}") / path.name
+        with atomic(target) as temporary:
+            temporary.write_bytes(path.read_bytes())
+        paths[name] = target
+    return paths
 
 
 def _asked(variants: Sequence[str]) -> list[str]:
@@ -199,13 +195,17 @@ def _asked(variants: Sequence[str]) -> list[str]:
     catalog = sources("packaging.catalog")
     if not variants:
         return list(catalog.names())
-    fidelities = {entry["component"]: entry["fidelities"] for entry in catalog.overview()}
-    return [
-        name
-        for asked in variants
-        for name in (
-            [f"{asked}/{fidelity}" for fidelity in fidelities[asked]]
-            if asked in fidelities
-            else [asked]
-        )
-    ]
+    return _spread(variants, {item["component"]: item["fidelities"] for item in catalog.overview()})
+
+
+def _spread(variants: Sequence[str], fidelities: Mapping[str, Sequence[str]]) -> list[str]:
+    """Names of variants, those of all fidelities for a component's name."""
+    found = []
+    for asked in variants:
+        if asked not in fidelities and "/" not in asked:
+            raise VariantError(
+                f"there is no component {asked!r}; {listing(fidelities, asked)}, or write "
+                "component/fidelity"
+            )
+        found += [f"{asked}/{f}" for f in fidelities[asked]] if asked in fidelities else [asked]
+    return found

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..files import write_text
-from ..installation import builder
+from ..installation.builder import default_provider
 from .pairs import pairs, values
+from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -107,9 +108,11 @@ def _master(
         return Master(system, algorithm or "jacobi", options=options), {}, ()
     file, run = scenarios.find(name)
     item = adjusted(file.scenario(run or next(iter(file.runs))), algorithm, options)
-    prepared = prepare(
-        item, builder.default_provider(), variants=variants, parameters=parameters, base=Path.cwd()
-    )
+    with Display() as display:
+        provider = default_provider(display.building)
+        prepared = prepare(
+            item, provider, variants=variants, parameters=parameters, base=Path.cwd()
+        )
     return prepared.master, dict(item.inputs), prepared.notes
 
 

@@ -38,8 +38,8 @@ def stdout_for_json() -> Iterator[None]:
         sys.stdout = given
 
 
-def print_json(content: Any) -> None:
-    """Print one JSON value."""
+def print_json(content: Any, indent: int | None = 2) -> None:
+    """Print one JSON value; on one line without an indent."""
     out = _kept[-1] if _kept else sys.stdout
-    out.write(json.dumps(content, indent=2) + "\n")
+    out.write(json.dumps(content, indent=indent) + "\n")
     out.flush()

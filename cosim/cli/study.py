@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError, StudyError
+from ..installation.builder import default_provider
 from ..system.provider import FolderProvider, Provider
+from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -48,44 +50,31 @@ def study_command(
 
     Example: `cosim study motor_bench --out out/swap`, or `cosim study my/study.toml`
     """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
     from ..study import Progress as State
     from ..study import read_study, run_study
 
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
-    provider: Provider | None = FolderProvider(fmus) if fmus is not None else None
     study = read_study(file)
     folder = out or Path("out") / study.name
     last = State(0, 0, 0)
-    bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TextColumn("{task.fields[failed]}"), TimeElapsedColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )  # fmt: skip
     try:
-        with bar:
-            task = bar.add_task(study.name, total=None, failed="")
+        with Display() as display:
 
             def told(state: State) -> None:
                 nonlocal last
                 last = state
-                failed = f"{state.failed} failed" if state.failed else ""
-                bar.update(task, total=state.total, completed=state.done, failed=failed)
+                failed = f", {state.failed} failed" if state.failed else ""
+                count = f"{state.done} of {state.total} runs{failed}"
+                display.update(study.name, state.done, state.total, count=count)
 
+            provider: Provider = (
+                FolderProvider(fmus) if fmus is not None else default_provider(display.building)
+            )
             result = run_study(
                 study, out=folder, workers=workers, scheduler=scheduler, retry=retry,
                 provider=provider, isolate=time_limit if isolate else None, progress=told,
-                warn=lambda text: typer.echo(f"warning: {text}", err=True),
+                warn=lambda text: display.say(f"warning: {text}"),
             )  # fmt: skip
     except KeyboardInterrupt:
         if not last.total:

@@ -31,6 +31,7 @@ from ..master.execution import Execution
 from ..master.initialization import initialize
 from ..master.master import Master
 from ..master.plan import Op, decoded
+from ..spec.distribution import way_out
 from ..system.inputs import Driver
 from ..system.system import Member
 from .sampled import matrices, period
@@ -116,7 +117,7 @@ def require_control() -> Any:
         import control
     except ImportError as error:
         raise InputError(
-            "this needs python-control; install the extra: pip install 'cosim[control]'"
+            f"this needs python-control; install the extra: {way_out('control')}"
         ) from error
     return control
 

@@ -53,9 +53,9 @@ def parquet_table(path: Path) -> Table:
     Raises:
         ScenarioError: it is none, damaged or too large.
     """
+    table, content = Table(), read_table(path)
     import pyarrow as pa
 
-    table, content = Table(), read_table(path)
     for item in content.schema:
         column, kind = content[item.name], item.type
         unit = (item.metadata or {}).get(b"unit", b"").decode(errors="replace")
@@ -109,7 +109,7 @@ def npz_table(path: Path) -> Table:
 
 
 def matlab_table(path: Path) -> Table:
-    """Read a MATLAB file of version 7 or older; a matrix becomes a column each, `name_1`, `name_2`.
+    """Read a MATLAB file; a matrix becomes a column each, `name_1`, `name_2`.
 
     Raises:
         ScenarioError: it is none, damaged or too large.

@@ -61,6 +61,20 @@ class Comparison:
     times: Vector
     differences: Vector
 
+    def _repr_html_(self) -> str:
+        from ..display.chart import Line, lines
+        from ..display.html import quantity
+        from ..display.notebook import key_values, view
+
+        name = ", ".join(self.signals)
+        return view(
+            f"{name} against {self.reference}", f"{self.count} samples",
+            key_values([("RMS", quantity(self.rms, self.unit)),
+                        ("largest", quantity(self.max, self.unit))]),
+            lines([Line(name, self.times, self.differences)],
+                  title=f"simulated − reference [{self.unit}]"),
+        )  # fmt: skip
+
 
 def circle(times: Vector, start: Sequence[float], centre: Sequence[float], rate: float) -> Vector:
     """Points, one row per time, of a motion about a centre at a constant rate [rad/s]."""

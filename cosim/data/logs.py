@@ -45,6 +45,7 @@ class Log:
         origins: what was taken off all values of a column so that the rest is exact.
         notes: what was assumed in reading.
         exact: values that doubles do not carry, as they are: texts, and integers beyond 2^53.
+        own: times and values of columns that are held on a clock of their own.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Log:
     origins: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     exact: Mapping[str, list[Any]] = field(default_factory=dict)
+    own: Mapping[str, tuple[Vector, Vector]] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Vector:
         """A column.
@@ -83,7 +85,7 @@ class Log:
         return self["time"]
 
 
-_READERS = {
+READERS = {
     ".csv": text_table, ".tsv": text_table, ".txt": text_table,
     ".parquet": parquet_table, ".npz": npz_table, ".mat": matlab_table,
 }  # fmt: skip
@@ -100,9 +102,9 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
         near = _beside(path)
         beside = f"; in its folder {listing(near, path.name)}" if near else ""
         raise ScenarioError(f"{path}: there is no such file{beside}")
-    reader = _READERS.get(path.suffix.lower())
+    reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ScenarioError(f"{path}: logs are {', '.join(_READERS)} files")
+        raise ScenarioError(f"{path}: logs are {', '.join(READERS)} files")
     table = reader(path)
     return Log(
         path.name, table.columns, {**table.units, **(units or {})}, gaps=table.gaps,

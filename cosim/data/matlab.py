@@ -1,4 +1,4 @@
-"""Numbers of MATLAB files up to version 7, decoded here.
+"""Numbers of MATLAB files, decoded here up to version 7; `matlab73` has the newer ones.
 
 SciPy's reader is compiled and trusts the sizes that a file states; a damaged file can end the
 process. Columns of numbers need little of the format (MAT-File Format, MathWorks, R2023b): full
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError
 from ..reading.limits import DATA
+from .matlab73 import read_matlab73
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
           13: "u8"}  # fmt: skip
@@ -41,7 +42,8 @@ def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
     """Arrays of numbers by name, without dimensions of one element.
 
     Raises:
-        ScenarioError: it is no MATLAB file, of version 7.3, damaged or too large.
+        ScenarioError: it is no MATLAB file, damaged or too large.
+        InputError: it is of version 7.3, and nothing is installed that reads it.
     """
     try:
         if excess := DATA.excess(path.stat().st_size):
@@ -50,7 +52,7 @@ def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
     if _HDF5 in content[:520] or content.startswith(b"MATLAB 7.3"):
-        raise ScenarioError(f"{path}: is a MATLAB file of version 7.3; save it with -v7")
+        return read_matlab73(path)
     old = 0 in content[:4]
     try:
         found = dict(_version4(content) if old else _version5(content))

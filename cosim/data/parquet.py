@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ScenarioError
 from ..reading.limits import DATA
+from ..spec.distribution import needed
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -17,12 +18,13 @@ def read_table(path: Path) -> pa.Table:
 
     Raises:
         ScenarioError: missing, damaged, too large, or with two columns of one name.
+        InputError: pyarrow is not installed.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     if not path.is_file():
         raise ScenarioError(f"{path}: there is no such file")
+    pq = needed("pyarrow.parquet", f"{path}: reading Parquet", "tables")
+    import pyarrow as pa
+
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             # runs of equal values take next to nothing in the file: rows count

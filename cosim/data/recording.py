@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
+from ..spec.distribution import has, needed
+from .npz import read_npz
 from .parquet import read_table
 
 if TYPE_CHECKING:
@@ -23,8 +25,19 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 _META = b"cosim"
+_NPZ_META = "cosim"
 _TYPES = ("double", "int64", "uint64", "string", "binary")
 """Of columns in Parquet; one of objects without rows has none."""
+
+MOST_AXES = 8
+"""Axes of a plot for which nobody has chosen signals."""
+_QUANTITIES = {
+    "rad": "angle", "deg": "angle", "rad/s": "angular speed", "rad/s2": "angular acceleration",
+    "m": "length", "m/s": "speed", "m/s2": "acceleration", "N": "force", "N.m": "torque",
+    "A": "current", "V": "voltage", "W": "power", "J": "energy", "kg": "mass", "s": "time",
+    "kg.m2": "inertia", "K": "temperature", "degC": "temperature", "1": "ratio",
+}  # fmt: skip
+"""Unit -> what it measures, as axes are named."""
 
 
 @dataclass(frozen=True)
@@ -93,12 +106,34 @@ class Recording:
         failed = f", stopped: {self.error}" if self.error else ""
         return f"<Recording of {len(self.names)} signals, {len(self)} times to {end}{failed}>"
 
+    def _repr_html_(self) -> str:
+        from ..display.notebook import key_values, more, signal_charts, view
+
+        columns = {
+            name: self.values[:, column]
+            for column, name in enumerate(self.names)
+            if self.objects.get(name, self.time).dtype != object
+        }
+        charts, left = signal_charts(self.time, columns, self.units)
+        title = self.provenance.get("scenario") or self.provenance.get("system") or "Recording"
+        end = f"{self.time[-1]:g} s" if len(self) else "empty"
+        facts: list[tuple[str, object]] = [("stopped", self.error)] if self.error else []
+        if self.bond_energy:
+            facts.append(("energy that the coupling invented", f"{self.energy_residual:.3g} J"))
+        return view(
+            title, f"{len(self.names)} signals, {len(self)} times to {end}",
+            key_values(facts) if facts else "", charts, more(left),
+        )  # fmt: skip
+
     # -- other forms -----------------------------------------------------------------------------
 
     def to_pandas(self) -> pd.DataFrame:
-        """A data frame over time [s]; units and provenance are in its `attrs`."""
-        import pandas as pd
+        """A data frame over time [s]; units and provenance are in its `attrs`.
 
+        Raises:
+            InputError: pandas is not installed.
+        """
+        pd = needed("pandas", "a recording as data frame", "tables")
         frame = pd.DataFrame(
             self.values, index=pd.Index(self.time, name="time"), columns=list(self.names)
         )
@@ -143,11 +178,15 @@ class Recording:
         return path
 
     def write_parquet(self, path: Path | str) -> Path:
-        """Write a Parquet file; unit in each column's metadata, the rest in the schema's."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        """Write a Parquet file; unit in each column's metadata, the rest in the schema's.
 
+        Raises:
+            InputError: pyarrow is not installed.
+        """
         path = Path(path)
+        pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
+        import pyarrow as pa
+
         fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})] + [
             pa.field(name, pa.array(column[:1]).type, metadata={"unit": self.units.get(name, "")})
             for name, column in zip(self.names, self._columns(), strict=True)
@@ -158,16 +197,41 @@ class Recording:
             pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
         return path
 
+    def write_npz(self, path: Path | str) -> Path:
+        """Write an npz archive of numpy with one array per signal; the rest in the array `cosim`.
+
+        Raises:
+            ScenarioError: a signal is binary.
+        """
+        path = Path(path)
+        arrays = {"time": self.time}
+        for name, column in zip(self.names, self._columns(), strict=True):
+            if any(isinstance(item, bytes) for item in column.tolist()):
+                raise ScenarioError(
+                    f"{path}: npz archives hold no binaries such as {name}; write Parquet"
+                )
+            arrays[name] = column.astype(str) if column.dtype == object else column
+        arrays[_NPZ_META] = np.array(json.dumps(self._meta()))
+        with atomic(path) as temporary, temporary.open("wb") as handle:
+            np.savez_compressed(handle, **arrays)  # type: ignore[arg-type]
+        return path
+
+    def keep(self, stem: Path) -> Path:
+        """Write `stem`.parquet, or `stem`.npz where pyarrow is not installed; returns the path."""
+        if has("pyarrow"):
+            return self.write_parquet(stem.with_name(f"{stem.name}.parquet"))
+        return self.write_npz(stem.with_name(f"{stem.name}.npz"))
+
     def plot(
         self,
         signals: Sequence[str] | None = None,
         path: Path | str | None = None,
         references: Mapping[str, tuple[Vector, Vector, str]] | None = None,
     ) -> Figure:
-        """Plot signals over time, those with the same unit in one axes.
+        """Plot signals over time, those with the same unit in one axes, named by what it measures.
 
         Args:
-            signals: names (vectors too); all if not given.
+            signals: names (vectors too); all if not given, of the units with most signals.
             path: where to write the figure; the suffix says how.
             references: signal -> (times, values, label), drawn with it.
         """
@@ -179,6 +243,9 @@ class Recording:
         groups: dict[str, list[str]] = {}
         for name in names:
             groups.setdefault(self.units.get(name, ""), []).append(name)
+        if signals is None and len(groups) > MOST_AXES:
+            most = sorted(groups, key=lambda unit: -len(groups[unit]))[:MOST_AXES]
+            groups = {unit: members for unit, members in groups.items() if unit in most}
         figure = Figure(figsize=(9.0, 1.0 + 2.2 * max(len(groups), 1)), layout="constrained")
         axes = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, (unit, members) in zip(axes, groups.items(), strict=False):
@@ -187,7 +254,7 @@ class Recording:
                 if times is not None:
                     axis.plot(times, values, color="0.6", linewidth=2.0, label=label)
                 axis.plot(self.time, self[name], linewidth=1.0, label=name)
-            axis.set_ylabel(f"[{unit}]" if unit else "")
+            axis.set_ylabel(f"{_QUANTITIES.get(unit, '')} [{unit}]".strip() if unit else "")
             axis.grid(True, alpha=0.3)
             if len(members) <= 12:
                 axis.legend(loc="upper right", fontsize="small")
@@ -212,20 +279,24 @@ def _cell(value: Any) -> str:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read a recording that `write_parquet` wrote.
+    """Read a recording that `write_parquet` or `write_npz` wrote.
 
     Raises:
         ScenarioError: missing, or not such a file.
+        InputError: it is Parquet, and pyarrow is not installed.
     """
     path = Path(path)
-    table = read_table(path)
-    metadata = table.schema.metadata or {}
-    if _META not in metadata or "time" not in table.column_names:
+    if path.suffix.lower() == ".npz":
+        found, content = _read_npz(path)
+    else:
+        table = read_table(path)
+        content = (table.schema.metadata or {}).get(_META)
+        found = {name: _column(path, name, table[name]) for name in table.column_names}
+    if content is None or "time" not in found:
         raise ScenarioError(f"{path}: is not a recording of cosim; read it as measurement")
-    meta = _read_meta(path, metadata[_META])
-    names = tuple(name for name in table.column_names if name != "time")
-    columns = [_column(path, name, table[name]) for name in names]
-    time = _column(path, "time", table["time"])
+    meta = _read_meta(path, content)
+    time = found.pop("time")
+    names, columns = tuple(found), list(found.values())
     if time.dtype != np.float64:
         raise ScenarioError(f"{path}: its times are no floating-point numbers; record it again")
     objects = {
@@ -249,6 +320,27 @@ def read_recording(path: Path | str) -> Recording:
         objects=objects,
         notes=tuple(meta.get("notes", ())),
     )
+
+
+def _read_npz(path: Path) -> tuple[dict[str, NDArray[Any]], bytes | None]:
+    """Columns of an npz archive, and what it says about itself.
+
+    Raises:
+        ScenarioError: it is none, or its columns have no rows of one length.
+    """
+    arrays = read_npz(path)
+    meta = arrays.pop(_NPZ_META, None)
+    if meta is None or meta.dtype.kind != "U" or meta.ndim:
+        return {}, None
+    rows = arrays["time"].shape if "time" in arrays else ()
+    for name, column in arrays.items():
+        if column.shape != rows or column.ndim != 1 or column.dtype.kind not in "fiuU":
+            raise ScenarioError(
+                f"{path}: column {name!r} has the shape {column.shape} and type {column.dtype}; "
+                "record it again"
+            )
+    plain = {n: c.astype(object) if c.dtype.kind == "U" else c for n, c in arrays.items()}
+    return plain, str(meta).encode()
 
 
 def _column(path: Path, name: str, column: Any) -> NDArray[Any]:

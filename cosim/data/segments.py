@@ -134,7 +134,8 @@ def windows(name: str, log: Log, lead: float) -> Iterator[tuple[str, Log]]:
         columns = {one: values[mine] for one, values in log.columns.items()
                    if values.shape == time.shape}  # fmt: skip
         columns["time"] = time[mine] - k * length
-        yield f"{name} {k}", replace(log, name=f"{log.name} {k}", columns=columns)
+        own = {one: (times - k * length, values) for one, (times, values) in log.own.items()}
+        yield f"{name} {k}", replace(log, name=f"{log.name} {k}", columns=columns, own=own)
 
 
 def relative_pose(pose: Vector, anchor: int) -> Vector:

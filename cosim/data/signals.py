@@ -18,6 +18,9 @@ CLOCK = 1e-3
 """Fraction of a sample interval within which two times are the same: logs keep sample times
 rounded (often to 32 bits), so a sample may seem to come just after the communication point that it
 belongs to."""
+EXACT = 1e-9
+"""The same for tables that are held beyond their ends [s]: they are written, not logged, and may
+have long intervals; only communication points carry rounding."""
 
 
 class Signal(Protocol):
@@ -170,6 +173,8 @@ class Table:
         """Refuse times outside; the distance within which two times are the same [s]."""
         intervals = np.diff(self.times)
         clock = CLOCK * float(np.median(intervals)) if intervals.size else 0.0
+        if self.extend:
+            clock = min(clock, EXACT)
         if not self.extend and times.size:
             first, last = self.times[0], self.times[-1]
             margin = clock + (float(np.max(intervals)) if intervals.size else 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,13 +15,14 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
+from ..calibrate.clocks import offsets
+from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError
-from ..files import atomic
-from ..system.provider import locate
+from ..errors import CosimError, ScenarioError, UnbuiltError
+from .adding import made_of
 from .bursts import bursts, times
-from .deferred import step_error
+from .carriers import leave_fmus
 from .exchange import reconsidered
 from .experiment import propose
 from .further import Further, judged
@@ -63,6 +63,7 @@ class Diagnosis:
         law: made from the data where something enters that has no name.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
+        findings: on the data.
     """
 
     problem: Problem
@@ -85,6 +86,12 @@ class Diagnosis:
     files: list[Path] = field(default_factory=list)
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    def _repr_html_(self) -> str:
+        from .notebook import shown
+
+        return shown(self.to_dict(), self.problem, self.residuals)
 
     def rms(self, which: str, purpose: str) -> dict[str, float | None]:
         """Channel -> RMS residual in its unit over the runs of a purpose."""
@@ -113,7 +120,9 @@ class Diagnosis:
             "verdict": self.verdict,
             "reason": self.reason,
             "warnings": self.warnings,
+            "findings": [finding.to_dict() for finding in self.findings],
             "effects": self.effects(),
+            "model": made_of(self.problem, self.after),
             "alternatives": [
                 {"effects": [c.label for c in f.effects], "score": self._score(f)}
                 for f in self.rivals
@@ -125,6 +134,7 @@ class Diagnosis:
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],
             "parameters": self.parameters(),
+            "clocks": offsets(fitted.estimate) if (fitted := self.after or self.before) else {},
             "start_values": self.start_values(),
             "bursts": self.bursts,
             "unstable_from": self.ended,
@@ -274,7 +284,7 @@ def diagnose(
 def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
     """The verdict on data that cannot be used."""
     errors = lines(f for f in findings if f.severity == "error")
-    result = Diagnosis(problem, "bad_data", "; ".join(errors))
+    result = Diagnosis(problem, "bad_data", "; ".join(errors), findings=findings)
     result.warnings = lines(f for f in findings if f.severity != "error")
     result.wall = time.perf_counter() - begun
     return result
@@ -290,13 +300,20 @@ def _searched(
     asked: Site | None,
 ) -> Diagnosis:
     problem = search.raw
-    result = Diagnosis(problem, "", "", search, base)
+    result = Diagnosis(problem, "", "", search, base, findings=findings)
     result.warnings = lines(findings)
     current = base
     winners: list[Round] = []
     for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
-        stage = search.round(current)
+        try:
+            stage = search.round(current)
+        except UnbuiltError as error:
+            if not winners:
+                raise
+            result.warnings.append(f"no further effect was looked for: {error}")
+            say(result.warnings[-1])
+            break
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(
@@ -339,7 +356,7 @@ def _searched(
         result.reason = f"{'' if asked else result.reason} {result.law.reason}".strip()
     _look_further(result)
     if out is not None and current.effects:
-        result.files += _leave_fmus(result, out)
+        result.files += leave_fmus(problem, current.effects, out, result.warnings)
     result.wall = time.perf_counter() - begun
     return result
 
@@ -478,23 +495,3 @@ def _look_further(result: Diagnosis) -> None:
             result.further.append(judged(simulator, result.problem, result.before, result.after))
         except CosimError as error:  # they are an extra: the verdict stands without them
             result.warnings.append(f"further runs are not judged: {error}")
-
-
-def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:
-    """Copy the FMUs that carry the effects into the output folder."""
-    assert result.after is not None
-    model = result.problem.model
-    for item in result.after.effects:
-        model = model.changed(item.change)
-    files = []
-    for name in dict.fromkeys(item.instance for item in result.after.effects):
-        try:
-            source = locate(model.instances[name], result.problem.provider)
-        except CosimError as error:
-            result.warnings.append(str(error))
-            continue
-        target = out / "fmus" / source.name
-        with atomic(target) as temporary:
-            shutil.copyfile(source, temporary)
-        files.append(target)
-    return files

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.deferred import corrected, step_error
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import CORRECTION, DRAFT, INTERVALS, Effort, fit
 from ..calibrate.known import Known
@@ -19,7 +20,6 @@ from ..calibrate.parts import Sensitivity
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
-from .deferred import corrected, step_error
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.deferred import corrected
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import CORRECTION, DRAFT, POLISH, fit
 from ..calibrate.nuisance import late_estimated, released
 from ..calibrate.simulator import Simulator
 from ..calibrate.staged import jointly, staged
 from ..errors import CosimError, FmuCallError
-from .deferred import corrected
 from .fitter import Fitter
 from .models import Fitted
 from .secant import patience

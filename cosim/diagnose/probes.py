@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
-from ..errors import CosimError
+from ..errors import CosimError, UnbuiltError
 from ..spec.hints import Mix
 from .candidates import Candidate, balances, element_of, new_parameters
 
@@ -84,20 +84,10 @@ class Probe:
         return (self.mixed.minimum, self.mixed.maximum) if self.mixed else (-math.inf, math.inf)
 
     @property
-    def visits(self) -> list[tuple[str, str]]:
-        """Parameters that are tried together along a run, with the variables that tell them."""
-        return [(p.name, p.hints.visits) for p in self.others if p.hints.visits]
-
-    @property
     def own(self) -> int:
         """Number of parameters of the effect, 0 of one on a whole vector."""
         prefix = self.candidate.prefix
         return sum(p.name.startswith(prefix) for p in self.problem.parameters)
-
-    @property
-    def choices(self) -> list[dict[str, float]]:
-        """Parameter -> value, one parameter at a time."""
-        return [{p.name: value} for p in self.others for value in p.hints.tries]
 
 
 @dataclass(frozen=True)
@@ -136,6 +126,8 @@ class Batch:
             assert self.change is not None
             problem = base.with_effects(self.change)
             problem.system()
+        except UnbuiltError:
+            raise
         except CosimError:
             return _single(base, self.candidates)
         found = [p for c, _ in self.members for p in _of(c, base, problem)]
@@ -177,6 +169,8 @@ def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
         try:
             problem = candidate.added_to(base)
             problem.system()
+        except UnbuiltError:
+            raise
         except CosimError:
             continue
         found += _of(candidate, base, problem)

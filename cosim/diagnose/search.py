@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.deferred import corrected
 from ..calibrate.fit import DRAFT, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..system.provider import locate
+from ..errors import UnbuiltError
+from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
-from .deferred import corrected
 from .established import needed, settle
 from .exchange import challenged, nearly, reconsidered, restarted
 from .fitter import ITERATIONS, Say
@@ -78,16 +80,25 @@ class Search(LateFitter):
 
         Args:
             problem: to which they will be added, the declared one if not given.
+
+        Raises:
+            UnbuiltError: FMUs for the declared one are missing and cannot be built.
         """
-        known = self.known if problem is None else candidates(problem)
-        problem = problem or self.declared
-        self._build(problem, (b.change or b.members[0][0].change for b in batches(known, problem)))
+        if problem is None:
+            self._build(self.declared, _changes(self.known, self.declared))
+            return
+        with suppress(UnbuiltError):  # the round that asks for them says so
+            self._build(problem, _changes(candidates(problem), problem))
 
     def _build(self, problem: Problem, changes: Iterable[Mapping[str, str]]) -> None:
         """Have changed FMUs of a problem built in the background."""
-        for instance, change in dict.fromkeys(pair for c in changes for pair in c.items()):
-            variant = apply(problem.instances, {instance: change}, problem.provider)
-            self._builder.submit(locate, variant[instance], problem.provider)
+        variants = [
+            apply(problem.instances, {instance: change}, problem.provider)[instance]
+            for instance, change in dict.fromkeys(pair for c in changes for pair in c.items())
+        ]
+        expected(problem.provider, variants)
+        for variant in variants:
+            self._builder.submit(locate, variant, problem.provider)
 
     def close(self) -> None:
         """Stop building."""
@@ -365,3 +376,9 @@ class Search(LateFitter):
         }
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
+
+
+def _changes(known: Sequence[Candidate], problem: Problem) -> Iterator[Mapping[str, str]]:
+    """What FMUs the candidates are simulated in, as of `cosim run --set`."""
+    for batch in batches(known, problem):
+        yield batch.change or batch.members[0][0].change

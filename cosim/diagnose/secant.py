@@ -19,10 +19,10 @@ from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate
+from .choices import choices
 from .linear import MATERIAL, Absorber, SampleStack, score
 from .probes import Batch, Probe, batches
 from .signature import EVIDENT, SHARE, Signature
-from .visits import visited
 
 Vector = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -39,15 +39,10 @@ only cost time."""
 RUNAWAY = 1e15
 """Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
 PATIENCE = 10.0
-"""Times as long as without the effect: a fidelity with more states takes a few times as long, and
-what takes longer is an instability that a solver tries to resolve."""
-EASY = 0.01
-"""Processor time over simulated time that is always granted: a system without states takes next to
-none, so any law with a state of its own would be given up."""
+"""Times as much work as without the effect: a fidelity with more states takes a few times as much,
+and what takes more is an instability that a solver tries to resolve."""
 SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
 """Values of a second parameter between which all others are mixed, by its kind."""
-PLACES = 24
-"""Places along a run that are tried: half a metre apart on a path of 12 m."""
 FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
@@ -232,18 +227,21 @@ class Bench:
             return
         problem = trials[0].probe.problem
         strengths = {t.probe.candidate.label: t.best.value for t in trials if t.best is not None}
-        for choices in zip(*(self._choices(t.probe) for t in trials), strict=True):
+        offered = [
+            choices(t.probe, self.simulator, self.theta, self.stack, self.residual) for t in trials
+        ]
+        for fixed_values in zip(*offered):  # noqa: B905 - no choice is worth more than another
             changes = []
             try:
                 for second in SECONDS[trials[0].probe.mix]:
                     values: dict[str, float] = {}
-                    for t, fixed in zip(trials, choices, strict=True):
+                    for t, fixed in zip(trials, fixed_values, strict=True):
                         value = strengths[t.probe.candidate.label]
                         values |= t.probe.values(value, second, fixed)
                     changes.append(self.at(problem, values) - self.model)
             except CosimError:
                 continue
-            for t, fixed in zip(trials, choices, strict=True):
+            for t, fixed in zip(trials, fixed_values, strict=True):
                 label = t.probe.candidate.label
                 parts = [np.where(masks[label], c, 0.0) if label in masks else c for c in changes]
                 before = t.best, t.promise, t.wish, t.second, t.fixed
@@ -254,15 +252,6 @@ class Bench:
                 else:
                     t.best, t.value = found, self._wanted(found, strengths[label])
                     t.tried = t.tried[-1:]
-
-    def _choices(self, probe: Probe) -> list[dict[str, float]]:
-        """Values of its parameters to try, by name."""
-        choices = probe.choices
-        if probe.visits:
-            names, variables = zip(*probe.visits, strict=True)
-            points = visited(self.simulator, self.theta, self.stack.runs, variables, PLACES)
-            choices += [dict(zip(names, point.tolist(), strict=True)) for point in points]
-        return choices
 
     def followed(self, begun: Sequence[Trials]) -> list[Signature]:
         """Signatures; those that promise something at the strength that the residual asks for."""
@@ -475,11 +464,8 @@ def _mismatch(item: Signature) -> float:
 
 
 def patience(base: Simulator) -> dict[str, float]:
-    """Processor time that the runs may take with an effect, from what they took without."""
-    return {
-        run: max(PATIENCE * cost, EASY * float(np.ptp(base.problem.run(run).times)))
-        for run, cost in base.costs.items()
-    }
+    """Work that the runs may take with an effect, from what they took without."""
+    return {run: PATIENCE * cost for run, cost in base.costs.items()}
 
 
 def model_values(simulator: Simulator, theta: Vector, stack: SampleStack) -> Vector:

@@ -15,6 +15,42 @@ from ..errors import UnknownNameError
 Vector = NDArray[np.float64]
 
 
+def followed(
+    simulator: Simulator,
+    theta: Vector,
+    runs: Sequence[MeasuredRun],
+    variables: Sequence[str],
+) -> list[Vector]:
+    """Values of variables in a simulation at the samples of each run, one column per variable.
+
+    Args:
+        simulator: of the system.
+        theta: its parameters.
+        runs: to simulate.
+        variables: full names.
+
+    Raises:
+        UnknownNameError: the system lacks a variable.
+    """
+    problem = simulator.problem
+    system = problem.system()
+    for name in variables:
+        system.variables(name)
+    names = {run.name for run in runs}
+    silent = [
+        replace(run, data=np.zeros((run.times.size, len(variables))))
+        for run in problem.runs
+        if run.name in names
+    ]
+    channels = [Channel(name, "", 1.0, name) for name in variables]
+    spy = simulator.limited({}).of(
+        problem.changed(runs=silent, channels=channels, relative=())
+    )  # fmt: skip
+    paths = [spy.simulate(theta, run) for run in silent]
+    spy.close()
+    return paths
+
+
 def visited(
     simulator: Simulator,
     theta: Vector,
@@ -36,24 +72,10 @@ def visited(
     Returns:
         one row per point; none if the system lacks a variable.
     """
-    problem = simulator.problem
-    system = problem.system()
     try:
-        for name in variables:
-            system.variables(name)
+        path = np.concatenate(followed(simulator, theta, runs, variables))
     except UnknownNameError:
         return np.empty((0, len(variables)))
-    names = {run.name for run in runs}
-    silent = [
-        replace(run, data=np.zeros((run.times.size, len(variables))))
-        for run in problem.runs
-        if run.name in names
-    ]
-    channels = [Channel(name, "", 1.0, name) for name in variables]
-    seen = problem.changed(runs=silent, channels=channels, relative=())
-    spy = simulator.limited({}).of(seen)
-    path = np.concatenate([spy.simulate(theta, run) for run in silent])
-    spy.close()
     points = [path[0]]
     away = np.linalg.norm(path - path[0], axis=1)
     while len(points) < most and float(away.max()) > 0.0:

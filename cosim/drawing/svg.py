@@ -8,7 +8,7 @@ other, are thick. An open circle is an input that nothing drives.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -46,9 +46,15 @@ _RULES = {
     ".tip.bond": "stroke: none; fill: #1c6e8c",
     ".tip.bond.back": "stroke: none; fill: #59a5c0",
     ".tip.loop": "stroke: none; fill: #c81e1e",
+    ".halo": "fill: #fde3d3; stroke: #b3400a; stroke-width: 2.4",
+    ".badge": "fill: #b3400a; stroke: #ffffff; stroke-width: 1.5",
+    ".count": "font-size: 12px; font-weight: 700; fill: #ffffff; text-anchor: middle",
 }
 # rules reach a whole page if the drawing is part of one, so they are bound to its class
 STYLE = "".join(f".cosim-system {name} {{ {rule} }}\n" for name, rule in _RULES.items())
+
+
+_NO_MARKS: Mapping[str, Sequence[str]] = {}
 
 
 @dataclass(frozen=True)
@@ -69,9 +75,14 @@ class _DrawnWire:
     text: str
 
 
-def svg(system: Drawable) -> str:
-    """A system as SVG."""
-    return "\n".join(_Drawing(system).lines()) + "\n"
+def svg(system: Drawable, marks: Mapping[str, Sequence[str]] | None = None) -> str:
+    """A system as SVG.
+
+    Args:
+        system: what is drawn.
+        marks: box -> short texts (a number, a letter) in badges on it; boxes with some stand out.
+    """
+    return "\n".join(_Drawing(system, marks or {}).lines()) + "\n"
 
 
 def to_svg(system: Drawable, path: Path | str) -> Path:
@@ -148,8 +159,8 @@ def _width(text: str, size: float) -> float:
 
 
 class _Drawing:
-    def __init__(self, system: Drawable) -> None:
-        self.system, self.found = system, _lines(system)
+    def __init__(self, system: Drawable, marks: Mapping[str, Sequence[str]] = _NO_MARKS) -> None:
+        self.system, self.found, self.marks = system, _lines(system), marks
         self.open: dict[str, list[str]] = {name: [] for name in system.members}
         for name in system.open_inputs():
             instance, _, variable = name.partition(".")
@@ -185,7 +196,9 @@ class _Drawing:
         layout, system = self.layout, self.system
         top = BORDER + (44.0 if system.text else 30.0)
         stub = 16.0 if any(self.open.values()) else 0.0
-        inside = [line for way in layout.ways for line in self._way(way, False)]
+        marked = [name for name in system.members if self.marks.get(name)]
+        inside = [line for name in marked for line in self._halo(name)]
+        inside += [line for way in layout.ways for line in self._way(way, False)]
         inside += [
             line for way in layout.ways for line in self._way(way, True)
         ]  # bonds over signals
@@ -293,6 +306,15 @@ class _Drawing:
         points = f"{x:.1f},{y:.1f} {tail:.1f},{y - size:.1f} {tail:.1f},{y + size:.1f}"
         yield f'<polygon class="{f"tip {kind}".strip()}" points="{points}"/>'
 
+    def _halo(self, name: str) -> Iterator[str]:
+        """What makes a marked box stand out, below the wires."""
+        item = self.layout.items[name]
+        x, y = self.layout.box(item)
+        yield (
+            f'<rect class="halo" x="{x - 5:.1f}" y="{y - 5:.1f}" width="{item.width + 10:.0f}" '
+            f'height="{item.height + 10:.0f}" rx="8"/>'
+        )
+
     # -- boxes -------------------------------------------------------------------------------------
 
     def _box(self, name: str) -> Iterator[str]:
@@ -321,6 +343,10 @@ class _Drawing:
             yield f'<path class="wire stub" d="M{x - 9.0:.1f} {at:.1f}H{x:.1f}"/>'
             yield _circle("free", x - 11.5, at)
             yield _text("port open", x + PAD, at + 3.6, label)
+        for number, mark in enumerate(self.marks.get(name, ())):
+            middle = x + w - 6.0 - 22.0 * number
+            yield f'<circle class="badge" cx="{middle:.1f}" cy="{y - 5:.1f}" r="10.5"/>'
+            yield _text("count", middle, y - 0.8, mark)
         yield "</g>"
 
 

@@ -47,6 +47,7 @@ class Fmi3:
     GET: ClassVar[dict[str, str]] = {
         **{name: f"fmi3Get{name}" for name in (*NUMERIC, "String", "Binary")},
         "Enumeration": "fmi3GetInt64",
+        "Float32Whole": "fmi3GetFloat32",
     }
     SET: ClassVar[dict[str, str]] = {key: name.replace("Get", "Set") for key, name in GET.items()}
 

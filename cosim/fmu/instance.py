@@ -249,7 +249,9 @@ class Instance:
         names = [
             v.name
             for v in self.description.variables.values()
-            if v.reference in wanted and v.type == type_ and v.causality != "local"
+            if v.reference in wanted
+            and v.type == type_.removesuffix("Whole")
+            and v.causality != "local"
         ]
         return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
 

@@ -14,6 +14,9 @@ from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 
 _libraries: dict[str, Any] = {}
+WORK = "cosim_work"
+"""Function that counts the steps that an instance's solver has made; FMI knows none, so only FMUs
+that have it can be limited without looking at the clock."""
 _functions: dict[tuple[str, int], dict[str, Any]] = {}
 
 
@@ -56,6 +59,8 @@ def bind(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
             for name, signature in binding.OPTIONAL.items():
                 if hasattr(library, name):
                     functions[name] = _prototype(library, name, signature)
+            if hasattr(library, WORK):
+                functions[WORK] = _prototype(library, WORK, (ct.c_void_p,), ct.c_int64)
             _functions[key] = functions
     except AttributeError as error:
         raise FmuFileError(
@@ -64,7 +69,7 @@ def bind(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
     return binding, _functions[key]
 
 
-def _prototype(library: Any, name: str, signature: tuple[Any, ...]) -> Any:
+def _prototype(library: Any, name: str, signature: tuple[Any, ...], result: Any = ct.c_int) -> Any:
     function = library[name]  # a fresh object: prototypes are not shared between bindings
-    function.argtypes, function.restype = list(signature), ct.c_int
+    function.argtypes, function.restype = list(signature), result
     return function

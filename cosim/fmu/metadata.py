@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import FmuFileError
 from ..reading.limits import TEXT
+from ..spec import scene
 
 ENTRY = "extra/cosim/component.json"
 _TEXTS = ("component", "variant", "fidelity")
@@ -95,7 +96,7 @@ def _problem(table: Any) -> str:
             return f"port {number} has {len(port['effort'])} efforts and {len(port['flow'])} flows"
         if port["sign"] not in (-1, 1):
             return f"port {number}: sign {port['sign']} is not 1 or -1"
-    return ""
+    return scene.problem(table.get("scene", []))
 
 
 def _texts(value: Any) -> bool:

@@ -22,11 +22,13 @@ from .attributes import INTEGERS
 from .description import Variable
 
 NUMBERS: dict[str, Any] = {
-    "Float64": np.float64, "Float32": np.float32, "Int8": np.int8, "UInt8": np.uint8,
-    "Int16": np.int16, "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32,
-    "Enumeration": np.int64, "Enumeration2": np.int32, "Boolean": np.bool_, "Boolean2": np.int32,
+    "Float64": np.float64, "Float32": np.float32, "Float32Whole": np.float32,
+    "Int8": np.int8, "UInt8": np.uint8, "Int16": np.int16, "UInt16": np.uint16,
+    "Int32": np.int32, "UInt32": np.uint32, "Enumeration": np.int64, "Enumeration2": np.int32,
+    "Boolean": np.bool_, "Boolean2": np.int32,
 }  # fmt: skip
-"""Types that travel as doubles, and what they are in memory."""
+"""Types that travel as doubles, and what they are in memory; `Float32Whole` is a `Float32` that is
+given integers, which it carries exactly or not at all."""
 OBJECTS: dict[str, Any] = {
     "Int64": np.int64, "UInt64": np.uint64, "String": np.uintp, "Binary": np.uintp,
 }  # fmt: skip
@@ -58,6 +60,9 @@ def fitting(type_: str, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
         return np.ones(numbers.shape, dtype=np.bool_)
     if type_ == "Float32":
         return np.asarray(~(np.abs(numbers) > np.finfo(np.float32).max))  # nan stays nan
+    if type_ == "Float32Whole":
+        with np.errstate(over="ignore"):
+            return np.asarray((numbers.astype(np.float32) == numbers) | np.isnan(numbers))
     if boolean(type_):
         rounded = np.rint(numbers)
         return np.asarray(whole(numbers) & ((rounded == 0.0) | (rounded == 1.0)))
@@ -77,7 +82,10 @@ def whole_number(value: Any) -> int | None:
 
 def refusal(type_: str, value: Any) -> str:
     """Why a type does not carry a number."""
-    name = {"Boolean2": "Boolean", "Enumeration2": "Enumeration"}.get(type_, type_)
+    plain = {"Boolean2": "Boolean", "Enumeration2": "Enumeration", "Float32Whole": "Float32"}
+    name = plain.get(type_, type_)
+    if type_ == "Float32Whole" and abs(value) <= float(np.finfo(np.float32).max):
+        return f"{int(value)} is an integer that type {name} does not carry exactly"
     if isinstance(value, float) and (boolean(type_) or not bool(whole(value))):
         what = "neither true (1) nor false (0)" if boolean(type_) else "no whole number"
         return f"{value!r} is {what}, and type {name} carries nothing else"
@@ -170,6 +178,10 @@ def _checked(where: str, variable: Variable, value: Any) -> Any:
         fits = bool(fitting(type_, np.array(float(number))).all())
     if not fits:
         raise ValueRangeError(f"{where}: {name}: {refusal(type_, number)}")
+    if type_ == "Float32" and isinstance(value, (int, np.integer)):
+        type_ = "Float32Whole"
+        if not fitting(type_, np.array(number)).all():
+            raise ValueRangeError(f"{where}: {name}: {refusal(type_, number)}")
     return number
 
 

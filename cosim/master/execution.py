@@ -19,10 +19,20 @@ from .plan import Stepper, decoded
 from .startup import find_past
 
 EXECUTORS = ("auto", "c", "python")
+Maker = Callable[[Outline, ExitStack], Interpreter]
+_usual: Maker = Interpreter
+
+
+def usual(maker: Maker) -> None:
+    """Have all further executions of this process made in another way (see `board`)."""
+    global _usual
+    _usual = maker
 
 
 class Interpreted:
     """A `plan.Stepper` that does the operations of each step one by one."""
+
+    looks_ahead = False
 
     def __init__(self, run: Interpreter) -> None:
         self.run, self.step = run, decoded(run.plan.step)
@@ -34,6 +44,12 @@ class Interpreted:
 
     def restart(self) -> None:
         """Nothing to forget."""
+
+    def save(self) -> None:
+        """Nothing is kept from step to step."""
+
+    def restore(self, memory: None) -> None:
+        """Nothing to return to."""
 
     def steps(self) -> int:
         """Steps that were made."""
@@ -50,7 +66,7 @@ class Execution:
     Args:
         outline: what is run.
         stack: ends the FMUs' instances.
-        interpreter: what makes the instances and does the operations.
+        interpreter: what makes the instances and does the operations; see `usual`.
 
     Attributes:
         run: the instances and their values.
@@ -64,7 +80,7 @@ class Execution:
         self,
         outline: Outline,
         stack: ExitStack,
-        interpreter: Callable[[Outline, ExitStack], Interpreter] = Interpreter,
+        interpreter: Maker | None = None,
     ) -> None:
         if outline.executor not in EXECUTORS:
             raise ValueRangeError(
@@ -72,7 +88,7 @@ class Execution:
                 f"{EXECUTORS[-1]}"
             )
         self.outline = outline
-        self.run = interpreter(outline, stack)
+        self.run = (interpreter or _usual)(outline, stack)
         self.stepper: Stepper | None = None
         self.ended = ""
         self.lost: list[str] = []
@@ -91,7 +107,7 @@ class Execution:
         count = self.outline.count
         shown = max(count // 100, 1)
         initialize(self.run)
-        self.lost = self._lost()
+        self.find_lost()
         before = Surroundings.now()
         try:
             stepper = self.begin()
@@ -157,9 +173,12 @@ class Execution:
 
         Args:
             request: of an FMU that ended it. Where all FMUs stand at one time then, their values
-                are recorded in any case.
+                are recorded in any case; otherwise those of the last time at which they did.
         """
         run = self.run
+        if request is not None and not request.complete:
+            run.keep_last(present=False)
+            return
         last = request is not None and request.complete
         if run.row > run.index // self.outline.every and not (
             last and run.index % self.outline.every
@@ -168,7 +187,7 @@ class Execution:
         for op, a, b in decoded(self.outline.plan.final):
             run.do(op, a, b)
         if last:
-            run.keep_last()
+            run.keep_last(present=True)
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""
@@ -228,8 +247,8 @@ class Execution:
         ]
         return [*self.lost, *filter(None, [self.ended]), *warnings, *changed]
 
-    def _lost(self) -> list[str]:
-        """Outputs that are not 0, must be passed on, and are not."""
+    def find_lost(self) -> None:
+        """Look which outputs are not 0, must be passed on, and are not."""
         found: dict[tuple[str, str], list[tuple[str, float]]] = {}
         system = self.outline.system
         instances = dict(zip(system.members, self.run.instances, strict=True))
@@ -241,7 +260,7 @@ class Execution:
             if value != 0.0:
                 array = name.partition("[")[0]
                 found.setdefault((owner, array), []).append((name, value))
-        return [
+        self.lost = [
             f"{owner}.{name} = {', '.join(f'{value:.3g}' for _, value in items)} "
             f"{system.unit(f'{owner}.{items[0][0]}')} is taken by nothing "
             f"({system.members[owner].description.extra['passed_on'][items[0][0]]}): it is missing "

@@ -29,7 +29,8 @@ def initialize(run: Interpreter) -> None:
         AlgebraicLoopError: initial values do not settle.
         FmuCallError: an FMU refused.
     """
-    start, stop = float(run.times[0]), float(run.times[-1])
+    start = float(run.times[0])
+    stop = None if run.outline.endless else float(run.times[-1])
     for instance, block in zip(run.instances, run.inputs, strict=True):
         instance.enter_initialization(start, stop, run.outline.tolerance)
         block.get()  # inputs that nothing sets keep the FMU's start values

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -12,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
+from ..fmu.attributes import INTEGERS
+from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from .extrapolation import derivatives_at_begin, mean_of_step
@@ -37,6 +40,9 @@ class Shared(Protocol):
     ) -> None:
         """Operation and instance of each call of the compiled executor."""
 
+    def enter(self) -> None:
+        """Note the thread that goes on with the run."""
+
 
 class Interpreter:
     """The FMUs of a run, the values that they exchange, and what each operation does to them.
@@ -52,6 +58,7 @@ class Interpreter:
         rows, row: recorded values, and how many rows there are.
         passes: whether values travel as objects.
         beside: communication point of the last row if it is none of every n-th, else None.
+        noted: communication point whose values stand behind the last row.
         bond_energy, bond_turnover: energy that each bond invented, and that went over it [J].
         newtons: one per algebraic loop.
         history, past: of extrapolated inputs, and how many values it has before the first step.
@@ -83,6 +90,8 @@ class Interpreter:
             ):
                 span = slice(*spans[index].tolist())
                 variables = [member.description.variables[name] for name in names[index]]
+                if blocks is self.inputs:
+                    variables = [self._exact(member.name, variable) for variable in variables]
                 blocks.append(Block(instance, variables, self.values[span], self.objects[span]))
         origins = {c.target: c.source for c in self.system.connections}
         origins.update({name: signal.text for name, signal in outline.signals.items()})
@@ -93,6 +102,7 @@ class Interpreter:
         self.rows = np.empty((outline.capacity, len(outline.observed)))
         self.row = self.index = 0
         self.beside: int | None = None
+        self.noted = -1
         self.bond_energy = np.zeros(len(self.layout.bonds))
         self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
@@ -104,6 +114,23 @@ class Interpreter:
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
         self.started = False
+
+    @cached_property
+    def _integers(self) -> set[str]:
+        """Inputs that get integers as they are."""
+        return {
+            wire.target
+            for wire in self.system.connections
+            if (wire.gain, wire.offset) == (1.0, 0.0)
+            and self.system.declaration(wire.source).type in INTEGERS
+        }
+
+    def _exact(self, instance: str, variable: Variable) -> Variable:
+        """An input, which refuses what it does not carry if only integers come."""
+        if variable.type != "Float32":
+            return variable
+        whole = {f"{instance}.{name}" for name in variable.elements()} <= self._integers
+        return replace(variable, type="Float32Whole") if whole else variable
 
     @cached_property
     def instants(self) -> list[float]:
@@ -149,7 +176,7 @@ class Interpreter:
 
     def size(self, time: float, step: float) -> float:
         """A step that does not miss the end of the run by rounding, and never goes beyond."""
-        end = self.instants[-1]
+        end = self.outline.end
         if time + step > end - ROUNDING * step:
             step = end - time
             while time + step > end:
@@ -222,18 +249,40 @@ class Interpreter:
         self.derivatives.curve[index] = curve * mean.gain
 
     def record(self) -> None:
-        """Keep observed values if it is their turn; note outputs for the energy of bonds."""
+        """Keep observed values if it is their turn; note outputs for the energy of bonds.
+
+        Otherwise they stand behind the last row, and are one if the run ends within the next step.
+        """
         layout, values = self.layout, self.values
         self.previous = values[layout.bond_output].tolist()
+        row = values[layout.record_source] * layout.record_gain + layout.record_offset
         if self.index % self.every == 0:
-            self.keep(values[layout.record_source] * layout.record_gain + layout.record_offset)
+            self.keep(row)
+            return
+        self.rows[self.row] = row
+        self.noted = self.index
+        if self.passes:
+            self.passing.note(self.objects)
 
-    def keep_last(self) -> None:
-        """Keep the present values although it is not their turn."""
+    def keep_last(self, *, present: bool) -> None:
+        """Keep a last row although it is not its turn.
+
+        Args:
+            present: with the present values; otherwise with those of the last communication point,
+                from which some FMUs have gone on.
+        """
         layout = self.layout
-        if self.index % self.every:
+        if not self.index % self.every:
+            return
+        if present:
             self.keep(self.values[layout.record_source] * layout.record_gain + layout.record_offset)
-            self.beside = self.index
+        elif self.noted == self.index:
+            self.row += 1
+            if self.passes:
+                self.passing.keep_noted()
+        else:
+            return
+        self.beside = self.index
 
     def recorded_times(self) -> Vector:
         """Times of the rows [s]."""

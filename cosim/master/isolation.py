@@ -153,7 +153,7 @@ def run_isolated(
             return recording("", outcome)
         messages = () if fork else _last_words(folder / "errors")
         text = f"run stopped at t = {when:.9g} s: {_blame(outline, witness)} "
-        text += f"did not return within {limit:g} s and was ended" if hung else _reason(code)
+        text += f"did not return within {limit:g} s and was ended" if hung else reason(code)
         text += f"; {WAY_OUT}"
         raise StepError(text, messages, time=when, recording=recording(text, Outcome()))
 
@@ -233,7 +233,8 @@ def _blame(outline: Outline, witness: Witness) -> str:
     return f"{name} ({members[name].reference}), in {what},"
 
 
-def _reason(code: int) -> str:
+def reason(code: int) -> str:
+    """How a process ended, by its exit code (negative for a signal)."""
     if code >= 0:
         return f"ended the process with exit code {code}, which an FMU must not"
     try:

@@ -61,16 +61,17 @@ class Outcome:
     beside: int | None = None
 
 
-class _Told(Interpreter):
+class Told(Interpreter):
     """An interpreter that says what it is about to do."""
 
     def __init__(self, outline: Outline, stack: ExitStack, witness: Witness) -> None:
         self.witness = self.shared = witness
-        calls.listen(witness.say)
         super().__init__(outline, stack)
-        self.rows = witness.rows
+        if witness.rows.shape == self.rows.shape:
+            self.rows = witness.rows
 
     def do(self, op: Op, a: int, b: int) -> None:
+        """See `Interpreter`."""
         self.tell()
         if op in (Op.SET, Op.GET, Op.STEP, Op.SUBSTEP):
             self.shared.do(op, a)
@@ -83,6 +84,7 @@ class _Told(Interpreter):
         self.shared.stand(self.index, self.row)
 
     def record(self) -> None:
+        """See `Interpreter`."""
         before = self.row
         super().record()
         if self.passing and self.row > before:
@@ -94,7 +96,8 @@ def execute(order: Order, witness: Witness) -> Outcome:
     text, messages = "", tuple[str, ...]()
     try:
         with ExitStack() as stack:
-            told = _Told(order.outline, stack, witness)
+            calls.listen(witness.say)
+            told = Told(order.outline, stack, witness)
             execution = Execution(order.outline, stack, lambda *_: told)
             try:
                 recording = execution.execute()
@@ -117,14 +120,14 @@ def execute(order: Order, witness: Witness) -> Outcome:
     )  # fmt: skip
 
 
-def orphaned(order: Order) -> None:
+def orphaned(owner: int, folder: Path) -> None:
     """End this process when the one that ordered it is gone; nobody else would end a hanging FMU.
 
     An FMU's call holds no interpreter lock, so this thread runs beside it.
     """
-    while os.getppid() == order.owner:
+    while os.getppid() == owner:
         time.sleep(WATCH)
-    shutil.rmtree(order.folder, ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
     if hasattr(os, "killpg"):
         os.killpg(0, signal.SIGKILL)
     os._exit(1)
@@ -135,7 +138,7 @@ def serve(order: Order, witness: Witness) -> None:
     faulthandler.disable()  # the ordering process says in a sentence what happened
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the ordering process decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=orphaned, args=(order,), daemon=True).start()
+    threading.Thread(target=orphaned, args=(order.owner, order.folder), daemon=True).start()
     outcome = execute(order, witness)
     part = order.folder / "outcome.part"
     part.write_bytes(pickle.dumps(outcome))

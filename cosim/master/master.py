@@ -174,6 +174,14 @@ class Master:
         """The plan of the algorithm with its options."""
         return compile_plan(self.algorithm, self.system, external, observed, self.options)
 
+    def tabulate(self, signals: Mapping[str, Signal], times: Vector) -> Vector:
+        """Values of inputs at further times, in the units of the inputs.
+
+        Raises:
+            InputError: values that do not fit.
+        """
+        return self._external(signals, times, {})
+
     # -- checks ----------------------------------------------------------------------------------
 
     def _count(self, duration: float, every: int, start: float) -> int:

@@ -45,6 +45,7 @@ class ObjectPassing:
             if carries[slot]
         }
         self.kept: dict[str, list[Any]] = {name: [] for name in self._recorded}
+        self._noted: dict[str, Any] = {}
 
     def __bool__(self) -> bool:
         return bool(self._copies or self._driven or self._recorded)
@@ -63,6 +64,15 @@ class ObjectPassing:
         """Record."""
         for name, slot in self._recorded.items():
             self.kept[name].append(objects[slot])
+
+    def note(self, objects: Objects) -> None:
+        """Remember what would be recorded."""
+        self._noted = {name: objects[slot] for name, slot in self._recorded.items()}
+
+    def keep_noted(self) -> None:
+        """Record what was remembered last."""
+        for name, item in self._noted.items():
+            self.kept[name].append(item)
 
     def copy(self, values: Vector, objects: Objects, first: int, last: int) -> None:
         """Pass on what goes through the connections `first` to before `last`.

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.metadata
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..data.recording import Recording
 from ..data.signals import Signal
+from ..spec import distribution
 from ..system.system import System
 from .invented import invented
 from .plan import Plan
@@ -39,6 +39,7 @@ class Outline:
         external: values of the driven inputs, one row per communication point.
         objects: per column of `external` whose values travel as objects, one per communication
             point.
+        endless: the run goes on beyond `times`, which are a window of it.
     """
 
     system: System
@@ -54,11 +55,17 @@ class Outline:
     signals: Mapping[str, Signal]
     external: Vector
     objects: Mapping[int, Sequence[Any]]
+    endless: bool = False
 
     @property
     def count(self) -> int:
         """Communication steps."""
         return self.times.size - 1
+
+    @property
+    def end(self) -> float:
+        """Where the run ends [s]; infinite if nobody knows."""
+        return math.inf if self.endless else float(self.times[-1])
 
     @property
     def capacity(self) -> int:
@@ -145,7 +152,7 @@ class Outline:
                 for member in self.system.members.values()
             },
             "connections": [f"{c.source} -> {c.target}" for c in self.system.connections],
-            "versions": {name: _version(name) for name in ("cosim", "numpy")},
+            "versions": {"cosim": distribution.version(), "numpy": np.__version__},
         }
 
 
@@ -157,11 +164,3 @@ def _column(type_: str, items: Sequence[Any]) -> NDArray[Any]:
 
 def _plain(value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else value
-
-
-@lru_cache
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"

@@ -136,13 +136,24 @@ class Stepper(Protocol):
     moves `index` on itself. Slots of inputs may be overwritten between steps (SOLVE exchanges too),
     so a stepper keeps what it needs of them; `extrapolation.smooth` says which connections carry
     values that may be blended.
+
+    Attributes:
+        looks_ahead: it must know the inputs of points to come.
     """
+
+    looks_ahead: bool
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""
 
     def restart(self) -> None:
         """Begin anew, at the first communication point."""
+
+    def save(self) -> Any:
+        """What it keeps from step to step, beside what `run` has; a copy."""
+
+    def restore(self, memory: Any) -> None:
+        """Return to what `save` gave, of this run or another one of the same outline."""
 
     def steps(self) -> int:
         """Steps of the whole system that were made, repeated ones too."""

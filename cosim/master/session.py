@@ -11,7 +11,6 @@ one of its own; the compiled executor releases the interpreter lock.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
@@ -24,6 +23,7 @@ from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
 from ..fmu.exchange import Block
+from ..fmu.library import WORK
 from ..fmu.values import check_values
 from ..system.inputs import Driver
 from . import kernel
@@ -34,7 +34,7 @@ from .master import Master
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
-"""Communication steps after which a limited run looks at the clock, and at what it has recorded; as
+"""Communication steps after which a limited run looks at its work, and at what it has recorded; as
 in the compiled executor."""
 RUNAWAY = 1e30
 """Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
@@ -74,12 +74,15 @@ class Session:
         self.master, self.names, self.count = master, outline.observed, outline.count
         self.times = outline.times[::every].copy()
         self.targets = tuple(targets)
+        self.work = 0
         self._stack = ExitStack()
         try:
             self._execution = Execution(outline, self._stack)
             self._run = self._execution.run
             self._stepper = self._execution.prepare()
             self._blocks = {name: self._block(name) for name in self.targets}
+            counting = [i for i in self._run.instances if WORK in i.functions]
+            self._counters = [(i.function(WORK), i.address) for i in counting]
         except BaseException:
             self._stack.close()
             raise
@@ -105,14 +108,15 @@ class Session:
 
         Args:
             values: by full name, or one per target.
-            limit: processor time that it may take [s].
+            limit: work that it may take: communication steps times instances, and steps of
+                solvers where FMUs count them (`library.WORK`). Time would depend on the machine.
 
         Returns:
             times, and one row per time with a column per name in `names` (a copy).
 
         Raises:
             ValueRangeError: outside the declared bounds.
-            StepError: an FMU failed, or the run took too long.
+            StepError: an FMU failed, or the run took more than its limit.
         """
         if values is None:
             values = {}
@@ -144,6 +148,7 @@ class Session:
         for block, items in arrays.values():
             block.set(items)
         initialize(run)
+        begun = self._steps_of_solvers()
         try:
             self._execution.begin()
             try:
@@ -154,6 +159,7 @@ class Session:
                 self._execution.finish()
         except (FmuCallError, AlgebraicLoopError) as error:
             raise self._execution.stopped(error, keep=False) from error
+        self.work = self._steps_of_solvers() - begun + self.count * len(run.instances)
         return run.recorded_times(), run.rows[: run.row].copy()
 
     def _advance_within(self, limit: float) -> None:
@@ -163,11 +169,17 @@ class Session:
             status = self._stepper.advance_within(self.count, limit, RUNAWAY)
             self._stopped(limit, status == kernel.TOO_LONG, status == kernel.TOO_LARGE)
         else:
-            begun = time.thread_time()
+            begun = self._steps_of_solvers()
             for last in [*range(LOOK, self.count, LOOK), self.count]:
                 self._stepper.advance(last)
-                late = time.thread_time() - begun > limit
-                self._stopped(limit, late, last % CHECK == 0 and self._largest()[1] > RUNAWAY)
+                work = self._steps_of_solvers() - begun + last * len(self._run.instances)
+                self._stopped(
+                    limit, work > limit, last % CHECK == 0 and self._largest()[1] > RUNAWAY
+                )
+
+    def _steps_of_solvers(self) -> int:
+        """Made so far by those that count them."""
+        return sum(int(count(address)) for count, address in self._counters)
 
     def _largest(self) -> tuple[str, float]:
         """Name and size of the largest value recorded last."""
@@ -179,8 +191,8 @@ class Session:
         """Raise if a run took too long or ran away."""
         if late:
             raise FmuCallError(
-                f"it took more than {limit:.3g} s of processor time: with these values a solver "
-                "takes very small steps"
+                f"it took more than {limit:.15g} steps of solvers and instances: with these "
+                "values a solver takes very small steps"
             )
         if large:
             raise FmuCallError(

@@ -10,7 +10,8 @@ import ctypes as ct
 import mmap
 import os
 import pickle
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -22,7 +23,7 @@ from . import kernel
 from .plan import Op
 
 Vector = NDArray[np.float64]
-INDEX, ROW, INSTANCE, OPERATION, CALLS = range(5)
+INDEX, ROW, INSTANCE, OPERATION, CALLS, THREAD = range(6)
 SAID = -1
 """Operation whose name is in `text`."""
 TEXT = 512
@@ -43,14 +44,23 @@ class Witness:
         folder: where it is; the files are made by whoever comes first.
         rows, columns: of the recording.
         files: another program shares the memory, not a fork of this process.
+        memory: makes shared arrays of a name, type and shape, in place of both.
     """
 
-    def __init__(self, folder: Path, rows: int, columns: int, *, files: bool = True) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        rows: int,
+        columns: int,
+        *,
+        files: bool = True,
+        memory: Callable[[str, Any, tuple[int, ...]], NDArray[Any]] | None = None,
+    ) -> None:
         self._folder = folder
-        shared = partial(_mapped, folder if files else None)
-        self.state = shared("state", np.int64, (5,))
+        shared = memory or partial(_mapped, folder if files else None)
+        self.state = shared("state", np.int64, (THREAD + 1,))
         self._text = shared("text", np.uint8, (TEXT,))
-        self._run = shared("run", np.uint8, (kernel.RUN_SIZE,))
+        self._run = shared("run", np.uint8, (kernel.structures.RUN_SIZE,))
         self.rows: Vector = shared("rows", np.float64, (rows, columns))
         self._objects: BinaryIO | None = None
 
@@ -67,6 +77,10 @@ class Witness:
     def stand(self, index: int, row: int) -> None:
         """Note the communication step under way, and how many rows there are."""
         self.state[INDEX], self.state[ROW] = index, row
+
+    def enter(self) -> None:
+        """Note the thread that goes on with the run."""
+        self.state[THREAD] = threading.get_ident()
 
     def do(self, op: Op, instance: int) -> None:
         """Note which operation an instance is about to do."""

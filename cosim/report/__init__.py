@@ -1,4 +1,4 @@
-"""Reports of diagnoses as web pages that need nothing else."""
+"""Reports of diagnoses and calibrations as web pages that need nothing else."""
 
 from .page import write_page
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import UnknownNameError, ValueRangeError
 from ..scenario.scenario import Scenario
-from ..system.provider import Provider
+from ..system.provider import Provider, get_ready
 from ..system.system import System
 
 
@@ -34,6 +34,7 @@ def swapped_system(
 ) -> tuple[System, list[str]]:
     """The system with its values, and notes on what a changed variant does not have."""
     notes = []
+    get_ready(provider, instances.values())
     system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
     for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
         instance = name.partition(".")[0]

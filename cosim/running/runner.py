@@ -23,17 +23,22 @@ from ..master.algorithms import names
 from ..master.master import Master
 from ..master.outline import Outline
 from ..master.session import Session
+from ..master.twin import Twin
 from ..scenario import scenario as scenarios
 from ..scenario.checks import CheckResult, evaluate
 from ..scenario.scenario import Scenario
 from ..ssp import read_scenario
 from ..system.provider import Provider
 from ..system.variants import apply
+from ..view.scene import Scenes, needs, scenes
+from .checks_table import checks_html
 from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
 from .preparation import left_out, recorded_signals, recording_interval, swapped_system
 
 Vector = NDArray[np.float64]
+SHOWN_RUNS = 3
+"""Recordings that a result of many runs shows in a notebook."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,13 @@ class RunResult:
     wall_s: float
     fmu_steps: int
     notes: tuple[str, ...] = ()
+
+    def _repr_html_(self) -> str:
+        from ..display.html import Html, join
+
+        differences = (item._repr_html_() for item in self.comparisons.values())
+        checks = checks_html(self.scenario.name, self.checks)
+        return join(*map(Html, (checks, self.recording._repr_html_(), *differences)))
 
     def plot(self, path: Path | str | None = None) -> Any:
         """Plot what the scenario describes or names, else what is compared, else everything."""
@@ -125,6 +137,15 @@ class Result:
             }
         )
 
+    def _repr_html_(self) -> str:
+        from ..display.html import Html, join
+
+        if len(self.runs) == 1:
+            return next(iter(self.runs.values()))._repr_html_()
+        checks = [replace(check, name=name) for name, check in self.checks.items()]
+        shown = [run.recording._repr_html_() for run in list(self.runs.values())[:SHOWN_RUNS]]
+        return join(*map(Html, (checks_html(self.name, checks), *shown)))
+
     def to_dict(self) -> dict[str, Any]:
         """As `cosim run --json` prints it."""
         first = next(iter(self.runs.values()))
@@ -169,6 +190,7 @@ class Prepared:
         record: signals to record.
         every: record every n-th communication point.
         notes: what a changed variant made the run leave out.
+        scenes: of the instances, which recordings keep; empty if they are not wanted.
     """
 
     scenario: Scenario
@@ -178,6 +200,7 @@ class Prepared:
     record: tuple[str, ...]
     every: int
     notes: tuple[str, ...]
+    scenes: Scenes = field(default_factory=dict)
 
     @property
     def _arguments(self) -> dict[str, Any]:
@@ -190,11 +213,19 @@ class Prepared:
 
     def run(self, progress: Callable[[float], None] | None = None) -> Recording:
         """Run it once."""
-        return self.master.run(self.scenario.duration, **self._arguments, progress=progress)
+        found = self.master.run(self.scenario.duration, **self._arguments, progress=progress)
+        if self.scenes:
+            found = replace(found, provenance={**found.provenance, "scene": self.scenes})
+        return found
 
     def session(self) -> Session:
         """Instances for many runs, one after the other."""
         return Session(self.master, self.scenario.duration, **self._arguments)
+
+    def twin(self) -> Twin:
+        """Instances that are stepped from outside."""
+        about = {"scene": self.scenes} if self.scenes else {}
+        return Twin(self.master, self.scenario.duration, **self._arguments, about=about)
 
     def outline(self) -> Outline:
         """Everything checked, inputs tabulated, no FMU created."""
@@ -230,6 +261,7 @@ def prepare(
     base: Path | None = None,
     isolate: float | None = None,
     guard: bool = False,
+    scene: bool = False,
 ) -> Prepared:
     """Choose the FMUs of a scenario and set its values; arguments as of `run_scenario`.
 
@@ -242,13 +274,16 @@ def prepare(
     system, notes = swapped_system(scenario, provider, instances, changed, parameters or {})
     notes += left_out(system, changed)
     record, others = recorded_signals(scenario, system, changed)
+    looks = scenes(system) if scene else {}
+    record = tuple(dict.fromkeys([*record, *needs(looks)]))
     master = Master(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
         isolate=isolate, guard=guard, options=scenario.options,
     )  # fmt: skip
     return Prepared(
-        scenario, usual, instances, master, record, recording_interval(scenario), (*notes, *others)
-    )
+        scenario, usual, instances, master, record, recording_interval(scenario),
+        (*notes, *others), looks,
+    )  # fmt: skip
 
 
 def run_scenario(
@@ -261,6 +296,7 @@ def run_scenario(
     base: Path | None = None,
     isolate: float | None = None,
     guard: bool = False,
+    scene: bool = False,
 ) -> RunResult:
     """Run one scenario.
 
@@ -273,13 +309,14 @@ def run_scenario(
         progress: told now and then which fraction is done.
         base: folder against which .fmu paths among the variants are taken.
         isolate, guard: as of `Master`.
+        scene: record what the scenes of the FMUs show, too, and keep the scenes.
 
     Raises:
         CosimError: see `errors`; a `StepError` carries the recording up to the failure.
     """
     prepared = prepare(
         scenario, provider, variants=variants, parameters=parameters, base=base, isolate=isolate,
-        guard=guard,
+        guard=guard, scene=scene,
     )  # fmt: skip
     started = time.perf_counter()
     recording = prepared.run(progress)
@@ -357,7 +394,8 @@ def run(
         return _run(
             found, None if out is None else Path(out), provider, progress,
             {"algorithm": algorithm, "options": options, "step": step, "duration": duration},
-            {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard},
+            {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard,
+             "scene": True},
         )  # fmt: skip
 
 
@@ -382,13 +420,13 @@ def _run(
             result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
             if place is not None and error.recording is not None:
-                path = error.recording.write_parquet(place / "recording.parquet")
+                path = error.recording.keep(place / "recording")
                 error.add_note(f"the recording up to then is in {path}")
             raise
         results[run_name] = result
         if place is not None:
             files += [
-                result.recording.write_parquet(place / "recording.parquet"),
+                result.recording.keep(place / "recording"),
                 result.recording.write_csv(place / "recording.csv"),
             ]
             result.plot(place / "plot.png")

@@ -19,7 +19,7 @@ import csv
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +80,7 @@ def table_runs(path: Path, entry: Any) -> dict[str, Row]:
             raise ScenarioError(f"{file}: has no row with {on} = {lacking[0]}")
         rows = [{**others[row[on]], **row} for row in rows]
     for name, text in entry.get("columns", {}).items():
-        values = [_evaluate(f"{path}: column {name}", str(text), row, rows) for row in rows]
+        values = [evaluate(f"{path}: column {name}", str(text), row, rows) for row in rows]
         for row, value in zip(rows, values, strict=True):
             row[name] = repr(value)
     return {str(fill(str(path), entry["name"], row)): row for row in rows}
@@ -141,8 +141,22 @@ def fill(where: str, item: Any, row: Mapping[str, str]) -> Any:
 # -- added columns ---------------------------------------------------------------------------------
 
 
-def _evaluate(what: str, text: str, row: Row, rows: list[Row]) -> float:
-    def number(name: str, of: Row) -> float:
+def evaluate(
+    what: str, text: str, row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] = ()
+) -> float:
+    """Value of arithmetic of columns.
+
+    Args:
+        what: what error texts call it.
+        text: the expression.
+        row: column -> value.
+        rows: those that `others` takes the mean of.
+
+    Raises:
+        ScenarioError: no expression, or a name that is no column.
+    """
+
+    def number(name: str, of: Mapping[str, Any]) -> float:
         if name not in of:
             raise ScenarioError(f"{what}: nothing is called {name!r}; {listing(of, name)}")
         try:

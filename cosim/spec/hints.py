@@ -22,7 +22,11 @@ class SearchHints:
             strength * (cos * effect at 0 + sin * effect at pi/2)); `shift`, an offset
             (effect = strength * (effect at 0 + value * derivative)).
         tries: values that a search should try, where a model with another one tells nothing of the
-            right one (cycles per revolution); for a strength, values near which fits begin.
+            right one; for a strength, values near which fits begin.
+        decades: smallest and largest value that nature has, for a parameter that may have any size
+            between them (a time constant).
+        cycles: output of the effect over which it repeats so many times per turn, for a parameter
+            that counts whole cycles.
         lattice: distance of the values at which the model is exact, 0 if it is everywhere (a held
             signal is delayed by whole samples; between, its steps are smeared).
         visits: output of the component among whose values along a run the right value is, for a
@@ -31,20 +35,35 @@ class SearchHints:
 
     mix: Mix = ""
     tries: tuple[float, ...] = ()
+    decades: tuple[float, ...] = ()
+    cycles: str = ""
     lattice: float = 0.0
     visits: str = ""
 
     def __post_init__(self) -> None:
         if self.mix not in get_args(Mix):
             raise ValueError(f"hint mix = {self.mix!r} is none of 'turn', 'shift' and '' for none")
+        if self.decades and not (
+            len(self.decades) == 2 and 0.0 < self.decades[0] < self.decades[1]
+        ):
+            raise ValueError(f"hint decades = {self.decades!r} is no pair 0 < smallest < largest")
 
-    def within(self, instance: str) -> SearchHints:
-        """The hints in a system, where variables are named with their instance."""
-        return replace(self, visits=f"{instance}.{self.visits}") if self.visits else self
+    def within(self, instance: str, parameter: str) -> SearchHints:
+        """The hints in a system, where variables are named with their instance.
+
+        Args:
+            instance: of the system.
+            parameter: whose hints these are, as its FMU calls it.
+        """
+        own = f"{instance}.{parameter}".rpartition(".")[0]
+        visits = f"{instance}.{self.visits}" if self.visits else ""
+        return replace(self, visits=visits, cycles=f"{own}.{self.cycles}" if self.cycles else "")
 
 
 NO_HINTS = SearchHints()
-_TABLES = {"mix": "mixes", "tries": "tries", "lattice": "lattices", "visits": "visits"}
+_TABLES = {"mix": "mixes", "tries": "tries", "decades": "decades", "cycles": "cycles",
+           "lattice": "lattices", "visits": "visits"}  # fmt: skip
+_LISTS = ("tries", "decades")
 
 
 def to_json(hints: Mapping[str, SearchHints]) -> dict[str, dict[str, Any]]:
@@ -66,6 +85,6 @@ def from_json(content: Mapping[str, Any]) -> dict[str, SearchHints]:
     found: dict[str, dict[str, Any]] = {}
     for hint, plural in _TABLES.items():
         for name, value in content.get(plural, {}).items():
-            kept = tuple(map(float, value)) if hint == "tries" else value
+            kept = tuple(map(float, value)) if hint in _LISTS else value
             found.setdefault(name, {})[hint] = kept
     return {name: SearchHints(**entries) for name, entries in found.items()}

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CosimError, InputError
+from ..spec.distribution import way_out
 from .compute import RunnerPool, TaskResult, compute, lost
 from .planning import Found, Group, Task
 
@@ -156,7 +157,7 @@ def on_scheduler(
         from distributed import Client
     except ModuleNotFoundError as error:
         raise InputError(
-            f"--scheduler needs {error.name}, which is not installed: pip install 'cosim[study]'"
+            f"--scheduler needs {error.name}, which is not installed: {way_out('study')}"
         ) from error
     try:
         client = Client(address, timeout=ANSWER)

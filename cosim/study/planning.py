@@ -6,7 +6,6 @@ Nothing is run here, and no FMU is created.
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
 import platform
 import sys
@@ -22,6 +21,7 @@ from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
 from ..running.runner import Prepared, adjusted, find_runs, prepare
 from ..scenario.scenario import Scenario
+from ..spec import distribution
 from ..system.provider import Provider
 from .definition import Study
 from .design import Point, points, reference_of
@@ -334,12 +334,8 @@ def versions() -> dict[str, str]:
         if path.suffix in (".py", ".c", ".h"):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(path.read_bytes())
-    try:
-        version = importlib.metadata.version("cosim")
-    except importlib.metadata.PackageNotFoundError:
-        version = "not installed"
     return {
-        "cosim": version,
+        "cosim": distribution.version(),
         "code": digest.hexdigest(),
         "numpy": np.__version__,
         "machine": f"{sys.platform} {platform.machine()}",

@@ -15,6 +15,7 @@ from ..data.recording import Recording
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
+from ..spec.distribution import has
 from ..system.provider import Provider
 from .compute import RunnerPool, TaskResult
 from .definition import Study, read_study
@@ -227,13 +228,14 @@ def _notes(plan: StudyPlan) -> list[str]:
 def _write(study: Study, folder: Path, table: StudyTable, picture: bool) -> list[Path]:
     files = [
         table.write_csv(folder / "study.csv"),
-        table.write_parquet(folder / "study.parquet"),
         folder / "study.json",
     ]
-    write_text(files[2], json.dumps(_rows(study, table), indent=1) + "\n")
+    if has("pyarrow"):
+        files.append(table.write_parquet(folder / "study.parquet"))
+    write_text(files[1], json.dumps(_rows(study, table), indent=1) + "\n")
     if picture:
         files.append(folder / "study.png")
-        plot(table, study.text or study.name, files[3])
+        plot(table, study.text or study.name, files[-1])
     return files
 
 

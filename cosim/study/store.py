@@ -1,7 +1,8 @@
 """Result files of a study: one per run, written whole or not at all, checked when read.
 
 `runs/KEY.json` holds `{"format", "sha256", "result"}`; the hash is that of the result as canonical
-JSON. Where signals are kept, `runs/KEY.parquet` holds them, and the result its hash.
+JSON. Where signals are kept, `runs/KEY.parquet` holds them (`runs/KEY.npz` where pyarrow is not
+installed), and the result its hash.
 """
 
 from __future__ import annotations
@@ -40,13 +41,14 @@ class Store:
 
     def channels(self, key: str) -> Path:
         """The recording of a run."""
-        return self.folder / f"{key}.parquet"
+        other = self.folder / f"{key}.npz"
+        return other if other.is_file() else self.folder / f"{key}.parquet"
 
     def write(self, result: dict[str, Any], recording: Recording | None) -> None:
         """Write a run's result, and its recording before that."""
         key = result["key"]
         if recording is not None:
-            path = recording.write_parquet(self.channels(key))
+            path = recording.keep(self.folder / key)
             result["channels"] = {"signals": list(recording.names), "sha256": _file_hash(path)}
         text = _canonical(result)
         digest = hashlib.sha256(text.encode()).hexdigest()

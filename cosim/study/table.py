@@ -18,6 +18,7 @@ from ..data.comparison import Reference, compare
 from ..data.recording import Recording
 from ..errors import UnknownNameError
 from ..files import atomic
+from ..spec.distribution import needed
 from .planning import StudyPlan, Task
 from .store import Store
 
@@ -91,9 +92,12 @@ class StudyTable:
         return found
 
     def to_pandas(self) -> pd.DataFrame:
-        """A data frame; units are in its `attrs`."""
-        import pandas as pd
+        """A data frame; units are in its `attrs`.
 
+        Raises:
+            InputError: pandas is not installed.
+        """
+        pd = needed("pandas", "a study's table as data frame", "tables")
         frame = pd.DataFrame(
             {name: [_cell(row.get(name)) for row in self.rows] for name in self.columns}
         )
@@ -114,9 +118,13 @@ class StudyTable:
         return path
 
     def write_parquet(self, path: Path) -> Path:
-        """Write a Parquet file; unit in each column's metadata."""
+        """Write a Parquet file; unit in each column's metadata.
+
+        Raises:
+            InputError: pyarrow is not installed.
+        """
+        pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         arrays, fields = [], []
         for name in self.columns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
@@ -42,6 +43,20 @@ class FolderProvider:
             f"{self.folder}: has no FMU of {variant!r}; {listing(present, variant)}. "
             "Build it with 'cosim fmus build' or give the path of an .fmu"
         )
+
+
+def get_ready(provider: Provider | None, references: Iterable[str]) -> None:
+    """Have variants built together, if the provider can do that better than one by one."""
+    prepare = getattr(provider, "prepare", None)
+    if prepare is not None:
+        prepare([item for item in references if not item.endswith(".fmu")])
+
+
+def expected(provider: Provider | None, references: Iterable[str]) -> None:
+    """Say which variants will be asked for, if the provider counts them."""
+    expect = getattr(provider, "expect", None)
+    if expect is not None:
+        expect([item for item in references if not item.endswith(".fmu")])
 
 
 def locate(reference: str, provider: Provider | None, base: Path | None = None) -> Path:

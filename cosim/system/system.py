@@ -13,7 +13,7 @@ Everything is checked when it is said: names, causality, units, bounds, double d
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -245,8 +245,10 @@ class System:
                     "connected"
                 )
         out, into = source[0], target[0]
-        if _family(out) != _family(into):
-            raise ConnectError(f"{what}: types {out.type} and {into.type} do not fit")
+        if _family(out) != _family(into) and not _counts(out, into):
+            raise ConnectError(
+                f"{what}: types {out.type} and {into.type} do not fit{_way(out, into)}"
+            )
         factor, offset = transformation
         if (factor, offset) != (1.0, 0.0) and _family(out) in ("String", "Binary"):
             raise ConnectError(
@@ -427,9 +429,12 @@ class System:
 
     # -- pictures --------------------------------------------------------------------------------
 
-    def svg(self) -> str:
-        """The system as a drawing (SVG)."""
-        return drawing.svg(self)
+    def svg(self, marks: Mapping[str, Sequence[str]] | None = None) -> str:
+        """The system as a drawing (SVG); instances with marks (short texts) stand out."""
+        return drawing.svg(self, marks)
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
 
     def to_svg(self, path: Path | str) -> Path:
         """Write the drawing to a file."""
@@ -466,6 +471,21 @@ def _family(variable: Variable) -> str:
     if variable.type in ("String", "Binary"):
         return variable.type
     return "truth" if boolean(variable.type) else "number"
+
+
+def _counts(out: Variable, into: Variable) -> bool:
+    """Whether a truth value goes into a number as 1 or 0: that loses nothing, but has no unit."""
+    plain = into.unit is None or into.unit.symbol in ("", "1")
+    return (_family(out), _family(into)) == ("truth", "number") and plain
+
+
+def _way(out: Variable, into: Variable) -> str:
+    match _family(out), _family(into):
+        case "truth", "number":
+            return f": true is 1, and not 1 {into.symbol}; convert it in one of the two FMUs"
+        case "number", "truth":
+            return ": a number is neither true nor false; compare it in one of the two FMUs"
+    return ""
 
 
 def _given(value: Any, found: list[Any]) -> Any:

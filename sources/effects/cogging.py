@@ -19,8 +19,7 @@ from cosim.spec.hints import SearchHints
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.angle import shaft_angle
-from ..laws.orders import ORDERS
+from ..laws.angle import ANGLE, shown_angle
 from ..quantity import Quantity
 
 TAU_C = Quantity("tau_c", "N.m", "amplitude of the torque, 0 = absent", start=0.05, strength=True)
@@ -30,7 +29,7 @@ N = Quantity(
     "cycles per revolution of the shaft",
     start=12.0,
     minimum=0.1,
-    hints=SearchHints(tries=ORDERS),
+    hints=SearchHints(cycles=ANGLE.name),
 )
 PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
@@ -46,7 +45,7 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the torque."""
-    p, theta = e.parameters(f_c=TAU_C, n=N, psi=PSI), shaft_angle(e, "velocity")
+    p, theta = e.parameters(f_c=TAU_C, n=N, psi=PSI), shown_angle(e, "velocity")
     argument = p.n * theta + p.psi
     e.add(-p.f_c * ca.sin(argument))
     e.stored_energy(p.f_c * (1 - ca.cos(argument)) / p.n)

@@ -4,10 +4,11 @@
 
 s_i are the scalar signals of the balance (speed, angle, load, ...). N_1 ... N_12 are cubic
 B-splines on knots that are equally spaced in asinh(x / x_scale) from `x_first` to `x_last`: dense
-around 0 where the scale is small, equally spaced in x where it is large. N_13 = tanh(x / x_0) is the jump at
-0 that no smooth curve has (dry friction). P_1 ... P_8 are cubic B-splines on equally spaced knots
-from `y_first` to `y_last`, on a circle of that circumference where `turn` is 1. Beyond the first
-and last knot, u keeps its value there. With the same c_km for all m, u depends on x alone.
+around 0 where the scale is small, equally spaced in x where it is large. N_13 = tanh(x / x_0) is
+the jump at 0 that no smooth curve has (dry friction). P_1 ... P_8 are cubic B-splines on equally
+spaced knots from `y_first` to `y_last`, on a circle of that circumference where `turn` is 1. Beyond
+the first and last knot, u keeps its value there. With the same c_km for all m, u depends on x
+alone.
 
 Not modelled: memory (hysteresis), more than two signals.
 

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -40,7 +42,14 @@ E = Quantity(
 G = Quantity(
     "g", "1/(N.m)", "growth of the friction coefficient with the torque on the teeth", minimum=0.0
 )
-W_S = Quantity("w_s", "rad/s", "speed over which that excess decays", start=0.5, minimum=1e-6)
+W_S = Quantity(
+    "w_s",
+    "rad/s",
+    "speed over which that excess decays",
+    start=0.5,
+    minimum=1e-6,
+    hints=SearchHints(decades=(0.01, 30.0)),
+)
 W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=2e-3, minimum=1e-6)
 
 EFFECT = Effect(

@@ -20,8 +20,7 @@ from cosim.spec.hints import SearchHints
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.angle import shaft_angle
-from ..laws.orders import ORDERS
+from ..laws.angle import ANGLE, shown_angle
 from ..quantity import Quantity
 
 EPS = Quantity(
@@ -37,7 +36,7 @@ N = Quantity(
     "cycles per revolution of the output",
     start=30.0,
     minimum=0.1,
-    hints=SearchHints(tries=ORDERS),
+    hints=SearchHints(cycles=ANGLE.name),
 )
 PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
@@ -55,5 +54,5 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the variation of the ratio."""
     p, ratio = e.parameters(N, PSI, EPS), e.signal("value")
-    theta_b = shaft_angle(e, "speed")
+    theta_b = shown_angle(e, "speed")
     e.add(ratio * p.n * p.eps * ca.cos(p.n * theta_b + p.psi))

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.signal_effect import sized
@@ -27,7 +29,14 @@ B = Quantity(
     start=0.05,
     strength=True,
 )
-T_W = Quantity("t_w", "s", "time constant of warming up", start=60.0, minimum=1e-3)
+T_W = Quantity(
+    "t_w",
+    "s",
+    "time constant of warming up",
+    start=60.0,
+    minimum=1e-3,
+    hints=SearchHints(decades=(0.5, 1000.0)),
+)
 W_N = Quantity("w_n", "rad/s", "speed that warms up halfway", start=1.0, minimum=1e-6)
 H = Quantity("h", "1", "0 cold, 1 warm")
 

@@ -17,8 +17,7 @@ from cosim.spec.hints import SearchHints
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.angle import shaft_angle
-from ..laws.orders import ORDERS
+from ..laws.angle import ANGLE, shown_angle
 from ..quantity import Quantity
 
 R = Quantity("r", "1", "amplitude over the torque constant, 0 = absent", start=0.03, strength=True)
@@ -28,7 +27,7 @@ N = Quantity(
     "cycles per revolution of the motor",
     start=12.0,
     minimum=0.1,
-    hints=SearchHints(tries=ORDERS),
+    hints=SearchHints(cycles=ANGLE.name),
 )
 PSI = Quantity("psi", "rad", "phase at angle 0", hints=SearchHints(mix="turn"))
 
@@ -46,5 +45,5 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the variation of the constant."""
     p, K = e.parameters(N, PSI, R), e.signal("value")
-    theta = shaft_angle(e, "speed")
+    theta = shown_angle(e, "speed")
     e.add(p.r * K * ca.cos(p.n * theta + p.psi))

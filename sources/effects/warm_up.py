@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
@@ -29,7 +31,15 @@ K = Quantity(
     maximum=20.0,
     strength=True,
 )
-T_W = Quantity("t_w", "s", "time constant of warming up", start=120.0, minimum=5.0, maximum=5000.0)
+T_W = Quantity(
+    "t_w",
+    "s",
+    "time constant of warming up",
+    start=120.0,
+    minimum=5.0,
+    maximum=5000.0,
+    hints=SearchHints(decades=(5.0, 5000.0)),
+)
 T_ON = Quantity("t_on", "s", "time from switching on to t = 0", nominal=100.0)
 
 EFFECT = Effect(

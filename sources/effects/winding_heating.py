@@ -14,6 +14,8 @@ Source: thermal model of first order, Leonhard, Control of Electrical Drives, 20
 
 from __future__ import annotations
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..laws.signal_effect import sized
@@ -27,7 +29,14 @@ R_TH = Quantity(
     minimum=0.0,
     strength=True,
 )
-T_TH = Quantity("t_th", "s", "thermal time constant", start=60.0, minimum=1e-3)
+T_TH = Quantity(
+    "t_th",
+    "s",
+    "thermal time constant",
+    start=60.0,
+    minimum=1e-3,
+    hints=SearchHints(decades=(0.5, 1000.0)),
+)
 ALPHA = Quantity("alpha", "1/K", "temperature coefficient of resistance, copper", start=0.00393)
 P = Quantity("p", "W", "copper loss behind the thermal time constant", nominal=10.0)
 RISE = Quantity("rise", "K", "temperature rise of the winding")

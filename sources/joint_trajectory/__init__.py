@@ -1,4 +1,4 @@
-"""Set motion of six joints over time."""
+"""Set motion of joints over time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RAMP = Quantity("ramp", "s", "time to fade in and out", start=1.0, minimum=1e-3)
 
 COMPONENT = Component(
     "joint_trajectory",
-    "Set motion of the six joints of an arm.",
+    "Set motion of the joints of an arm.",
     source="digital twin paper of the mobile manipulator, joint trajectories of the UR5",
     energy=False,
 )

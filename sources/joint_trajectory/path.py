@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from .. import joint_trajectory as qs
+from ..laws.joints import Joints
 from ..model import SX, Model
 
 
@@ -21,7 +22,7 @@ def window(m: Model, start: SX, duration: SX, ramp: SX) -> SX:
 
 def output_path(m: Model, q: SX) -> None:
     """Output the angles and their time derivatives."""
-    speed = ca.jacobian(q, m.t)
-    m.output(qs.Q_SET, q)
-    m.output(qs.QD_SET, speed)
-    m.output(qs.QDD_SET, ca.jacobian(speed, m.t))
+    joints, speed = Joints.of_device(m), ca.jacobian(q, m.t)
+    m.output(joints.sized(qs.Q_SET), q)
+    m.output(joints.sized(qs.QD_SET), speed)
+    m.output(joints.sized(qs.QDD_SET), ca.jacobian(speed, m.t))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from .. import joint_trajectory as qs
 from ..component import Fidelity
+from ..laws.joints import Joints
 from ..model import Model
 from ..quantity import Quantity
 from .path import output_path, smooth
@@ -29,6 +30,7 @@ DURATION = Quantity("duration", "s", "time that the move takes", start=1.0, mini
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    p = m.parameters(Q_START, Q_END, qs.T_START, DURATION)
+    joints = Joints.of_device(m)
+    p = m.parameters(joints.sized(Q_START), joints.sized(Q_END), qs.T_START, DURATION)
     s = (m.t - p.t_start) / p.duration
     output_path(m, p.q_start + (p.q_end - p.q_start) * smooth(s))

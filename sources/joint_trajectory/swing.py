@@ -17,6 +17,7 @@ import casadi as ca
 
 from .. import joint_trajectory as qs
 from ..component import Fidelity
+from ..laws.joints import Joints
 from ..model import Model
 from ..quantity import Quantity
 from .path import output_path, window
@@ -36,7 +37,9 @@ DURATION = Quantity("duration", "s", "from first to last motion", start=10.0, mi
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    p = m.parameters(qs.T_START, DURATION, qs.RAMP, FREQUENCY, qs.Q_HOLD, AMPLITUDE)
+    joints = Joints.of_device(m)
+    of_joints = joints.sized(qs.Q_HOLD), joints.sized(AMPLITUDE)
+    p = m.parameters(qs.T_START, DURATION, qs.RAMP, FREQUENCY, *of_joints)
     faded = window(m, p.t_start, p.duration, p.ramp)
     phase = 2 * math.pi * p.f * (m.t - p.t_start)
     output_path(m, p.q_hold + p.amplitude * faded * ca.sin(phase))

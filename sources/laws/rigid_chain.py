@@ -1,9 +1,10 @@
-"""Kinematics and dynamics of a serial chain of rigid links with revolute joints on a moving mount.
+"""Kinematics and dynamics of a serial chain of rigid links on a moving mount.
 
-Link `i` carries a frame whose z axis is joint axis `i` and whose origin lies on it; it is turned by
-`q_i` against axes that are fixed in its predecessor. (Frame i-1 of the standard Denavit-Hartenberg
-convention, turned by `q_i`.) The joint axis is then (0, 0, 1) in every link, numbers that are zero
-stay structurally zero, and the C code holds no needless operation.
+Link `i` carries a frame whose z axis is joint axis `i` and whose origin lies on it; a revolute
+joint turns it by `q_i` against axes that are fixed in its predecessor, a prismatic one moves it by
+`q_i`. (Frame i-1 of the standard Denavit-Hartenberg convention, turned by `q_i`.) The joint axis is
+then (0, 0, 1) in every link, numbers that are zero stay structurally zero, and the C code holds no
+needless operation.
 
 Wrenches are [force; moment], motions [linear; angular], both at the frame's origin in its axes.
 Accelerations are classical ones (second derivative of the position) and not spatial ones: then no
@@ -14,8 +15,10 @@ as the upward acceleration `-g` of the mount.
     joint:  a_i = a_p + alpha_p x r + w_p x (w_p x r),   alpha_i = alpha_p + w_p x z qd + z qdd
 
 with the mass m, first moment h and inertia J of a link about its frame's origin and the offset r of
-the joint from the predecessor's origin. A rotor inertia J_r acts on the joint's own acceleration
-only (its gyroscopic moments are neglected): z.M = tau - J_r qdd.
+its frame from the predecessor's origin. Along a prismatic joint r grows by z q, a_i gains
+2 w_i x z qd + z qdd, and alpha_i = alpha_p. A rotor inertia J_r acts on the joint's own
+acceleration only (its gyroscopic moments are neglected): z.M = tau - J_r qdd, or z.F of a prismatic
+joint.
 
 Source: Featherstone, Rigid Body Dynamics Algorithms, 2008 (RNEA ch. 5, CRBA ch. 6, ABA ch. 7),
 rewritten for classical accelerations.
@@ -23,59 +26,29 @@ rewritten for classical accelerations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from .chain import (
+    Body,
+    Chain,
+    Link,
+    quaternion_of,
+    shifted,
+    skew,
+    standard_dh,
+    symmetric,
+    with_load,
+)
+from .rotation import product
+
 SX = Any
 
-
-@dataclass(frozen=True)
-class Link:
-    """A link and the joint before it.
-
-    Attributes:
-        rotation: axes of the joint at `q = 0` in the axes of the predecessor (3x3).
-        offset: position of the joint in the predecessor's frame [m].
-        mass: [kg].
-        first_moment: mass times centre of mass [kg.m].
-        inertia: about the frame's origin [kg.m2] (3x3).
-    """
-
-    rotation: SX
-    offset: SX
-    mass: SX
-    first_moment: SX
-    inertia: SX
-
-
-@dataclass(frozen=True)
-class Chain:
-    """Links from the mount to the tool; the flange is fixed in the last link."""
-
-    links: tuple[Link, ...]
-    flange_rotation: SX
-    flange_offset: SX
-
-
-@dataclass(frozen=True)
-class Body:
-    """Mass properties about the origin of a frame, in its axes."""
-
-    mass: SX
-    first_moment: SX
-    inertia: SX
-
-    def matrix(self) -> SX:
-        """Wrench per acceleration [linear; angular] of the frame (6x6)."""
-        cross = skew(self.first_moment)
-        return ca.vertcat(
-            ca.horzcat(self.mass * ca.SX.eye(3), -cross), ca.horzcat(cross, self.inertia)
-        )
+__all__ = ["Body", "Chain", "ForwardDynamics", "Link", "Posture", "standard_dh", "upper_triangle"]
 
 
 @dataclass(frozen=True)
@@ -83,7 +56,7 @@ class ForwardDynamics:
     """Result of the articulated-body algorithm.
 
     Attributes:
-        acceleration: joint accelerations [rad/s2].
+        acceleration: of the joints [rad/s2], prismatic [m/s2].
         inertia: articulated inertia at the mount (6x6): wrench of the mount on the chain per
             acceleration [linear; angular] of the mount, with the joints free to follow.
         bias: that wrench for a mount that is not accelerated, without gravity.
@@ -94,84 +67,8 @@ class ForwardDynamics:
     bias: SX
 
 
-def standard_dh(
-    d: Sequence[float],
-    a: Sequence[float],
-    alpha: Sequence[float],
-    mass: Sequence[float],
-    centre: Sequence[Sequence[float]],
-    inertia: Sequence[Sequence[float]],
-) -> Chain:
-    """Chain from standard Denavit-Hartenberg data, T_i = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i).
-
-    Args:
-        d, a, alpha: link offsets [m], lengths [m] and twists [rad].
-        mass: masses [kg].
-        centre: centres of mass in frame i [m].
-        inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre of mass in axes i [kg.m2].
-    """
-    links = []
-    rotation, offset = np.eye(3), np.zeros(3)
-    for i in range(len(d)):
-        turn, shift = _rotation_x(alpha[i]), np.array([a[i], 0.0, d[i]])
-        c = shift + turn @ np.asarray(centre[i])
-        xx, yy, zz, xy, xz, yz = inertia[i]
-        about_centre = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-        about_origin = about_centre + mass[i] * (c @ c * np.eye(3) - np.outer(c, c))
-        links.append(
-            Link(
-                ca.SX(rotation),
-                ca.SX(offset),
-                ca.SX(mass[i]),
-                ca.SX(mass[i] * c),
-                ca.SX(about_origin),
-            )
-        )
-        rotation, offset = turn, shift
-    return Chain(tuple(links), ca.SX(rotation), ca.SX(offset))
-
-
-def _rotation_x(angle: float) -> Any:
-    """Rotation about x; cosines and sines of right angles are exactly 0 or 1."""
-    c, s = np.cos(angle), np.sin(angle)
-    c, s = (float(np.round(v)) if abs(v - np.round(v)) < 1e-7 else float(v) for v in (c, s))
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def with_load(chain: Chain, mass: SX, first_moment: SX, inertia: SX) -> Chain:
-    """The chain with a rigid load on its flange (first moment and inertia about the flange)."""
-    last = chain.links[-1]
-    turn, shift = chain.flange_rotation, chain.flange_offset
-    h = turn @ ca.SX(first_moment)
-    J = _symmetric(turn @ ca.SX(inertia) @ turn.T)
-    link = replace(
-        last,
-        mass=last.mass + mass,
-        first_moment=last.first_moment + (h + mass * shift),
-        inertia=last.inertia + (J + _shifted(mass, h, shift)),
-    )
-    return replace(chain, links=(*chain.links[:-1], link))
-
-
-def _shifted(m: SX, h: SX, r: SX) -> SX:
-    """What an inertia gains when its reference point moves by -r (h: first moment before)."""
-    return _symmetric(
-        (2 * ca.dot(r, h) + m * ca.dot(r, r)) * ca.SX.eye(3) - r @ h.T - h @ r.T - m * (r @ r.T)
-    )
-
-
-def _symmetric(matrix: SX) -> SX:
-    """The upper triangle mirrored: the lower one is never computed."""
-    return ca.triu2symm(ca.triu(matrix))
-
-
-def skew(v: SX) -> SX:
-    """Matrix of the cross product, `skew(v) @ w = v x w`."""
-    return ca.skew(v)
-
-
 class Posture:
-    """A chain at given joint angles: the rotations that everything else needs, computed once."""
+    """A chain at given joint positions: what everything else needs of them, computed once."""
 
     def __init__(self, chain: Chain, q: SX) -> None:
         self.chain = chain
@@ -190,7 +87,14 @@ class Posture:
         loaded._load = Body(ca.SX(mass), ca.SX(first_moment), ca.SX(inertia))
         return loaded
 
+    def _offset(self, i: int) -> SX:
+        """Origin of link i in the frame of its predecessor."""
+        link = self.chain.links[i]
+        return link.offset + link.rotation[:, 2] * self._q[i] if link.prismatic else link.offset
+
     def _turn(self, i: int, v: SX) -> SX:
+        if self.chain.links[i].prismatic:
+            return v
         c, s = self._cos[i], self._sin[i]
         return ca.vertcat(c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
@@ -201,10 +105,15 @@ class Posture:
     def up(self, i: int, v: SX) -> SX:
         """A vector in the axes of the predecessor of link i, in the axes of link i."""
         w = self.chain.links[i].rotation.T @ v
+        if self.chain.links[i].prismatic:
+            return w
         c, s = self._cos[i], self._sin[i]
         return ca.vertcat(c * w[0] + s * w[1], c * w[1] - s * w[0], w[2])
 
     def _down_symmetric(self, i: int, matrix: SX) -> SX:
+        rotation = self.chain.links[i].rotation
+        if self.chain.links[i].prismatic:
+            return symmetric(rotation @ matrix @ rotation.T)
         c, s = self._cos[i], self._sin[i]
         xx, xy, yy = matrix[0, 0], matrix[0, 1], matrix[1, 1]
         cs, ss = c * s, s * s
@@ -217,8 +126,7 @@ class Posture:
             ca.horzcat(xy_new, yy - shift, yz),
             ca.horzcat(xz, yz, matrix[2, 2]),
         )
-        rotation = self.chain.links[i].rotation
-        return _symmetric(rotation @ turned @ rotation.T)
+        return symmetric(rotation @ turned @ rotation.T)
 
     def _down_matrix(self, i: int, matrix: SX) -> SX:
         columns = [self.down(i, matrix[:, k]) for k in range(3)]
@@ -232,23 +140,21 @@ class Posture:
         rotation = self.chain.flange_rotation
         position = self.chain.flange_offset
         for i in reversed(range(len(self.chain.links))):
-            position = self.chain.links[i].offset + self.down(i, position)
+            position = self._offset(i) + self.down(i, position)
             rotation = ca.horzcat(*[self.down(i, rotation[:, k]) for k in range(3)])
         return position, rotation
 
     def flange_quaternion(self) -> SX:
         """Rotation of the flange against the mount, a quaternion of any length."""
         quaternion = ca.SX([1, 0, 0, 0])
-        turns = [link.rotation for link in self.chain.links[1:]] + [self.chain.flange_rotation]
+        turns = [link.rotation for link in self.chain.links] + [self.chain.flange_rotation]
         for i, turn in enumerate(turns):
-            w, x, y, z = (quaternion[k] for k in range(4))
-            c, s = ca.cos(self._q[i] / 2), ca.sin(self._q[i] / 2)
-            w, x, y, z = w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s
-            # about x by alpha: the half angle's cosine and sine times 2 cos(alpha/2)
-            cos, sin = 1 + float(turn[1, 1]), float(turn[2, 1])
-            quaternion = ca.vertcat(
-                w * cos - x * sin, x * cos + w * sin, y * cos + z * sin, z * cos - y * sin
-            )
+            if i and not self.chain.links[i - 1].prismatic:
+                w, x, y, z = (quaternion[k] for k in range(4))
+                c, s = ca.cos(self._q[i - 1] / 2), ca.sin(self._q[i - 1] / 2)
+                quaternion = ca.vertcat(w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s)
+            if i or not _is_identity(turn):
+                quaternion = _turned(quaternion, turn)
         return quaternion
 
     def rates(self, qd: SX, base_rate: SX) -> list[SX]:
@@ -256,15 +162,18 @@ class Posture:
         w, result = base_rate, []
         for i in range(len(self.chain.links)):
             w = self.up(i, w)
-            w = ca.vertcat(w[0], w[1], w[2] + qd[i])
+            if not self.chain.links[i].prismatic:
+                w = ca.vertcat(w[0], w[1], w[2] + qd[i])
             result.append(w)
         return result
 
-    def velocities(self, rates: list[SX], base_velocity: SX, base_rate: SX) -> list[SX]:
+    def velocities(self, rates: list[SX], base_velocity: SX, base_rate: SX, qd: SX) -> list[SX]:
         """Velocities of the origins of the links in their own axes."""
         v, w, result = base_velocity, base_rate, []
         for i, link in enumerate(self.chain.links):
-            v = self.up(i, v + ca.cross(w, link.offset))
+            v = self.up(i, v + ca.cross(w, self._offset(i)))
+            if link.prismatic:
+                v = ca.vertcat(v[0], v[1], v[2] + qd[i])
             w = rates[i]
             result.append(v)
         return result
@@ -288,11 +197,11 @@ class Posture:
         whole, load = bare._composite()[0], self._load
         position, rotation = self.flange()
         h = rotation @ load.first_moment
-        J = _symmetric(rotation @ load.inertia @ rotation.T)
+        J = symmetric(rotation @ load.inertia @ rotation.T)
         return Body(
             whole.mass + load.mass,
             whole.first_moment + (h + load.mass * position),
-            whole.inertia + (J + _shifted(load.mass, h, position)),
+            whole.inertia + (J + shifted(load.mass, h, position)),
         )
 
     def _composite(self) -> list[Body]:
@@ -304,8 +213,9 @@ class Posture:
             m, h, J = m + link.mass, h + link.first_moment, J + link.inertia
             bodies.append(Body(m, h, J))
             h, J = self.down(i, h), self._down_symmetric(i, J)
-            J = J + _shifted(m, h, link.offset)
-            h = h + m * link.offset
+            offset = self._offset(i)
+            J = J + shifted(m, h, offset)
+            h = h + m * offset
         bodies.append(Body(m, h, J))
         return bodies[::-1]
 
@@ -344,10 +254,12 @@ class Posture:
         a, alpha, w = base_acceleration, base_angular_acceleration, base_rate
         wrenches = []
         for i, link in enumerate(self.chain.links):
-            m, h, J, r = link.mass, link.first_moment, link.inertia, link.offset
-            a = self.up(i, a + ca.cross(alpha, r) + _centripetal(w, r))
-            alpha, w = self.up(i, alpha) + _coriolis(rates[i], qd[i]), rates[i]
-            alpha = ca.vertcat(alpha[0], alpha[1], alpha[2] + qdd[i])
+            m, h, J, r = link.mass, link.first_moment, link.inertia, self._offset(i)
+            a, alpha, w = *self._carried(i, a, alpha, w, rates[i], qd[i], r), rates[i]
+            if link.prismatic:
+                a = ca.vertcat(a[0], a[1], a[2] + qdd[i])
+            else:
+                alpha = ca.vertcat(alpha[0], alpha[1], alpha[2] + qdd[i])
             F = m * a + ca.cross(alpha, h) + _centripetal(w, h)
             M = J @ alpha + ca.cross(h, a) + ca.cross(w, J @ w)
             wrenches.append((F, M))
@@ -355,10 +267,17 @@ class Posture:
         F, M = self._minus_load(load)
         for i in reversed(range(len(self.chain.links))):
             F, M = F + wrenches[i][0], M + wrenches[i][1]
-            tau.append(M[2])
+            tau.append(F[2] if self.chain.links[i].prismatic else M[2])
             F, M = self.down(i, F), self.down(i, M)
-            M = M + ca.cross(self.chain.links[i].offset, F)
+            M = M + ca.cross(self._offset(i), F)
         return ca.vertcat(*tau[::-1]), ca.vertcat(F, M)
+
+    def _carried(self, i: int, a: SX, alpha: SX, w: SX, w_own: SX, qd: SX, r: SX) -> tuple[SX, SX]:
+        """Acceleration of link i, in its axes, without that of its joint."""
+        a, alpha = self.up(i, a + ca.cross(alpha, r) + _centripetal(w, r)), self.up(i, alpha)
+        if self.chain.links[i].prismatic:
+            return a + 2 * _coriolis(w_own, qd), alpha
+        return a, alpha + _coriolis(w_own, qd)
 
     def _minus_load(self, load: SX | None) -> tuple[SX, SX]:
         if load is None:
@@ -374,12 +293,17 @@ class Posture:
         matrix = ca.SX.zeros(size, size)
         for i in range(size):
             h = bodies[i].first_moment
-            F, M = ca.vertcat(-h[1], h[0], 0), bodies[i].inertia[:, 2]
-            matrix[i, i] = M[2]
+            if self.chain.links[i].prismatic:
+                F, M = ca.vertcat(0, 0, bodies[i].mass), ca.vertcat(h[1], -h[0], 0)
+                matrix[i, i] = F[2]
+            else:
+                F, M = ca.vertcat(-h[1], h[0], 0), bodies[i].inertia[:, 2]
+                matrix[i, i] = M[2]
             for k in range(i, 0, -1):
                 F, M = self.down(k, F), self.down(k, M)
-                M = M + ca.cross(self.chain.links[k].offset, F)
-                matrix[k - 1, i] = matrix[i, k - 1] = M[2]
+                M = M + ca.cross(self._offset(k), F)
+                felt = F[2] if self.chain.links[k - 1].prismatic else M[2]
+                matrix[k - 1, i] = matrix[i, k - 1] = felt
         return matrix
 
     def forward_dynamics(
@@ -407,36 +331,21 @@ class Posture:
         links, rates = self.chain.links, self.rates(qd, base_rate)
         mass, cross, inertia = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
         F, M = self._minus_load(load)
-        joints: list[tuple[SX, SX, SX, SX]] = []
+        joints: list[_GivingJoint] = []
         for i in reversed(range(len(links))):
             link, w = links[i], rates[i]
-            m, h, J, r = link.mass, link.first_moment, link.inertia, link.offset
+            m, h, J, r = link.mass, link.first_moment, link.inertia, self._offset(i)
             mass = mass + m * ca.SX.eye(3)
             cross = cross - skew(h)
             inertia = inertia + J
             F = F + _centripetal(w, h)
             M = M + ca.cross(w, J @ w)
 
-            # the joint gives way: what remains is felt across it
-            u_force, u_moment = cross[:, 2], inertia[:, 2]
-            inverse = 1 / (u_moment[2] + rotor[i])
-            torque = tau[i] - M[2]
-            joints.append((u_force, u_moment, inverse, torque))
-            # these quotients first, so that numbers known at build time round as at run time
-            kept, by_force, by_moment = (
-                rotor[i] * inverse,
-                u_force * inverse,
-                u_moment[:2] * inverse,
+            joint = _give_way(
+                link.prismatic, mass, cross, inertia, F, M, w, qd[i], tau[i], rotor[i]
             )
-            mass = _symmetric(mass - by_force @ u_force.T)
-            cross = ca.horzcat(cross[:, :2] - by_force @ u_moment[:2].T, u_force * kept)
-            corner = _symmetric(inertia[:2, :2] - by_moment @ u_moment[:2].T)
-            edge = u_moment * kept
-            inertia = ca.vertcat(ca.horzcat(corner, edge[:2]), edge.T)
-            turning = _coriolis(w, qd[i])[:2]
-            F = F + by_force * torque + cross[:, :2] @ turning
-            passed = ca.vertcat(M[:2] + by_moment * torque, tau[i] - kept * torque)
-            M = passed + inertia[:, :2] @ turning
+            mass, cross, inertia, F, M = joint.passed
+            joints.append(joint)
 
             # to the frame of the predecessor
             w_p = rates[i - 1] if i else base_rate
@@ -446,24 +355,102 @@ class Posture:
             F = self.down(i, F) + mass @ centripetal
             M = self.down(i, M) + cross.T @ centripetal + ca.cross(r, F)
             shifted = cross - mass @ shift
-            inertia = _symmetric(inertia - cross.T @ shift + shift @ shifted)
+            inertia = symmetric(inertia - cross.T @ shift + shift @ shifted)
             cross = shifted
 
         joints.reverse()
         qdd = []
         a, alpha, w = base_acceleration, base_angular_acceleration, base_rate
-        for i, (u_force, u_moment, inverse, torque) in enumerate(joints):
-            r = links[i].offset
-            a = self.up(i, a + ca.cross(alpha, r) + _centripetal(w, r))
-            alpha, w = self.up(i, alpha) + _coriolis(rates[i], qd[i]), rates[i]
-            acceleration = inverse * (torque - ca.dot(u_force, a) - ca.dot(u_moment, alpha))
-            alpha = ca.vertcat(alpha[0], alpha[1], alpha[2] + acceleration)
+        for i, joint in enumerate(joints):
+            a, alpha = self._carried(i, a, alpha, w, rates[i], qd[i], self._offset(i))
+            w = rates[i]
+            acceleration = joint.inverse * (
+                joint.torque - ca.dot(joint.u_force, a) - ca.dot(joint.u_moment, alpha)
+            )
+            if links[i].prismatic:
+                a = ca.vertcat(a[0], a[1], a[2] + acceleration)
+            else:
+                alpha = ca.vertcat(alpha[0], alpha[1], alpha[2] + acceleration)
             qdd.append(acceleration)
         return ForwardDynamics(
             ca.vertcat(*qdd),
             ca.vertcat(ca.horzcat(mass, cross), ca.horzcat(cross.T, inertia)),
             ca.vertcat(F, M),
         )
+
+
+class _GivingJoint(NamedTuple):
+    """A joint that gives way: its column of the inertia, and what is felt across it.
+
+    `passed`: inertia (mass, cross, inertia) and bias (force, moment) in the axes of its link.
+    """
+
+    u_force: SX
+    u_moment: SX
+    inverse: SX
+    torque: SX
+    passed: tuple[SX, SX, SX, SX, SX]
+
+
+def _give_way(
+    prismatic: bool,
+    mass: SX,
+    cross: SX,
+    inertia: SX,
+    F: SX,
+    M: SX,
+    w: SX,
+    qd: SX,
+    tau: SX,
+    rotor: SX,
+) -> _GivingJoint:
+    """What is felt across a joint under a torque, from the inertia and bias beyond it."""
+    if prismatic:
+        u_force, u_moment = mass[:, 2], cross[2, :].T
+        inverse = 1 / (u_force[2] + rotor)
+        torque = tau - F[2]
+        kept, by_force, by_moment = rotor * inverse, u_force[:2] * inverse, u_moment * inverse
+        corner = symmetric(mass[:2, :2] - by_force @ u_force[:2].T)
+        edge = u_force * kept
+        mass = ca.vertcat(ca.horzcat(corner, edge[:2]), edge.T)
+        cross = ca.vertcat(cross[:2, :] - by_force @ u_moment.T, u_moment.T * kept)
+        inertia = symmetric(inertia - by_moment @ u_moment.T)
+        moving = 2 * _coriolis(w, qd)[:2]
+        F = ca.vertcat(F[:2] + by_force * torque, tau - kept * torque) + mass[:, :2] @ moving
+        M = M + by_moment * torque + cross[:2, :].T @ moving
+        return _GivingJoint(u_force, u_moment, inverse, torque, (mass, cross, inertia, F, M))
+    u_force, u_moment = cross[:, 2], inertia[:, 2]
+    inverse = 1 / (u_moment[2] + rotor)
+    torque = tau - M[2]
+    # these quotients first, so that numbers known at build time round as at run time
+    kept, by_force, by_moment = rotor * inverse, u_force * inverse, u_moment[:2] * inverse
+    mass = symmetric(mass - by_force @ u_force.T)
+    cross = ca.horzcat(cross[:, :2] - by_force @ u_moment[:2].T, u_force * kept)
+    corner = symmetric(inertia[:2, :2] - by_moment @ u_moment[:2].T)
+    edge = u_moment * kept
+    inertia = ca.vertcat(ca.horzcat(corner, edge[:2]), edge.T)
+    turning = _coriolis(w, qd)[:2]
+    F = F + by_force * torque + cross[:, :2] @ turning
+    passed = ca.vertcat(M[:2] + by_moment * torque, tau - kept * torque)
+    M = passed + inertia[:, :2] @ turning
+    return _GivingJoint(u_force, u_moment, inverse, torque, (mass, cross, inertia, F, M))
+
+
+def _is_identity(turn: SX) -> bool:
+    return bool(np.array_equal(np.array(ca.DM(turn)), np.eye(3)))
+
+
+def _turned(quaternion: SX, turn: SX) -> SX:
+    """A quaternion, then a fixed rotation; of any length."""
+    w, x, y, z = (quaternion[k] for k in range(4))
+    fixed = np.array(ca.DM(turn))
+    if fixed[0, 0] == 1.0:
+        # about x by alpha: the half angle's cosine and sine times 2 cos(alpha/2)
+        cos, sin = 1 + float(turn[1, 1]), float(turn[2, 1])
+        return ca.vertcat(
+            w * cos - x * sin, x * cos + w * sin, y * cos + z * sin, z * cos - y * sin
+        )
+    return product(quaternion, ca.SX(quaternion_of(fixed)))
 
 
 def _centripetal(w: SX, r: SX) -> SX:

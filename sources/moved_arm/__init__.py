@@ -1,4 +1,4 @@
-"""Six-joint arm whose motion is given: joint angles, speeds and accelerations in, currents out."""
+"""Arm whose motion is given: joint angles, speeds and accelerations in, currents out."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ JOINT = Port("joint", TAU, QD, "gives_effort", +1, "what the motors put into the
 
 COMPONENT = Component(
     "moved_arm",
-    "Six-joint arm on a fixed base that is moved as given.",
+    "Serial arm on a fixed base that is moved as given.",
     ports=(JOINT,),
     device="ur10e",
     source="Mamedov, Mikhel, Practical aspects of model-based collision detection, Frontiers in "

@@ -21,15 +21,23 @@ import casadi as ca
 
 from .. import moved_arm as qs
 from ..component import Fidelity, Solver
-from ..laws.rigid_chain import Chain, Posture, standard_dh
+from ..laws.chain import Chain, standard_dh
+from ..laws.joints import Joints
+from ..laws.rigid_chain import Posture
 from ..model import SX, Model
+from ..serial_arm.links import chain as base_chain
 
 # No states of its own; bristles that stick within 0.1 mrad need short steps.
 FIDELITY = Fidelity(level=0, solver=Solver("rodas3", 1e-4))
 
 
 def chain(m: Model) -> Chain:
-    """The device's geometry and masses with the parameters' moments and inertias."""
+    """The device's links, with what can be told of them as parameters.
+
+    Base parameters; where the device gives DH data, all first moments and inertias.
+    """
+    if "alpha" not in m.values:
+        return base_chain(m)
     mass = m.constant("mass")
     nothing = [[0.0] * 3] * 6, [[0.0] * 6] * 6
     bare = standard_dh(m.constant("d"), m.constant("a"), m.constant("alpha"), mass, *nothing)
@@ -48,11 +56,18 @@ def chain(m: Model) -> Chain:
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    u = m.inputs(qs.Q, qs.QD, qs.QDD)
+    joints = Joints.of_device(m)
+    u = m.inputs(*(joints.sized(each) for each in (qs.Q, qs.QD, qs.QDD)))
     m.input_rate(u.q, u.qd)
     m.input_rate(u.qd, u.qdd)
     posture, zero = Posture(chain(m), u.q), ca.SX.zeros(3)
-    p = m.parameters(qs.GRAVITY, qs.J_M, qs.F_C, qs.W_0, qs.F_0, qs.F_V, qs.GAIN)
+    p = m.parameters(
+        qs.GRAVITY,
+        joints.sized(qs.J_M),
+        joints.sized(qs.F_C),
+        qs.W_0,
+        *(joints.sized(each) for each in (qs.F_0, qs.F_V, qs.GAIN)),
+    )
     moving, _ = posture.inverse_dynamics(
         u.qd,
         u.qdd,
@@ -63,21 +78,13 @@ def equations(m: Model) -> None:
     dry = p.F_c * ca.tanh(u.qd / p.w_0) + p.F_0
     friction = p.F_v * u.qd + dry
     load: SX = moving + p.J_m * u.qdd
-    effects = m.balance("joint", "rotation", velocity=u.qd, angle=u.q, load=load).effort
-    effects += ca.vertcat(
-        *[
-            m.balance(
-                f"joint_{k + 1}", "rotation", velocity=u.qd[k], angle=u.q[k], load=load[k]
-            ).effort
-            for k in range(6)
-        ]
-    )
+    effects = joints.efforts(m, speed=u.qd, angle=u.q, load=load)
     torque = load + friction - effects
-    m.output(qs.TAU, torque)
-    m.output(qs.I, torque / p.K)
-    m.port(qs.JOINT, torque, u.qd)
+    m.output(joints.sized(qs.TAU), torque)
+    m.output(joints.sized(qs.I), torque / p.K)
+    m.port(joints.port(qs.JOINT), torque, u.qd)
     rates = posture.rates(u.qd, zero)
-    velocities = posture.velocities(rates, zero, zero)
+    velocities = posture.velocities(rates, zero, zero, u.qd)
     height = posture.mass_properties().first_moment[2]
     kinetic = posture.kinetic_energy(rates, velocities)
     m.stored_energy(kinetic + p.gravity * height + ca.dot(p.J_m, u.qd**2) / 2)

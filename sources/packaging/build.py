@@ -20,14 +20,15 @@ import casadi as ca
 
 from cosim import spec
 from cosim.errors import listing
-from cosim.spec import hints
+from cosim.spec import devices, hints
+from cosim.spec.archive import pack
 from cosim.spec.variant import Name
 
 from ..function import Functions, build_functions
 from ..model import Model, ModelError
+from ..scene import model_scene
 from ..variant import build_model, fidelities, parse_name
 from . import description, native, python, rights
-from .archive import pack
 from .cache import cache_folder, write_atomically
 from .layout import Entry, layout
 
@@ -118,6 +119,9 @@ def component_json(variant: Variant) -> bytes:
         content["left_out"] = [
             {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
         ]
+    looks = model_scene(model, {entry.name for entry in variant.entries})
+    if looks:
+        content["scene"] = looks
     return (json.dumps(content, indent=2) + "\n").encode()
 
 
@@ -251,7 +255,29 @@ def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
 def _stamp(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
     """A file that holds the hash of the FMU built from these very sources."""
     key = f"{sources_key()} {name} {fmi} {kind} {_platforms(platform)}"
+    own = devices.find(name.component, name.device)
+    if own is not None:
+        key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
     return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
+
+
+def ready(
+    name: str, *, out: Path, fmi: int = 2, kind: Kind = "native", platform: str = "host"
+) -> Path | None:
+    """Path of the FMU of a variant if it is there and up to date, else None; arguments as `build`.
+
+    Raises:
+        UnknownVariantError: the name does not follow the grammar.
+    """
+    parsed = parse_name(name)
+    path = target_path(parsed, out, fmi, kind)
+    if path.exists():
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        for served in dict.fromkeys((platform, "all")):  # an FMU for all platforms serves the host
+            stamp = _stamp(parsed, fmi, kind, served)
+            if stamp.exists() and stamp.read_text() == digest:
+                return path
+    return None
 
 
 def build(
@@ -274,13 +300,10 @@ def build(
     if kind == "python" and fmi != 2:
         raise ValueError("python FMUs are FMI 2.0 (pythonfmu writes no other version)")
     parsed = parse_name(name)
+    done = ready(name, out=out, fmi=fmi, kind=kind, platform=platform)
+    if done is not None:
+        return done
     path = target_path(parsed, out, fmi, kind)
-    if path.exists():
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        for served in dict.fromkeys((platform, "all")):  # an FMU for all platforms serves the host
-            stamp = _stamp(parsed, fmi, kind, served)
-            if stamp.exists() and stamp.read_text() == digest:
-                return path
     content = _packed(name, fmi, kind, platform)
     write_atomically(path, content)
     stamp = _stamp(parsed, fmi, kind, platform)

@@ -6,10 +6,21 @@ import inspect
 from functools import lru_cache
 from typing import Any
 
+from cosim.spec import devices as own_devices
+
 from ..component import Fidelity
+from ..laws.base_parameters import find, standard_parameters
 from ..model import Model, misfit
 from ..quantity import Quantity
-from ..variant import build_model, components, devices, effects, fidelities, parse_name
+from ..variant import (
+    build_model,
+    components,
+    device_values,
+    devices,
+    effects,
+    fidelities,
+    parse_name,
+)
 
 
 @lru_cache(maxsize=None)
@@ -23,7 +34,8 @@ def names(component: str = "") -> tuple[str, ...]:
 
     Every fidelity of every component, for the other devices too where their values are baked into
     the code (elsewhere they only change start values); and every effect once per component, on the
-    highest fidelity that has a balance for it. Any other combination can be built by its name.
+    highest fidelity that has a balance for it (not where a component is `like` another). Any other
+    combination can be built by its name.
     """
     if not component:
         return tuple(name for each in components() for name in names(each))
@@ -31,14 +43,15 @@ def names(component: str = "") -> tuple[str, ...]:
     declared = components()[component]
     models = _plain(component)
     found += [f"{component}/{fidelity}" for fidelity in models]
+    own = own_devices.own(component)
     for device in devices(component):
-        if device != declared.device:
+        if device != declared.device and device not in own:
             found += [
                 f"{component}.{device}/{fidelity}"
                 for fidelity, model in models.items()
                 if model.baked
             ]
-    for effect, module in effects().items():
+    for effect, module in effects().items() if not declared.like else ():
         fitting = [
             fidelity
             for fidelity, model in models.items()
@@ -170,3 +183,18 @@ def describe(name: str) -> dict[str, Any]:
         "states": listed("state") + listed("discrete"),
         "description": summary,
     }
+
+
+def base_parameters(device: str) -> list[dict[str, Any]]:
+    """Name, value, unit and formula of the base parameters of an arm, a device of `serial_arm`.
+
+    Raises:
+        UnknownVariantError: no such device.
+    """
+    values = {key: item.value for key, item in device_values("serial_arm", device).items()}
+    standard = standard_parameters(values["mass"], values["centre"], values["inertia"])
+    return [
+        {"name": each.name, "value": each.value(standard), "unit": each.unit,
+         "formula": each.formula()}
+        for each in find(values["rotation"], values["offset"], values["prismatic"])
+    ]  # fmt: skip

@@ -6,6 +6,8 @@ import importlib.metadata
 from functools import lru_cache
 from pathlib import Path
 
+from cosim.spec import distribution
+
 LICENSE = Path(__file__).parents[2] / "LICENSE"
 """The licence's text, beside `sources/` in a checkout and in an installed library."""
 SPDX = "BSD-3-Clause"
@@ -17,14 +19,10 @@ _FOLDER = "documentation/licenses"
 def attributes() -> dict[str, str]:
     """Of `fmiModelDescription`, the same in FMI 2 and 3.
 
-    The tool's version is left out where the package runs without being installed. No date: the same
-    sources give the same bytes.
+    No date: the same sources give the same bytes.
     """
     line = next(x for x in LICENSE.read_text(encoding="utf-8").splitlines() if "(c)" in x)
-    try:
-        version = importlib.metadata.version("cosim")
-    except importlib.metadata.PackageNotFoundError:
-        version = ""
+    version = distribution.version()
     found = {
         "author": line.split(", ", 1)[1],
         "version": version,

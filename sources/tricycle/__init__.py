@@ -21,7 +21,7 @@ RATIO = Quantity("ratio", "1", "steering angle of the wheel over that of its enc
 
 COMPONENT = Component(
     "tricycle",
-    "Tricycle on a floor, driven by the angle and the speed of its front wheel.",
+    "Tricycle on a floor, driven by the angle of its front wheel and the speed of a driven one.",
     device="sapienza",
     source="e.g. Siciliano et al., Robotics, 2009, ch. 11",
     energy=False,

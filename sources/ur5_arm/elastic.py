@@ -15,85 +15,10 @@ Source: Spong, J. Dyn. Sys. Meas. Control 109, 1987, 310-319.
 
 from __future__ import annotations
 
-import casadi as ca
-
-from .. import ur5_arm as qs
 from ..component import Fidelity, Solver
-from ..model import Model
-from ..quantity import Quantity
-from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+from ..serial_arm.elastic import equations
+
+__all__ = ["FIDELITY", "equations"]
 
 # The last link on its gear swings at 1 kHz, sqrt(K/J) = 6e3 1/s; RK4 is stable up to 2.8e4 1/s.
 FIDELITY = Fidelity(level=5, solver=Solver("rk4", 1e-4))
-K = Quantity(
-    "K",
-    "N.m/rad",
-    "torsional stiffness of the gears",
-    start=(3.1e4, 3.1e4, 3.1e4, 4.7e3, 4.7e3, 4.7e3),
-    minimum=0.0,
-    nominal=1e4,
-    size=6,
-)
-D = Quantity(
-    "D",
-    "N.m.s/rad",
-    "damping of the gears' twist",
-    start=(15.0, 15.0, 15.0, 0.5, 0.5, 0.5),
-    minimum=0.0,
-    nominal=10.0,
-    size=6,
-)
-J_HUB = Quantity(
-    "J_hub",
-    "kg.m2",
-    "inertia of each gear on the motor's side of its spring, seen at the joint",
-    start=1e-3,
-    minimum=1e-9,
-    nominal=1e-3,
-)
-J_OUT = Quantity(
-    "J_out",
-    "kg.m2",
-    "inertia of each gear's output beyond that of the links",
-    minimum=0.0,
-    nominal=1e-3,
-)
-TWIST = Quantity(
-    "twist", "rad", "state: twist of the gears, motor's side less link", nominal=1e-3, size=6
-)
-TWIST_RATE = Quantity("twist_rate", "rad/s", "state: rate of the twist", nominal=0.1, size=6)
-Q_LINK = Quantity("q_link", "rad", "angles of the links behind the gears", size=6)
-QD_LINK = Quantity("qd_link", "rad/s", "speeds of the links behind the gears", size=6)
-
-
-def equations(m: Model) -> None:
-    """Collect the equations."""
-    mount = at_rest(read_mount(m))
-    u = m.inputs(qs.TAU, qs.J_ADDED)
-    p = m.parameters(K, D, J_HUB)
-    x = m.states(qs.ANGLE, qs.SPEED, TWIST, TWIST_RATE)
-    theta, thetad = x.angle, x.speed
-    q, qd = theta - x.twist, thetad - x.twist_rate
-    hub = u.J_added + p.J_hub
-    driving = u.tau + joint_efforts(m, thetad, theta, u.tau)
-    gear = m.balance(
-        "gear", "compliance", deflection=x.twist, rate=x.twist_rate, stiffness=p.K, damping=p.D
-    )
-    through = p.K * x.twist + p.D * x.twist_rate - gear.effort
-    arm = links(m, mount, q, qd)
-    output = m.parameter(J_OUT) * ca.SX.ones(6)
-    dynamics = arm.accelerate(through, output)
-    acceleration = (driving - through) / hub
-    m.derivative(theta, thetad)
-    m.derivative(x.twist, x.twist_rate)
-    m.derivative(thetad, acceleration)
-    m.derivative(x.twist_rate, acceleration - dynamics.acceleration)
-    output_motion(m, mount, theta, thetad, arm.posture, u.tau)
-    m.output(Q_LINK, q)
-    m.output(QD_LINK, qd)
-    locked = arm.posture.mass_properties().matrix()
-    output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
-    kinetic, potential = arm.energy()
-    m.stored_energy(kinetic + potential + ca.dot(output, qd**2) / 2)
-    m.stored_energy(ca.dot(hub, thetad**2) / 2 + ca.dot(p.K, x.twist**2) / 2)
-    m.loss("gears", ca.dot(p.D, x.twist_rate**2))

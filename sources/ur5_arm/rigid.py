@@ -14,29 +14,9 @@ Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 7.
 
 from __future__ import annotations
 
-import casadi as ca
-
-from .. import ur5_arm as qs
 from ..component import Fidelity, Solver
-from ..model import Model
-from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+from ..serial_arm.rigid import equations
+
+__all__ = ["FIDELITY", "equations"]
 
 FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-3))
-
-
-def equations(m: Model) -> None:
-    """Collect the equations."""
-    mount = at_rest(read_mount(m))
-    u = m.inputs(qs.TAU, qs.J_ADDED)
-    x = m.states(qs.ANGLE, qs.SPEED)
-    q, qd = x.angle, x.speed
-    torque = u.tau + joint_efforts(m, qd, q, u.tau)
-    arm = links(m, mount, q, qd)
-    dynamics = arm.accelerate(torque, u.J_added)
-    m.derivative(q, qd)
-    m.derivative(qd, dynamics.acceleration)
-    output_motion(m, mount, q, qd, arm.posture, u.tau)
-    locked = arm.posture.mass_properties().matrix()
-    output_wrench(m, mount, locked, dynamics.bias, dynamics.bias)
-    kinetic, potential = arm.energy()
-    m.stored_energy(kinetic + potential + ca.dot(u.J_added, qd**2) / 2)

@@ -24,7 +24,14 @@ from .. import ur5_arm as qs
 from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+from ..serial_arm.links import (
+    at_rest,
+    joint_efforts,
+    links,
+    output_motion,
+    output_wrench,
+    read_mount,
+)
 
 FIDELITY = Fidelity(level=2, solver=Solver("rk4", 1e-3))
 T = Quantity("T", "s", "period of the ticks", start=5e-4, minimum=1e-6, variability="fixed")

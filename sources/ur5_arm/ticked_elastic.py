@@ -31,7 +31,14 @@ from .. import ur5_arm as qs
 from ..component import Fidelity, Solver
 from ..model import Model
 from ..quantity import Quantity
-from .links import at_rest, joint_efforts, links, output_motion, output_wrench, read_mount
+from ..serial_arm.links import (
+    at_rest,
+    joint_efforts,
+    links,
+    output_motion,
+    output_wrench,
+    read_mount,
+)
 from .ticked import HELD_ACCELERATION, HELD_SPEED, T
 
 COMPLIANCES = tuple(3e-5 * 1.5**k for k in range(12))

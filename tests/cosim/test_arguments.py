@@ -102,3 +102,28 @@ def test_right_kinds_pass(system) -> None:
     master = Master(system, "jacobi", np.float64(1e-3))
     inputs = {"load.tau": lambda t: 0.0 * t}
     assert master.run(1, inputs=inputs, record=("load.w",), every=np.int64(10)).time.size == 101
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((3,), r'scenario to open must be a text, not 3 .*cosim\.open\("motor_bench/ST1"\)'),
+        (("motor_bench/ST1", {"variants": "lossy"}), "variants of a twin must be a table"),
+        (("motor_bench/ST1", {"parameters": [1]}), "parameters of a twin must be a table"),
+        (("motor_bench/ST1", {"duration": "1"}), "duration of a twin must be a number, not '1'"),
+        (("motor_bench/ST1", {"step": True}), "step of a twin must be a number, not True"),
+    ],
+)
+def test_open(arguments, text) -> None:
+    name, how = (*arguments, {})[:2]
+    with pytest.raises(InputError, match=text):
+        cosim.open(name, **how)
+
+
+def test_twin(system) -> None:
+    text = r"master of a Twin must be a Master, not 'x'.*cosim\.open"
+    with pytest.raises(InputError, match=text):
+        cosim.Twin("x")  # type: ignore[arg-type]
+    text = "duration of a step must be a number, not '1'"
+    with cosim.Twin(Master(system)) as twin, pytest.raises(InputError, match=text):
+        twin.step("1")  # type: ignore[arg-type]

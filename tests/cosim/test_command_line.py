@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from cosim.cli import app as cli
+from cosim.spec.distribution import version
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
 
@@ -81,7 +82,6 @@ def test_fmus_build_and_check(command: Command, tmp_path: Path) -> None:
     done = command("fmus", "build", "gearbox/ratio", "--out", tmp_path / "f", "--json")
     (built,) = json.loads(done.out)["built"]
     assert done.code == 0 and Path(built["file"]).is_file()
-    assert "1/1 gearbox/ratio: " in done.err
     done = command("fmus", "check", built["file"], "--json")
     assert done.code == 0
     assert json.loads(done.out) == {
@@ -113,8 +113,27 @@ def test_fmus_check_finds_problems(command: Command, tmp_path: Path) -> None:
 
 def test_scenarios_json(command: Command) -> None:
     entries = json.loads(command("scenarios", "--json").out)
-    bench = next(entry for entry in entries if entry["scenario"] == "motor_bench")
-    assert bench["system"] == "motor_bench" and bench["runs"]
+    bench = next(entry for entry in entries if entry["name"] == "motor_bench")
+    assert bench["kind"] == "scenario" and bench["system"] == "motor_bench" and bench["runs"]
+    kinds = {entry["kind"] for entry in entries}
+    assert kinds == {"scenario", "logs", "study", "public logs"}
+    for entry in entries:
+        assert entry["description"], entry
+        if entry["kind"] == "public logs":
+            assert entry["origin"] and Path(entry["readme"]).is_file()
+
+
+def test_scenarios_says_how_each_kind_is_run(command: Command) -> None:
+    text = " ".join(command("scenarios").out.split())
+    for words in ("cosim run NAME", "cosim diagnose NAME", "cosim study NAME", "--mapping NAME"):
+        assert words in text
+    for name in ("motor_bench", "MB-13", "tolerances", "emps/open_loop", "crawler_bench"):
+        assert f"│ {name} " in text
+
+
+def test_version_is_that_of_the_distribution(command: Command) -> None:
+    done = command("--version")
+    assert done.code == 0 and done.out == f"cosim {version()} (cosim-robotics)\n"
 
 
 def test_run_json(command: Command, tmp_path: Path) -> None:
@@ -181,7 +200,8 @@ RUN = ["run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.1", "--out",
         (["fmus", "build", "gearbox/rubber", "--out", "results"], "called 'rubber'"),
         (["fmus", "build", "gearbox/ratio", "--out", "cut.fmu"], "choose another folder"),
         (["linearize", "motor_bench/ST1", "--out", "cut.fmu/x"], "choose another folder"),
-        (["fmus", "build", "gearbox_", "--out", "results"], "'gearbox_' is not a variant name"),
+        (["fmus", "build", "gearbox_", "--out", "results"],
+         "no component 'gearbox_'; did you mean 'gearbox'"),
         (["fmus", "build", "gearbox/ratio", "--kind", "python", "--fmi", "3", "--out", "results"],
          "python FMUs are FMI 2.0 only"),
         (["fmus", "check", "lost.fmu"], "lost.fmu: there is no such file"),

@@ -167,12 +167,6 @@ def test_matlab_sizes_that_do_not_fit(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "more than the limit of 1 MB" in text and "COSIM_MAX_DATA" in text
 
 
-def test_matlab_7_3(tmp_path: Path) -> None:
-    path = tmp_path / "x.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n")
-    assert refused(read_log, path).endswith("is a MATLAB file of version 7.3; save it with -v7")
-
-
 # -- Parquet and recordings ------------------------------------------------------------------------
 
 

@@ -114,12 +114,18 @@ def test_a_session_ends_where_the_fmu_asks(every: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("executor", ["python", "auto"])
-def test_an_end_inside_a_step(executor: str, fmi: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("executor", ["python", "auto", ISOLATED])
+@pytest.mark.parametrize(("every", "times"), [(1, [0, 1, 2, 3, 4]), (2, [0, 2, 4]), (3, [0, 3, 4])])
+def test_an_end_inside_a_step_keeps_the_last_values_of_all(
+    every: int, times: list[int], executor: str, fmi: int, tmp_path: Path
+) -> None:
     status = 2 if fmi == 2 else 0
     path = tiny(tmp_path, CLOCK, TIME, EARLY.replace("END_STATUS", str(status)), fmi=fmi)
-    recording = run(alone(path), executor=executor)
-    assert recording.time == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], rel=1e-15)
+    how = {"isolate": 30.0} if executor == "isolated" else {"executor": executor}
+    recording = run(alone(path, 2), every=every, **how)
+    assert recording.time == pytest.approx(0.1 * np.array(times), rel=1e-15)
+    for name in ("a.y", "b.y"):  # one of the two has gone on
+        assert recording[name] == pytest.approx(recording.time, rel=1e-15)
     assert "asked to end the simulation at t = 0.45 s" in recording.notes[0]
 
 

@@ -10,6 +10,9 @@ import pytest
 
 from cosim import Constant, Master, Recording, System, Table, read_recording
 from cosim.errors import CosimError, GraphError, StepError, ValueRangeError
+from cosim.master import kernel
+from sources.packaging.build import host_platform
+from sources.packaging.kernel import build_kernel
 from tests.tiny_fmus import V, tiny
 
 BIG = 2**63 - 1
@@ -168,6 +171,58 @@ def test_a_real_number_becomes_an_integer_within_rounding_only(
     assert "setting u from a.y: 0.4 is no whole number, and type Int32 carries nothing else" in (
         str(caught.value)
     )
+
+
+@pytest.mark.parametrize("executor", ["python", "c"])
+@pytest.mark.parametrize("type_", ["Int32", "UInt32"])
+def test_integers_go_into_a_short_float_exactly_or_not_at_all(
+    executor: str, type_: str, tmp_path: Path
+) -> None:
+    if executor == "c":
+        build_kernel(kernel.SOURCES, kernel.cache_folder() / kernel.library_name(), host_platform())
+    system = pair(tmp_path, type_, "Float32")
+    most = 2**24
+    assert short(system, inputs={"a.u": most}, executor=executor)["b.y"].tolist() == [most] * 5
+    with pytest.raises(CosimError) as caught:
+        short(
+            system,
+            inputs={"a.u": Table([0.0, 0.1], [most, most + 1], extend=True)},
+            executor=executor,
+        )
+    text = "setting u from a.y: 16777217 is an integer that type Float32 does not carry exactly"
+    assert text in str(caught.value)
+    # a number with a unit or a fraction is rounded as ever
+    system = System("scaled")
+    system.add("a", str(tmp_path / "source.fmu"))
+    system.add("b", str(tmp_path / "target.fmu"))
+    system.connect("a.y", "b.u", factor=0.1)
+    found = short(system, inputs={"a.u": most + 1}, executor=executor)
+    assert found["b.y"].tolist() == [float(np.float32(0.1 * (most + 1)))] * 5
+
+
+def test_an_integer_that_a_short_float_does_not_carry_is_no_parameter(tmp_path: Path) -> None:
+    fmu = passing(tmp_path, "Float32")
+    with pytest.raises(ValueRangeError, match="u: 16777217 is an integer that type Float32 does"):
+        alone(fmu, {"u": 2**24 + 1})
+    alone(fmu, {"u": 2**24 + 2})
+    alone(fmu, {"u": 2.0**24 + 1.0})  # measured to 24 bits
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_truth_value_counts_as_a_number_without_a_unit(fmi: int, tmp_path: Path) -> None:
+    on = Table([0.0, 0.1], [True, False], extend=True)
+    for type_ in ("Float64", "Int32"):
+        system = pair(tmp_path, "Boolean", type_, fmi)
+        assert shown(short(system, inputs={"a.u": on})["b.y"]) == [1.0, 0.0]
+    with pytest.raises(CosimError, match=r"Boolean2? do not fit: a number is neither true nor"):
+        pair(tmp_path, "Float64", "Boolean", fmi)
+    kelvin = V("u", "Float64", "input", "0", inner='unit="K"')
+    warm = tiny(tmp_path, [kelvin], fmi=fmi, definitions=DEGREES, name="warm")
+    system = System("warm")
+    system.add("a", str(passing(tmp_path, "Boolean", fmi, "source")))
+    system.add("b", str(warm))
+    with pytest.raises(CosimError, match=r"do not fit: true is 1, and not 1 K; convert it"):
+        system.connect("a.y", "b.u")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

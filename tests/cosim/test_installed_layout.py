@@ -11,57 +11,177 @@ from pathlib import Path
 
 import pytest
 
+from cosim.errors import CosimError, VariantError
+from cosim.installation.library import Library
+from distribution.make import make, write_pack
 from tests.fmus import fmu
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 RUN = ["run", "motor_bench/ST1", "--step", "1e-3", "--duration", "0.05", "--json"]
+PLAIN = ["dc_motor.lab_bench/sampled", "gearbox.lab_bench/ratio", "inertia.lab_bench/disc",
+         "encoder.motor_bench/counts", "gearbox/ratio"]  # fmt: skip
+MAPPING = ROOT / "scenarios" / "robotino_omni" / "dataset.toml"
+"""Its system has few candidates."""
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder as the wheel fills it."""
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a small wheel carries."""
+    folder = tmp_path_factory.mktemp("made")
+    make(folder, mappings=[MAPPING], plain=PLAIN)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as a wheel without FMUs fills it."""
     folder = tmp_path_factory.mktemp("site")
     ignored = shutil.ignore_patterns("__pycache__", "*.fmu")
     shutil.copytree(ROOT / "cosim", folder / "cosim", ignore=ignored)
     for name in ("sources", "scenarios"):
         shutil.copytree(ROOT / name, folder / "cosim_library" / name, ignore=ignored)
     shutil.copy(ROOT / "LICENSE", folder / "cosim_library")
-    (folder / "cosim_library" / "fmus" / "fmi2").mkdir(parents=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(bare: Path, made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with FMUs."""
+    folder = tmp_path_factory.mktemp("full") / "site"
+    shutil.copytree(bare, folder)
+    shutil.copytree(made / "kernel", folder / "cosim" / "master" / "kernel" / "lib")
+    for name in ("fmus", "packs"):
+        shutil.copytree(made / name, folder / "cosim_library" / name)
+    shutil.copy(made / "catalogue.json", folder / "cosim_library")
     return folder
 
 
 def call(site: Path, work: Path, *arguments: str, blocked: str = "") -> tuple[int, str, str]:
-    program = "import sys\n"
+    program = f"import sys\nsys.path.insert(0, {str(site)!r})\n"
     if blocked:
         program += f"sys.modules[{blocked!r}] = None\n"
     program += f"sys.argv = ['cosim', *{list(arguments)!r}]\nfrom cosim.cli import main\nmain()\n"
+    cache = {"COSIM_CACHE": str(work / "cache")} if blocked else {}
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=work, capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": str(site)},
+        env={**os.environ, **cache},
     )  # fmt: skip
     return done.returncode, done.stdout, done.stderr
 
 
-def test_runs_from_any_folder_and_builds_what_is_missing(site: Path, tmp_path: Path) -> None:
-    code, out, err = call(site, tmp_path, *RUN)
+def test_a_wheel_without_fmus_builds_what_is_missing(bare: Path, tmp_path: Path) -> None:
+    code, out, err = call(bare, tmp_path, *RUN)
     assert code == 0, err
     assert json.loads(out)["scenario"] == "motor_bench/ST1"
     assert (tmp_path / "out" / "motor_bench" / "ST1" / "result.json").is_file()
-    assert not (site / "sources").exists()
-
-
-def test_without_casadi_only_ready_fmus_run(site: Path, tmp_path: Path) -> None:
-    code, out, err = call(site, tmp_path, *RUN, blocked="casadi")
+    assert not (bare / "sources").exists()
+    code, out, err = call(bare, tmp_path, *RUN, blocked="casadi")
     assert code == 2 and out == ""
-    assert "building FMUs needs casadi, which is not installed" in err
-    for name in ("dc_motor.lab_bench/sampled", "gearbox.lab_bench/ratio", "inertia.lab_bench/disc",
-                 "encoder.motor_bench/counts"):  # fmt: skip
-        shutil.copy(fmu(name), site / "cosim_library" / "fmus" / "fmi2")
+    assert "building FMUs needs casadi, which is not installed: pip install 'cosim-rob" in err
+
+
+def test_its_fmus_run_without_casadi_by_the_compiled_executor(site: Path, tmp_path: Path) -> None:
+    files = sorted(path for path in site.rglob("*") if path.suffix != ".pyc")
     code, out, err = call(site, tmp_path, *RUN, blocked="casadi")
     assert code == 0, err
     assert json.loads(out)["fmu_steps"] == 200
+    recording = tmp_path / "out" / "motor_bench" / "ST1" / "ST1" / "recording.parquet"
+    assert recording.is_file() or list(tmp_path.rglob("recording.parquet"))
+    assert (site / "cosim" / "master" / "kernel" / "lib").is_dir()
+    assert not (tmp_path / "cache" / "kernel").exists()
+    assert sorted(path for path in site.rglob("*") if path.suffix != ".pyc") == files
+
+
+def test_its_catalogue_is_listed_and_copied_without_casadi(site: Path, tmp_path: Path) -> None:
     code, out, err = call(site, tmp_path, "fmus", "list", "--json", blocked="casadi")
     assert code == 0, err
-    assert "inertia.lab_bench/disc" in {entry["variant"] for entry in json.loads(out)}
+    listed = {entry["variant"]: entry for entry in json.loads(out)}
+    assert set(PLAIN) < set(listed)
+    assert "tau_a" in {item["name"] for item in listed["gearbox.lab_bench/ratio"]["inputs"]}
+    built = ["fmus", "build", "gearbox.lab_bench/ratio", "--fmi", "3", "--out", "copied"]
+    code, out, err = call(site, tmp_path, *built, blocked="casadi")
+    assert code == 0, err
+    copied = tmp_path / "copied" / "fmi3" / "gearbox.lab_bench-ratio.fmu"
+    assert copied.read_bytes() == fmu("gearbox.lab_bench/ratio", fmi=3).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("gearbox=lossy", "gearbox.lab_bench/lossy is not among the FMUs of this installation, "
+         "and building FMUs needs casadi, which is not installed: pip install 'cosim-robotics[b"),
+        ("gearbox=losy", "no fidelity of 'gearbox' called 'losy'; did you mean 'lossy'"),
+        ("load=+coulom", "no effect 'coulom'; did you mean 'coulomb'"),
+        ("gearbox=gearbox.lab_bensh/ratio", "no device 'lab_bensh'; did you mean 'lab_bench'"),
+        ("gearbox=gearbx/ratio", "no component 'gearbx'; did you mean 'gearbox'"),
+    ],
+)  # fmt: skip
+def test_what_it_lacks_is_one_sentence_with_the_way_out(
+    site: Path, tmp_path: Path, change: str, said: str
+) -> None:
+    code, out, err = call(site, tmp_path, *RUN, "--set", change, blocked="casadi")
+    assert (code, out) == (2, "") and said in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_packed_fmus_are_those_that_are_built(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COSIM_CACHE", str(tmp_path))
+    library = Library(made)
+    (base,) = {n for n in library.names() if n.startswith("omni_wheels")}
+    effects = library.candidates(base)
+    assert effects
+    names = [f"{base}+{effect}@{port}" for effect, port, _ in effects]
+    found = [library.find(name) for name in names]
+    assert all(path is not None and path.is_relative_to(tmp_path) for path in found)
+    monkeypatch.undo()
+    assert found[0] is not None and found[0].read_bytes() == fmu(names[0]).read_bytes()
+    assert all(library.has(name) for name in names)
+    assert not library.has(names[0] + "+noise") and library.find(names[0] + "+noise") is None
+    assert library.near(names[0].rpartition("@")[0]) == [
+        n for n in names if n.startswith(names[0].rpartition("@")[0] + "@")
+    ]
+
+
+def test_what_does_not_fit_is_known(made: Path, tmp_path: Path) -> None:
+    content = json.loads((made / "catalogue.json").read_text())
+    content["impossible"] = ["gearbox-ratio+backlash@x"]
+    (tmp_path / "catalogue.json").write_text(json.dumps(content))
+    library = Library(tmp_path)
+    assert library.has("gearbox/ratio+backlash@x")
+    with pytest.raises(VariantError, match="its effects do not fit"):
+        library.find("gearbox/ratio+backlash@x")
+
+
+def test_damage_is_seen(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COSIM_CACHE", str(tmp_path / "cache"))
+    folder = tmp_path / "library"
+    shutil.copytree(made, folder)
+    library = Library(folder)
+    pack, keys = next((k, v) for k, v in library.content["packs"].items() if v[0][0] == "2")
+    variant = keys[0].removeprefix("2/").replace("-", "/", 1)
+    path = library.find(variant)
+    assert path is not None
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-9])
+    assert library.find(variant) == path and path.read_bytes() == whole  # unpacked again
+    path.unlink()
+    content = (folder / "packs" / pack).read_bytes()
+    (folder / "packs" / pack).write_bytes(content[: len(content) // 2])
+    with pytest.raises(CosimError, match=r"\.tar\.xz: is damaged .*; reinstall"):
+        Library(folder).find(variant)
+    (folder / "catalogue.json").write_text("{")
+    with pytest.raises(CosimError, match=r"catalogue\.json: is damaged"):
+        Library(folder).find("gearbox/none")
+
+
+def test_packs_are_the_same_bytes_for_the_same_fmus(tmp_path: Path) -> None:
+    names = ("gearbox.lab_bench/ratio", "inertia.lab_bench/disc")
+    files = [(f"2/{fmu(name).stem}", fmu(name)) for name in names]
+    for name in "ab":
+        write_pack(tmp_path / name, files)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    assert (tmp_path / "a").stat().st_size < sum(path.stat().st_size for _, path in files)

@@ -262,6 +262,12 @@ def test_tables_hold_and_interpolate() -> None:
     np.testing.assert_array_equal(held, np.arange(5000.0))
 
 
+def test_a_written_table_does_not_jump_early_however_long_it_holds() -> None:
+    times = 1e-4 * np.arange(24_990, 25_010)
+    held = Table([0.0, 2.5, 5.0], [1.0, 2.0, 3.0], extend=True).at(times)
+    np.testing.assert_array_equal(held, np.where(np.arange(24_990, 25_010) < 25_000, 1.0, 2.0))
+
+
 @pytest.mark.parametrize(
     ("step", "duration", "message"),
     [

@@ -56,7 +56,7 @@ def test_csv_keeps_every_bit_and_names_units(recording: Recording, tmp_path: Pat
 def test_plot(recording: Recording, tmp_path: Path) -> None:
     path = tmp_path / "plot.png"
     figure = recording.plot(["load.w", "motor.i"], path)
-    assert [axis.get_ylabel() for axis in figure.axes] == ["[rad/s]", "[A]"]
+    assert [axis.get_ylabel() for axis in figure.axes] == ["angular speed [rad/s]", "current [A]"]
     assert path.read_bytes().startswith(b"\x89PNG")
 
 

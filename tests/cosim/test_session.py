@@ -62,10 +62,15 @@ def test_a_run_that_takes_too_long_is_stopped(parts, executor) -> None:
     master = Master(master.system, master.algorithm, master.step, executor=executor)
     with Session(master, DURATION, inputs=inputs, record=RECORD) as session:
         free = session.run()
-        with pytest.raises(StepError, match=r"stopped at t = 0\.005 s: it took more than"):
+        work = session.work
+        with pytest.raises(StepError, match=r"stopped at t = 0\.005 s: it took more than 0 steps"):
             session.run(limit=0.0)
-        timed = session.run(limit=60.0)
-    assert np.array_equal(free[1], timed[1])  # looking at the clock changes nothing
+        counted = session.run(limit=work)
+        assert session.work == work  # no more and no less than the first time
+        with pytest.raises(StepError, match=f"it took more than {work - 1} steps of solvers"):
+            session.run(limit=work - 1)
+    assert work > session.count * 2  # solvers of the two parts make steps of their own
+    assert np.array_equal(free[1], counted[1])  # counting changes nothing
 
 
 @pytest.mark.parametrize("executor", ["c", "python"])
@@ -73,10 +78,10 @@ def test_a_limited_run_that_runs_away_is_stopped(parts, executor, monkeypatch) -
     master, inputs = parts
     master = Master(master.system, master.algorithm, master.step, executor=executor)
     with Session(master, DURATION, inputs=inputs, record=RECORD) as session:
-        free = session.run(limit=60.0)
+        free = session.run(limit=1e9)
         monkeypatch.setattr("cosim.master.session.RUNAWAY", 0.5 * np.abs(free[1]).max())
         with pytest.raises(StepError, match=r"\.[\w]+ passed .*: .* the system is unstable"):
-            session.run(limit=60.0)
+            session.run(limit=1e9)
         assert np.array_equal(free[1], session.run()[1])  # a run without a limit is not watched
 
 

@@ -94,7 +94,7 @@ def command(*words: object) -> int:
     [
         # a sensor that says nothing ends a diagnosis at once
         (["diagnose"], 0.0, ["diagnosis.json", "report.html"]),
-        (["calibrate", "--samples", 0], None, ["calibration.json"]),
+        (["calibrate", "--samples", 0], None, ["calibration.json", "report.html"]),
     ],
     ids=["diagnose", "calibrate"],
 )

@@ -12,7 +12,7 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.bursts import bursts, times
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
-from cosim.report.page import _bursts
+from cosim.report import sections
 from tests.problems import simulator
 
 FIRST, LAST = 500, 540
@@ -47,9 +47,9 @@ def test_a_burst_pulls_no_parameter(clean_bench: Problem) -> None:
             ((begin, end),) = spans[run.name]
             assert begin <= run.times[FIRST] and end >= run.times[LAST]
             assert end - begin < 0.05 * (run.times[-1] - run.times[0])
-            assert f"{begin:.2f} to {end:.2f} s" in _bursts(spans)
+            assert f"{begin:.2f} to {end:.2f} s" in sections.bursts(spans)
         search.close()
-    assert _bursts({}) == ""
+    assert sections.bursts({}) == ""
     one, other = values
     known = one.identifiable & other.identifiable
     width = one.high - one.low

@@ -17,9 +17,10 @@ from cosim.cli.diagnose import _spread
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis, _look_further
 from cosim.diagnose.further import carried, judged
+from cosim.diagnose.story.facts import Facts
 from cosim.errors import ScenarioError, VariantError
 from cosim.installation import places
-from cosim.report.page import _further
+from cosim.report import sections
 from tests.problems import simulator
 
 COULOMB = Candidate("load", "inertial_load", "coulomb", "flange")
@@ -97,7 +98,7 @@ def test_the_model_that_was_found_is_what_judges(raw: Problem, folder: Path) -> 
     assert found.rms("after", 0) == pytest.approx(float(np.sqrt(np.nanmean(expected[:, 0] ** 2))))
     row = found.to_dict()["channels"]["speed"]
     assert row["after"] == pytest.approx(found.rms("after", 0) * row["noise_rms"])
-    page = _further([found.to_dict()])
+    page = sections.further(Facts({"further_runs": [found.to_dict()]}))
     assert "Runs MX1, which need the system warm_bench" in page and page.count("<tr>") == 5
     assert _spread(found).startswith("MX1 with warm_bench, residuals over the noise: before ")
     simulator(direct).close()

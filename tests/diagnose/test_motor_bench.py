@@ -20,8 +20,12 @@ from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis, _searched
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
-from cosim.report.page import _interval, _starts, page
+from cosim.diagnose.story.facts import interval
+from cosim.report import sections
+from cosim.report.page import page
 from tests.problems import simulator
+from tests.report import stories
+from tests.report.marked import Marked, expected
 
 pytestmark = pytest.mark.slow
 
@@ -98,8 +102,30 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
     text = page(result)
     for part in ("battery_sag at motor.winding", "Where the disturbance enters", "motor.winding"):
         assert part in text
+    for fact, shown in Marked(text).facts.items():
+        assert set(shown) == {expected(table, fact)}
+    view = Marked(result._repr_html_())
+    assert "Supply voltage that falls" in view.text or "supply voltage that falls" in view.text
+    assert all(set(shown) == {expected(table, fact)} for fact, shown in view.facts.items())
+    assert "R_a" in Marked(base.estimate._repr_html_()).text
+    assert table["model"]["variants"] == {"motor": "dc_motor.lab_bench/sampled+battery_sag@winding"}
+    assert table["model"]["values"].keys() > {"motor.R_a", "motor.winding.battery_sag.r_b"}
+    assert shape(table) == shape(stories.table("effect_found"))
     (left,) = result.files
     assert "battery_sag" in left.name and left.is_file()
+
+
+def shape(table: dict[str, Any]) -> list[set[str]]:
+    """Keys of a diagnosis and of what is in it."""
+    parts = [
+        table, table["effects"][0], table["localisation"][0], table["model"],
+        table["localisation"][0]["curves"][0], table["channels"]["speed"],
+        table["parameters"]["R_a"], table["parameters"]["R_a"]["before"],
+        table["structure"]["after validation"][0],
+        *(item["parameters"][name] for item in table["effects"][:1]
+          for name in list(item["parameters"])[:1]),
+    ]  # fmt: skip
+    return [set(part) for part in parts]
 
 
 def test_friction_that_is_declared_already_is_not_identifiable(sets: dict[str, Path]) -> None:
@@ -122,12 +148,13 @@ def test_start_values_that_were_estimated_are_reported(sets: dict[str, Path]) ->
     after: Any = SimpleNamespace(problem=own.hold({late[0].name: 0.125}).changed(late=late[:1]))
     found = Diagnosis(problem, "effect_found", "", after=after).start_values()
     assert found == {problem.runs[0].name: {"theta_0": 0.125}}
-    assert "theta_0" in _starts(found) and "0.125" in _starts(found)
-    assert _starts({}) == ""
+    shown = sections.starts(found)
+    assert "theta_0" in shown and "0.125" in shown
+    assert sections.starts({}) == ""
 
 
 def test_what_the_data_leave_open_is_said() -> None:
     known = {"value": 0.5, "ci95": [0.2, 0.8], "unit": "W", "identifiable": True}
     for entry, word in ((known, False), ({**known, "identifiable": False}, True)):
         assert ("open" in _value("P_0", entry)) is word
-        assert ("open" in _interval(entry)) is word
+        assert ("open" in interval(entry)) is word

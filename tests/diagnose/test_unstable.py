@@ -20,7 +20,7 @@ from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
 from cosim.diagnose.unstable import ended, ends
 from cosim.errors import FmuCallError
-from cosim.report.page import _ended
+from cosim.report import sections
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
@@ -137,7 +137,7 @@ def test_further_effects_are_looked_for_before_that(
     _verdict(result, [])
     # tables have the runs in full
     assert result.residuals["after", first.name].shape == first.data.shape
-    assert ("<td>1.00 s</td>" in _ended(result.ended)) == gone
+    assert (">1.00 s</td>" in sections.ended(result.ended)) == gone
 
 
 def test_where_a_changed_value_cannot_be_simulated_runs_count_in_full(

@@ -19,6 +19,7 @@ from cosim.system.system import System
 from sources.packaging.build import host_platform
 from sources.packaging.native import compile_c
 from tests.coupling.faulty import XML
+from tests.faults import others
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
 LIMIT = 1.0
@@ -39,6 +40,7 @@ class Fault:
         says: what the error says (or the note, if the run goes on), as a regular expression.
         text: what it does, for the page.
         fails: whether the run must fail.
+        maker: "" for the FMU in C of FMI 2; `third` or `python` for those of `others`.
     """
 
     phase: str
@@ -46,18 +48,26 @@ class Fault:
     says: str
     text: str
     fails: bool = True
+    maker: str = ""
 
     @property
     def name(self) -> str:
-        return f"{self.phase}_{self.kind}"
+        return "_".join(filter(None, (self.phase, self.kind, self.maker)))
+
+    @property
+    def place(self) -> str:
+        """First cell of its row."""
+        return {"third": "FMI 3: ", "python": "pythonfmu: "}.get(self.maker, "") + self.phase
 
     @property
     def hangs(self) -> bool:
         return self.kind in ("hang", "spin")
 
 
-def _of(kind: str, says: str, text: str, *phases: str, fails: bool = True) -> list[Fault]:
-    return [Fault(phase, kind, says, text, fails) for phase in phases]
+def _of(
+    kind: str, says: str, text: str, *phases: str, fails: bool = True, maker: str = ""
+) -> list[Fault]:
+    return [Fault(phase, kind, says, text, fails, maker) for phase in phases]
 
 
 EVERY = ("create", "init", "set", "get", "step", "terminate", "free")
@@ -125,6 +135,29 @@ FAULTS: tuple[Fault, ...] = (
     *_of("cut", "is cut short", "binary cut short", "archive"),
     *_of("platform", "has no binary for this machine", "binary for another platform", "archive"),
     *_of("once", "can be instantiated only once per process", "is allowed once only", "archive"),
+    *_of("error", "failed with status 'error'", "returns error", "step", maker="third"),
+    *_of("fatal", "failed with status 'fatal'", "returns fatal", "step", maker="third"),
+    *_of("discard", "failed with status 'discard'", "returns discard", "step", maker="third"),
+    *_of("status7", "failed with status 7, which FMI does not know", "returns 7", "step",
+         maker="third"),
+    *_of("warning", "returned status 'warning'", "returns warning", "step", fails=False,
+         maker="third"),
+    *_of("exit0", EXIT.format(0), "calls `exit(0)`", "create", "get", "step", maker="third"),
+    *_of("segv", CRASH.format("SIGSEGV"), "writes to a wild address", "create", "get", "step",
+         maker="third"),
+    *_of("abort", CRASH.format("SIGABRT"), "calls `abort()`", "step", maker="third"),
+    *_of("hang", "did not return within 1 s", "does not return, busily", "step", maker="third"),
+    *_of("nan", r"bad_step_nan_third\.y became nan", "gives nan", "step", maker="third"),
+    *_of("raises", "belt came off", "raises an exception", "create", "init", "get", "step",
+         maker="python"),
+    *_of("false", "asked to end the simulation at t = 0.2 s", "returns False", "step", fails=False,
+         maker="python"),
+    *_of("leaves", "failed with status 'fatal'", "calls `sys.exit(0)`", "step", maker="python"),
+    *_of("exit0", EXIT.format(0), "calls `os._exit(0)`", "step", maker="python"),
+    *_of("abort", CRASH.format("SIGABRT"), "calls `os.abort()`", "step", maker="python"),
+    *_of("hang", "did not return within 1 s", "does not return, busily", "step", maker="python"),
+    *_of("nan", r"bad_step_nan_python\.y became nan", "gives nan", "step", maker="python"),
+    *_of("prints", "", "prints", "step", fails=False, maker="python"),
 )  # fmt: skip
 
 
@@ -174,14 +207,23 @@ class Outcome:
     rows: int
 
 
+def faulty(folder: Path, fault: Fault) -> Path:
+    """The FMU that fails."""
+    if fault.maker == "third":
+        return others.third(folder, fault.phase, fault.kind)
+    if fault.maker == "python":
+        return others.python(folder)
+    return build(folder, fault.kind if fault.phase == "archive" or fault.kind == "string" else "")
+
+
 def outcome(folder: Path, fault: Fault, isolated: bool) -> Outcome:
     """Run with a fault as `cosim run` does, with or without `--isolate`."""
-    own = fault.kind if fault.phase == "archive" or fault.kind == "string" else ""
+    once = "once" if fault.kind == "once" else ""
     system = System("pair")
     bad = f"bad_{fault.name}"
     try:
-        system.add("good", str(build(folder, "once" if own == "once" else "")))
-        system.add(bad, str(build(folder, own)))
+        system.add("good", str(build(folder, once)))
+        system.add(bad, str(faulty(folder, fault)))
         system.connect("good.y", f"{bad}.u")
         how = {"isolate": LIMIT} if isolated else {"guard": True}
         recording = Master(system, step=0.1, **how).run(1.0)
@@ -212,7 +254,7 @@ def table() -> str:
             )
             code, rows = ("130", "–") if fault.hangs else (str(same.code), str(same.rows))
             lines.append(
-                f"| {fault.phase} | {fault.text} | {plain or 'nothing: the run is right'} | {code} "
+                f"| {fault.place} | {fault.text} | {plain or 'nothing: the run is right'} | {code} "
                 f"| {rows} | {other} |"
             )
     return "\n".join(lines)

@@ -21,6 +21,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cosim import ssp
+from cosim.calibrate import read_problem
+from cosim.calibrate.checks.examine import check_data
 from cosim.data.logs import read_data_set, read_log
 from cosim.data.recording import read_recording
 from cosim.fmu.archive import open_fmu
@@ -30,9 +32,10 @@ from cosim.fmu.metadata import parse_metadata
 from cosim.scenario.scenario import read_scenario
 from cosim.study.definition import read_study
 from cosim.study.store import Store
+from cosim.system.provider import FolderProvider
 from cosim.system.toml import read_system
 
-from . import seeds
+from . import bags, seeds
 from .mutate import (
     JSON_VALUES,
     NUMBERS,
@@ -291,6 +294,11 @@ def _set(path: Path) -> None:
         data.log(run)
 
 
+def _mapping(path: Path) -> None:
+    problem = read_problem(path.parent, FolderProvider(path.parent), mapping=path)
+    check_data(problem)
+
+
 def _store(path: Path) -> None:
     store = Store(path.parent, lambda text: None)
     if store.read(path.stem) is not None and store.channels(path.stem).is_file():
@@ -367,6 +375,13 @@ READERS = {
             "set", "set.toml", lambda: [seeds.SET.encode()], TOML, _set,
             lambda: {"log.csv": seeds.CSV.encode(), "rig.toml": seeds.SHEET.encode()},
         ),
+        Reader(
+            "mapping", "dataset.toml", lambda: [seeds.MAPPING.encode()], TOML, _mapping,
+            lambda: {
+                "system.toml": seeds.SYSTEM.encode(), "log.csv": seeds.CSV.encode(),
+                "a.fmu": seeds.fmu(2),
+            },
+        ),
         Reader("csv", "x.csv", lambda: [seeds.CSV.encode()], _csv, read_log),
         Reader("parquet", "x.parquet", lambda: [seeds.parquet()], _parquet, read_log),
         Reader(
@@ -379,6 +394,12 @@ READERS = {
         ),
         Reader("recording", "x.parquet", lambda: [seeds.recording()], _parquet, read_recording),
         Reader("store", "runs/k.json", lambda: [seeds.result(seeds.RESULT)], _result, _store),
+        Reader("inspect", "x.csv", lambda: [seeds.CSV.encode()], _csv, bags.inspected),
+        *(
+            Reader("mcap", "x.mcap", lambda: [bags.bag("MCAP")], some_bytes, bags.inspected),
+            Reader("db3", "x.db3", lambda: [bags.bag("SQLITE3")], some_bytes, bags.inspected),
+            Reader("bag", "x.bag", lambda: [bags.bag1()], some_bytes, bags.inspected),
+        )[: 3 * bags.THERE],
     )
 }  # fmt: skip
 

@@ -261,6 +261,76 @@ name = "r1"
 file = "log.csv"
 purpose = "validation"
 """
+MAPPING = """description = "a mapping"
+rig = "bench"
+system = "system.toml"
+step = 0.05
+algorithm = "gauss_seidel"
+options = { extrapolation = 1 }
+period = 0.1
+ticks = true
+search_step = 0.1
+time = "time"
+gap = 0.3
+lead = 0.1
+relative = []
+
+[search]
+options = { extrapolation = 2 }
+parameters = { "a.n" = 3 }
+
+[parameters]
+a.n = 2
+
+[starts]
+begin = "b.n"
+
+[inputs]
+"a.u" = { column = "u", gain = 0.5, interpolation = "linear", unit = "V" }
+"a.on" = "flag"
+
+[columns]
+flag = { source = "u", scale = 0.0, offset = 1.0, unit = "1" }
+turn = { source = "y", time = "time", late = 0.01, unwrap = true, gap = 0.2, limit = 9.0 }
+
+[channels]
+y = { signal = "a.y", sigma = 0.1, quantum = 0.01, roundings = 2 }
+turn = { signal = "b.y", sigma = 0.1, transform = "mean", window = 0.1, shift = 0.05 }
+other = { signal = "a.w", column = "nowhere", sigma = 1.0, optional = true }
+
+[[parameter]]
+name = "n"
+unit = ""
+nominal = 3
+min = 0
+max = 9
+prior = 1.0
+targets = { "a.n" = 1.0 }
+
+[[nuisance]]
+name = "first"
+nominal = "first:y"
+span = 2.0
+per_run = true
+targets = ["b.u"]
+
+[[run]]
+name = "r0"
+file = "log.csv"
+purpose = "identification"
+begin = 2
+samples = [1, 11]
+
+[[run]]
+name = "r1"
+file = "log.csv"
+purpose = "validation"
+begin = 3
+window = 0.5
+
+[checks]
+allow = ["spikes"]
+"""
 SHEET = '[[signal]]\nname = "u"\nunit = "V"\nnoise_sigma = 0.1\n'
 CSV = "time [s],u [V],y,word\n" + "".join(
     f"{t:.1f},{t * t},{'' if t > 0.9 else t},a\n" for t in TIME.tolist()

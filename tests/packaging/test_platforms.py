@@ -81,7 +81,13 @@ def test_fmi_2_has_a_universal_mac_library() -> None:
 @pytest.mark.parametrize("folder", ["linux64", "aarch64-linux", "win64", "darwin64"])
 def test_both_versions_are_exported_everywhere(folder: str) -> None:
     library = libraries(2)[folder]
-    for name in ("fmi2DoStep", "fmi2NewDiscreteStates", "fmi3DoStep", "fmi3GetOutputDerivatives"):
+    for name in (
+        "fmi2DoStep",
+        "fmi2NewDiscreteStates",
+        "fmi3DoStep",
+        "fmi3GetOutputDerivatives",
+        "cosim_work",
+    ):
         assert name.encode() in library
     for name in ("f_outputs", "rodas3", "check_finite"):  # nothing of ours
         assert name.encode() + b"\0" not in library

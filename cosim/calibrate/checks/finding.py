@@ -28,6 +28,7 @@ KINDS = {
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",
     "reading": "what was assumed in reading",
+    "saturated": "a column that stays at its largest or smallest value",
     "short": "too few samples",
     "sign": "a column with the sign turned round",
     "simulation": "a model that does not run",
@@ -69,6 +70,15 @@ class Finding:
         if self.severity == "error" and self.kind not in LASTING:
             way = f' (if the data are right: [checks] allow = ["{self.kind}"] in dataset.toml)'
         return f"{self.severity}: {where + ': ' if where else ''}{self.text}{way}"
+
+    def _repr_html_(self) -> str:
+        from ...display.html import tag
+        from ...display.notebook import view
+
+        where = [f"run {self.run}"] * bool(self.run) + [self.column] * bool(self.column)
+        kind = "over" if self.severity == "error" else ""
+        text = tag("p", tag("span", self.text, class_=kind))
+        return view(f"{self.severity}: {self.kind}", ", ".join(where), text)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""

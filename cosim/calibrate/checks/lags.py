@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks import clocked
 from .finding import Finding
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ ENOUGH = 0.1
 def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -> Iterator[Finding]:
     """A run, or one column in all runs, that fits much better when it is shifted in time."""
     lags: dict[tuple[str, int], tuple[int, float]] = {}
+    estimated = clocked(problem.parameters)
     for run in problem.runs:
         reach = min(run.times.size // 8, 200)
         for index in range(len(problem.channels)):
@@ -34,6 +36,7 @@ def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -
         interval = float(np.median(np.diff(run.times)))
         if (
             len(sure) > len(own) / 2
+            and not estimated
             and abs(np.median(sure)) >= 2
             and np.ptp(sure) <= 2 + 0.2 * abs(np.median(sure))
         ):
@@ -41,6 +44,8 @@ def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -
             text = f"all columns fit better shifted: they are late by {late:.4g} s (clock offset)"
             yield Finding("warning", "clock", run.name, "time", text)
     for index, channel in enumerate(problem.channels):
+        if channel.name in estimated:
+            continue
         sure = [
             lags[run.name, index][0] for run in problem.runs if lags[run.name, index][1] > evident
         ]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from ...calibrate.deferred import corrected
 from ...calibrate.estimate import Estimate
 from ...calibrate.fit import CORRECTION, Effort, fit
 from ...calibrate.normal import BOUNDS
@@ -17,7 +18,6 @@ from ...calibrate.simulator import Simulator
 from ...errors import CosimError
 from ...system.variants import component
 from ..candidates import Candidate
-from ..deferred import corrected
 from ..models import GATE, Fitted, compare, is_open
 from .basis import Axis, Shape
 from .bench import EFFECT, LawBench

@@ -1,8 +1,8 @@
 """The whole check of one .fmu file, from the archive inwards.
 
 Our own rules name the variable, the line and the way out. What they leave is covered by the XML
-schemas of the standard and by FMPy's validation, which run on the description alone: FMPy is part
-of every installation and needs no compiler. Nothing is unpacked, loaded or run.
+schemas of the standard and by FMPy's validation, which run on the description alone where FMPy is
+installed (the extra `validate`). Nothing is unpacked, loaded or run.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Literal
 from ...errors import FmuFileError
 from ...reading import archives, markup
 from ...reading.limits import TEXT, UNPACKED
+from ...spec.distribution import has
 from ..description import parse_description
 from ..metadata import ENTRY, parse_metadata
 from .content import check_binaries, check_entries, check_folders, check_sources
@@ -31,7 +32,8 @@ _AGAIN = "build or fetch it again"
 MOST = 1000
 """Findings that are given; more come from a mistake that is repeated in every variable."""
 _MORE = 100
-"""Findings of the schema that are given; a description of another kind has one per element."""
+"""Findings of the schema that are given, and errors of our own rules with which it is not asked: a
+description of another kind has one per element."""
 
 
 def check(path: Path) -> list[Finding]:
@@ -124,7 +126,9 @@ def _description(
         except FmuFileError as error:
             about.error(str(error).removeprefix(": "), "or export it again")
     build = archive.read(entries[_BUILD]) if _BUILD in entries else None
-    inside.found += _of_fmpy(xml, build, model, inside.found)
+    errors = [finding for finding in inside.found if finding.severity == "error"]
+    if has("fmpy") and len(errors) < _MORE:  # FMPy's time grows with the square of what is wrong
+        inside.found += _of_fmpy(xml, build, model, errors)
     if not any(f.severity == "error" for f in inside.found):
         _as_run(xml, model, inside)
     return inside.found
@@ -157,7 +161,6 @@ def _of_fmpy(xml: bytes, build: bytes | None, model: Model, known: list[Finding]
         problems = [str(error) or type(error).__name__]
     else:
         return []
-    known = [finding for finding in known if finding.severity == "error"]
     lines = {finding.line for finding in known}
     structure = any(
         "Unknowns l" in finding.text or "Outputs l" in finding.text for finding in known

@@ -24,6 +24,25 @@ def names() -> list[str]:
     return sorted(info.name for info in pkgutil.iter_modules(__path__))
 
 
+def known_options(algorithm: str) -> list[str]:
+    """The options of an algorithm that exists.
+
+    Raises:
+        InputError: its file does not say how to compile a plan.
+    """
+    module = importlib.import_module(f"{__name__}.{algorithm}")
+    if not hasattr(module, "compile_plan"):
+        raise InputError(
+            f"algorithm {algorithm!r}: {module.__file__} has no function "
+            "compile_plan(system, external, observed, *, options) -> Plan"
+        )
+    return [
+        name
+        for name, parameter in inspect.signature(module.compile_plan).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+
+
 def compile_plan(
     algorithm: str,
     system: System,
@@ -40,21 +59,12 @@ def compile_plan(
         raise UnknownNameError(
             f"there is no algorithm {algorithm!r}; {listing(names(), algorithm)}"
         )
-    module = importlib.import_module(f"{__name__}.{algorithm}")
-    if not hasattr(module, "compile_plan"):
-        raise InputError(
-            f"algorithm {algorithm!r}: {module.__file__} has no function "
-            "compile_plan(system, external, observed, *, options) -> Plan"
-        )
-    known = [
-        name
-        for name, parameter in inspect.signature(module.compile_plan).parameters.items()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-    ]
+    known = known_options(algorithm)
     for name in options or {}:
         if name not in known:
             raise UnknownNameError(
                 f"algorithm {algorithm!r} has no option {name!r}; {listing(known, name)}"
             )
+    module = importlib.import_module(f"{__name__}.{algorithm}")
     plan: Plan = module.compile_plan(system, external, observed, **(options or {}))
     return plan

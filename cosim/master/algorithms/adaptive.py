@@ -115,6 +115,8 @@ class StepControl:
         shortest, longest: of those taken [s].
     """
 
+    looks_ahead = True
+
     def __init__(self, run: Interpreter, settings: Settings) -> None:
         self.run, self.settings = run, settings
         layout = run.layout
@@ -143,6 +145,15 @@ class StepControl:
 
     def _nominal(self, full: str) -> float:
         return abs(self.run.system.declaration(full).nominal or 1.0)
+
+    def save(self) -> dict[str, Any]:
+        """Where it stands, and its step size."""
+        kept = ("time", "size", "taken", "rejected", "shortest", "longest", "power")
+        return {name: getattr(self, name) for name in kept}
+
+    def restore(self, memory: dict[str, Any]) -> None:
+        """Return to them."""
+        vars(self).update(memory)
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""

@@ -69,6 +69,8 @@ class Iterated:
         smooth: per copy, whether its values are continuous in time.
     """
 
+    looks_ahead = False
+
     def __init__(self, run: Interpreter, tolerance: float, smooth: NDArray[np.bool_]) -> None:
         self.run, self.tolerance = run, tolerance
         self.sources = np.unique(run.layout.copy_source[smooth])
@@ -89,6 +91,14 @@ class Iterated:
     def restart(self) -> None:
         """Forget what earlier steps were like."""
         self.newton.valid[0] = 0
+
+    def save(self) -> tuple[Vector, int, int]:
+        """The Jacobian that is kept from step to step, and how many steps there were."""
+        return self.newton.inverse.copy(), int(self.newton.valid[0]), self.repetitions
+
+    def restore(self, memory: tuple[Vector, int, int]) -> None:
+        """Return to them."""
+        self.newton.inverse[:], self.newton.valid[0], self.repetitions = memory
 
     def steps(self) -> int:
         """Steps of the whole system that were made, repeated ones too."""

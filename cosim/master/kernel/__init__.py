@@ -10,7 +10,6 @@ import ctypes as ct
 import hashlib
 import math
 import platform
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -23,83 +22,21 @@ from numpy.typing import NDArray
 
 from ...fmu.exchange import Block
 from ...fmu.instance import Instance
+from ...fmu.library import WORK
 from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
 from ..plan import Op, Plan
+from . import structures
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
 """Of the library; the first is compiled and includes the others."""
-_P, _I64, _I32, _D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
-    "Boolean", "Boolean2",
+    "Boolean", "Boolean2", "Float32Whole",
 )  # fmt: skip
 _TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
-
-
-class _Call(ct.Structure):
-    _fields_ = (
-        ("component", _P), ("function", _P), ("references", _P), ("buffer", _P), ("slots", _P),
-        ("n_references", _I64), ("n_values", _I64), ("type", _I32), ("version", _I32),
-        ("warned", _I64),
-    )  # fmt: skip
-
-
-class _Member(ct.Structure):
-    _fields_ = (("component", _P), ("step", _P), ("reached", _D), ("warned", _I64), ("modes", _I64))
-
-
-class _Instruction(ct.Structure):
-    _fields_ = (("operation", _I64), ("first", _I64), ("last", _I64))
-
-
-class _Copy(ct.Structure):
-    _fields_ = (("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64))
-
-
-class _Term(ct.Structure):
-    _fields_ = (
-        ("sign", _D), ("previous", _D), ("held", _D), ("output", _I64),
-        ("input", _I64), ("bond", _I64), ("mean", _I64),
-    )  # fmt: skip
-
-
-class _Loop(ct.Structure):
-    _fields_ = (
-        ("sources", _P), ("inverse", _P), ("valid", _P), ("work", _P), ("n", _I64),
-        ("first", _I64), ("last", _I64),
-    )  # fmt: skip
-
-
-class _Mean(ct.Structure):
-    _fields_ = (
-        ("gain", _D), ("offset", _D), ("source", _I64), ("target", _I64), ("order", _I64),
-        ("ahead", _I64), ("moving", _I64), ("bonded", _I64),
-    )  # fmt: skip
-
-
-class _Derivatives(ct.Structure):
-    _fields_ = (
-        ("component", _P), ("function", _P), ("references", _P), ("orders", _P), ("values", _P),
-        ("n", _I64),
-    )  # fmt: skip
-
-
-class _Run(ct.Structure):
-    _fields_ = (
-        ("members", _P), ("calls", _P), ("values", _P), ("instructions", _P),
-        ("n_instructions", _I64), ("times", _P), ("step", _D), ("end", _D), ("external", _P),
-        ("external_slot", _P), ("n_external", _I64), ("copies", _P), ("records", _P),
-        ("n_record", _I64), ("every", _I64), ("row", _I64), ("rows", _P), ("terms", _P),
-        ("bond_energy", _P), ("bond_turnover", _P), ("n_terms", _I64), ("carried", _I64),
-        ("index", _I64), ("next_record", _I64), ("loops", _P), ("means", _P), ("history", _P),
-        ("past", _P), ("n_means", _I64),
-        ("average", _P), ("slope", _P), ("curve", _P), ("derivatives", _P),
-        ("at", _P), ("failed_loop", _I64), ("failed_call", _I64), ("failed_member", _I64),
-        ("failed_derivatives", _I64),
-    )  # fmt: skip
 
 
 class _Code(IntEnum):
@@ -130,8 +67,6 @@ UNSETTLED = 1003
 """Status of an algebraic loop that has no solution or does not settle."""
 TOO_LONG, TOO_LARGE = 1004, 1005
 """Statuses of a run that took more than its limit, and of one that ran away."""
-RUN_SIZE = ct.sizeof(_Run)
-_STRUCTURES = (_Run, _Member, _Call, _Instruction, _Copy, _Term, _Loop, _Mean, _Derivatives)
 
 
 @dataclass(frozen=True)
@@ -147,26 +82,31 @@ class Standing:
 
 def standing(memory: NDArray[np.uint8]) -> Standing:
     """Where a run of another process stands, whose structure is in shared memory."""
-    run = _Run.from_buffer(memory.data)
+    run = structures.Run.from_buffer(memory.data)
     begins = [run.calls or 0, run.members or 0, run.derivatives or 0]
     found = [-1, -1, -1]
-    if run.at:
+    if at := run.at:  # read once: the other process goes on
         # arrays are apart: the one that begins last before the address holds it
-        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= run.at else -1)
-        size = ct.sizeof((_Call, _Member, _Derivatives)[near])
-        found[near] = (run.at - begins[near]) // size
+        near = max(range(3), key=lambda kind: begins[kind] if begins[kind] <= at else -1)
+        size = ct.sizeof((structures.Call, structures.Member, structures.Derivatives)[near])
+        found[near] = (at - begins[near]) // size
     return Standing(int(run.index), int(run.row), *found)
 
 
-def library_name() -> str:
-    """File name of the library for these sources and this machine."""
+def library_name(target: str = "") -> str:
+    """File name of the library for these sources.
+
+    Args:
+        target: machine and system, such as x86_64-linux; this machine's if not given.
+    """
     content = b"\0".join(path.read_bytes() for path in SOURCES)
     digest = hashlib.sha256(content).hexdigest()[:16]
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    return f"kernel-{digest}-{machine}-{platform.system().lower()}{suffix}"
+    if not target:
+        machine = platform.machine().lower()
+        machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+        target = f"{machine}-{platform.system().lower()}"
+    suffix = {"windows": ".dll", "darwin": ".dylib"}.get(target.rpartition("-")[2], ".so")
+    return f"kernel-{digest}-{target}{suffix}"
 
 
 def cache_folder() -> Path:
@@ -177,12 +117,12 @@ def cache_folder() -> Path:
 @lru_cache(maxsize=1)
 def _load(path: str) -> Any:
     library = ct.CDLL(path)
-    library.cosim_run.argtypes, library.cosim_run.restype = [_P, _I64], ct.c_int
-    library.cosim_run_within.argtypes = [_P, _I64, _D, _D]
+    library.cosim_run.argtypes, library.cosim_run.restype = [structures.P, structures.I64], ct.c_int
+    library.cosim_run_within.argtypes = [structures.P, structures.I64, structures.D, structures.D]
     library.cosim_run_within.restype = ct.c_int
-    library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], _I64
-    sizes = [library.cosim_size(what) for what in range(len(_STRUCTURES))]
-    expected = [ct.sizeof(kind) for kind in _STRUCTURES]
+    library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], structures.I64
+    sizes = [library.cosim_size(what) for what in range(len(structures.ALL))]
+    expected = [ct.sizeof(kind) for kind in structures.ALL]
     if sizes != expected:
         raise OSError(f"{path}: its structures have sizes {sizes}, expected {expected}")
     return library
@@ -229,7 +169,7 @@ class Kernel:
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
         self._told: list[tuple[Instance, NDArray[np.uint32]]] = []
-        calls: list[_Call] = []
+        calls: list[structures.Call] = []
         spans: dict[tuple[Op, int], tuple[int, int]] = {}
         for op, blocks, slots in (
             (Op.SET, bound.inputs, layout.inputs),
@@ -241,25 +181,26 @@ class Kernel:
                     calls.append(self._call(op, instance, block, part, int(slots[index, 0])))
                     self._parts.append((op, instance, part))
                 spans[op, index] = (first, len(calls))
-        self.run = _Run(
-            members=self._structures(_Member, (_member(instance) for instance in instances)),
-            calls=self._structures(_Call, calls),
+        self.run = structures.Run(
+            members=self._structures(structures.Member, map(_member, instances)),
+            n_members=len(instances),
+            calls=self._structures(structures.Call, calls),
             values=self._array(bound.values),
             times=self._array(bound.times),
             step=bound.step,
-            end=float(bound.times[-1]),
+            end=bound.outline.end,
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
             copies=self._structures(
-                _Copy,
+                structures.Copy,
                 zip(
                     layout.copy_gain.tolist(), layout.copy_offset.tolist(),
                     layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True,
                 ),
             ),
             records=self._structures(
-                _Copy,
+                structures.Copy,
                 zip(
                     layout.record_gain.tolist(), layout.record_offset.tolist(),
                     layout.record_source.tolist(), range(bound.rows.shape[1]), strict=True,
@@ -269,7 +210,7 @@ class Kernel:
             every=bound.every,
             rows=self._array(bound.rows),
             terms=self._structures(
-                _Term,
+                structures.Term,
                 zip(
                     layout.bond_sign.tolist(), *[[0.0] * len(layout.bond_sign)] * 2,
                     layout.bond_output.tolist(), layout.bond_input.tolist(),
@@ -292,7 +233,7 @@ class Kernel:
             first = len(instructions)
             instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
             loops.append(
-                _Loop(
+                structures.Loop(
                     self._array(loop.sources),
                     self._array(newton.inverse),
                     self._array(newton.valid),
@@ -302,10 +243,10 @@ class Kernel:
                     len(instructions),
                 )
             )
-        self.run.loops = self._structures(_Loop, loops)
-        self.run.instructions = self._structures(_Instruction, instructions)
+        self.run.loops = self._structures(structures.Loop, loops)
+        self.run.instructions = self._structures(structures.Instruction, instructions)
         self.run.means = self._structures(
-            _Mean,
+            structures.Mean,
             (
                 (m.gain, m.offset, m.source, m.target, m.order, m.ahead, m.moving, m.bonded)
                 for m in plan.means
@@ -323,17 +264,15 @@ class Kernel:
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
         self.run.average = self._array(derivatives.average)
-        self.run.slope, self.run.curve = (
-            self._array(derivatives.slope),
-            self._array(derivatives.curve),
-        )
-        rows: list[_Derivatives] = []
+        self.run.slope = self._array(derivatives.slope)
+        self.run.curve = self._array(derivatives.curve)
+        rows: list[structures.Derivatives] = []
         told = {}
         for key, told_calls in derivatives.calls.items():
             for call in told_calls:
                 instance = self._instances[call.instance]
                 rows.append(
-                    _Derivatives(
+                    structures.Derivatives(
                         instance.address, instance.functions["fmi2SetRealInputDerivatives"],
                         call.references.ctypes.data, call.orders.ctypes.data,
                         call.values.ctypes.data, call.references.size,
@@ -341,7 +280,7 @@ class Kernel:
                 )  # fmt: skip
                 self._told.append((instance, call.references))
             told[key] = (len(rows) - len(told_calls), len(rows))
-        self.run.derivatives = self._structures(_Derivatives, rows)
+        self.run.derivatives = self._structures(structures.Derivatives, rows)
         return told
 
     def _array(self, array: NDArray[Any]) -> int:
@@ -359,13 +298,15 @@ class Kernel:
         self._made[kind] = array
         return ct.addressof(array)
 
-    def _call(self, op: Op, instance: Instance, block: Block, part: Any, base: int) -> _Call:
+    def _call(
+        self, op: Op, instance: Instance, block: Block, part: Any, base: int
+    ) -> structures.Call:
         slots = 0
         if part.buffer is not block.values:
             within = np.arange(block.values.size)[part.slots]
             slots = self._array(np.ascontiguousarray(within + base, dtype=np.int64))
         names = instance.binding.SET if op is Op.SET else instance.binding.GET
-        return _Call(
+        return structures.Call(
             instance.address, instance.functions[names[part.type]], part.references.ctypes.data,
             part.buffer.ctypes.data, slots, part.references.size, part.buffer.size,
             _TYPE_CODES[part.type], instance.binding.version,
@@ -373,38 +314,54 @@ class Kernel:
 
     def advance(self, last: int) -> int:
         """Communication steps up to `last`; 0, or the status that ended it."""
+        self._enter()
         return int(self._library.cosim_run(ct.addressof(self.run), last))
 
     def advance_within(self, last: int, limit: float, most: float) -> int:
-        """The same within some processor time [s], while no recorded value is larger than `most`.
+        """The same within some work (see `Session.run`), while no recorded value is above `most`.
 
         It does not return in between: each time, a thread would wait for the interpreter lock.
         """
+        self._enter()
         return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
+
+    def _enter(self) -> None:
+        if self._bound.witness is not None:
+            self._bound.witness.enter()
 
     def restart(self) -> None:
         """Begin again at the first communication point."""
         self.run.index = self.run.row = self.run.next_record = 0
+
+    def save(self) -> bytes:
+        """What it keeps beside the run's arrays: outputs noted for the energy of bonds."""
+        return bytes(self._made[structures.Term])
+
+    def restore(self, terms: bytes) -> None:
+        """Return to what `save` gave, at the communication point where the run stands."""
+        ct.memmove(self._made[structures.Term], terms, len(terms))
+        self.run.index, self.run.row = self._bound.index, self._bound.row
+        self.run.next_record = -(-self._bound.index // self._bound.every) * self._bound.every
 
     def reached(self) -> float | None:
         """The time that the failed step has reached, where the FMU says so [s]."""
         instance = self._instances[self.run.failed_member]
         if instance.binding.version != 3:
             return None
-        return float(self._made[_Member][self.run.failed_member].reached)
+        return float(self._made[structures.Member][self.run.failed_member].reached)
 
     def hand_over(self) -> None:
         """Give the interpreter what it needs to go on within a step."""
-        terms = list(self._made[_Term])[: len(self._bound.previous)]
+        terms = list(self._made[structures.Term])[: len(self._bound.previous)]
         self._bound.previous = [term.previous for term in terms]
         self._bound.held[:] = [term.held for term in terms]
 
     def note_warnings(self) -> None:
         """Tell the instances which of their calls returned warnings."""
-        for (op, instance, _), call in zip(self._parts, self._made[_Call], strict=False):
+        for (op, instance, _), call in zip(self._parts, self._made[structures.Call], strict=False):
             if call.warned:
                 instance.warned("getting values" if op is Op.GET else "setting values", math.nan)
-        for instance, member in zip(self._instances, self._made[_Member], strict=False):
+        for instance, member in zip(self._instances, self._made[structures.Member], strict=False):
             if member.warned:
                 instance.warned("a step", math.nan)
             if member.modes:
@@ -429,15 +386,17 @@ class Kernel:
         return Op.RECORD, None, None
 
 
-def _member(instance: Instance) -> _Member:
-    return _Member(instance.address, instance.functions[f"fmi{instance.binding.version}DoStep"])
+def _member(instance: Instance) -> structures.Member:
+    functions = instance.functions
+    step = functions[f"fmi{instance.binding.version}DoStep"]
+    return structures.Member(instance.address, step, functions.get(WORK, 0))
 
 
 def _instructions(
     plan: Plan,
     rows: NDArray[np.int64],
     spans: dict[tuple[Op, int], tuple[int, int]],
-    calls: Sequence[_Call],
+    calls: Sequence[structures.Call],
     instances: Sequence[Instance],
     told: Mapping[tuple[int, int], tuple[int, int]],
 ) -> list[tuple[int, int, int]]:

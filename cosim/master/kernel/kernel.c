@@ -4,12 +4,9 @@
    so the caller may release the interpreter lock and run several systems in threads. Compiled
    without fused multiply-add, because the Python executor rounds every product. */
 
-#define _POSIX_C_SOURCE 200809L /* clock_gettime */
 #if defined(_WIN32)
-#include <windows.h>
 #define EXPORT __declspec(dllexport)
 #else
-#include <time.h>
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
@@ -49,6 +46,7 @@ static int convert(const Call *c, double *values, int into) {
     CONVERT(8, int64_t, SIGNED(64, *v), rint(*v)) /* enumerations of FMI 3 */
     CONVERT(9, bool, TRUTH(*v), rint(*v))
     CONVERT(10, int32_t, TRUTH(*v), rint(*v)) /* booleans of FMI 2 */
+    CONVERT(11, float, (double)(float)*v == *v || isnan(*v), *v) /* given integers */
   }
   return 0;
 }
@@ -144,16 +142,14 @@ static int record(Run *run) {
   const double *values = run->values;
   if (!run->carried || run->index == 0)
     for (int64_t i = 0; i < run->n_terms; i++) run->terms[i].previous = values[run->terms[i].output];
+  double *const row = run->rows + run->row * run->n_record;
+  const Copy *c = run->records, *const end = c + run->n_record;
+  /* between its turns a row is written, but not counted: it is the last one if the run ends here */
+  for (double *to = row; c < end; c++) *to++ = values[c->source] * c->gain + c->offset;
   if (run->index != run->next_record) return 0;
   run->next_record += run->every;
-  double *row = run->rows + run->row * run->n_record;
-  int finite = 1;
-  for (int64_t i = 0; i < run->n_record; i++) {
-    const Copy *c = run->records + i;
-    row[i] = values[c->source] * c->gain + c->offset;
-    finite &= isfinite(row[i]) != 0;
-  }
-  if (!finite) return NOT_FINITE;
+  for (const double *v = row; v < row + run->n_record; v++)
+    if (!isfinite(*v)) return NOT_FINITE;
   run->row++;
   return 0;
 }
@@ -339,28 +335,25 @@ EXPORT int cosim_run(Run *run, int64_t last) {
   return status;
 }
 
-/* Processor time of this thread [s]. */
-static double processor_time(void) {
-#if defined(_WIN32)
-  FILETIME created, ended, kernel, user;
-  if (!GetThreadTimes(GetCurrentThread(), &created, &ended, &kernel, &user)) return 0.0;
-  const double high = (double)kernel.dwHighDateTime + (double)user.dwHighDateTime;
-  return 1e-7 * (4294967296.0 * high + (double)kernel.dwLowDateTime + (double)user.dwLowDateTime);
-#else
-  struct timespec now;
-  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now)) return 0.0;
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-#endif
+/* Steps that the solvers of all members have made so far, as far as they count them. */
+static double work_of(const Run *run) {
+  double sum = 0.0;
+  for (int64_t i = 0; i < run->n_members; i++) {
+    const Member *m = &run->members[i];
+    if (m->work) sum += (double)((Work)m->work)(m->component);
+  }
+  return sum;
 }
 
-/* The same within some processor time [s], and as long as no recorded value is larger than `most`. */
+/* The same within so many steps of solvers, a communication step of a member counting as one, too, and as
+   long as no recorded value is larger than `most`. */
 EXPORT int cosim_run_within(Run *run, int64_t last, double limit, double most) {
-  const double begun = processor_time();
+  const double begun = work_of(run) + (double)(run->index * run->n_members);
   while (run->index < last) {
     const int64_t look = (run->index / LOOK + 1) * LOOK, next = look < last ? look : last;
     const int status = cosim_run(run, next);
     if (status) return status;
-    if (processor_time() - begun > limit) return TOO_LONG;
+    if (work_of(run) + (double)(run->index * run->n_members) - begun > limit) return TOO_LONG;
     if (next % CHECK || !run->row) continue;
     for (int64_t i = (run->row - 1) * run->n_record; i < run->row * run->n_record; i++)
       if (fabs(run->rows[i]) > most) return TOO_LARGE;

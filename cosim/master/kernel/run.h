@@ -29,6 +29,7 @@ typedef struct {
 
 typedef struct {
   void *component, *step;
+  void *work;     /* function that counts the steps of its solver; null: it has none */
   double reached; /* the time at which an FMU of FMI 3 says that it stands */
   int64_t warned;
   int64_t modes;  /* whether a step has left the rounding of numbers changed; it was undone */
@@ -81,7 +82,7 @@ typedef struct {
   Call *calls;
   double *values;
   const Instruction *instructions;
-  int64_t n_instructions;
+  int64_t n_instructions, n_members;
   const double *times;
   double step, end; /* the time at which the run ends */
   const double *external; /* rows per communication point */
@@ -111,5 +112,6 @@ typedef struct {
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
 typedef int (*SetDerivatives2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
+typedef int64_t (*Work)(void *);
 typedef int (*Step2)(void *, double, double, int);
 typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);

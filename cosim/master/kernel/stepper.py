@@ -19,6 +19,8 @@ class Compiled:
         FileNotFoundError: this machine has no compiled executor; the text is its file name.
     """
 
+    looks_ahead = False
+
     def __init__(self, run: Interpreter) -> None:
         self.run, self.kernel = run, Kernel(run)
 
@@ -34,6 +36,14 @@ class Compiled:
         """Begin anew."""
         self.kernel.restart()
 
+    def save(self) -> bytes:
+        """What it keeps from step to step."""
+        return self.kernel.save()
+
+    def restore(self, memory: bytes) -> None:
+        """Return to it."""
+        self.kernel.restore(memory)
+
     def steps(self) -> int:
         """Steps that were made."""
         return self.run.index
@@ -46,6 +56,7 @@ class Compiled:
     def _ended(self, status: int) -> int:
         """Where the compiled executor is; what has not failed goes through."""
         self.run.index, self.run.row = int(self.kernel.run.index), int(self.kernel.run.row)
+        self.run.noted = self.run.index
         if status and status not in (TOO_LONG, TOO_LARGE):
             self._fail(status)
         return status

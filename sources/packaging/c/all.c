@@ -1,4 +1,4 @@
-/* The whole FMU as one translation unit: nothing but the FMI functions is visible outside. */
+/* The whole FMU as one translation unit: nothing but the FMI functions and cosim_work is visible outside. */
 #include "model.c"
 
 #include "core.c"

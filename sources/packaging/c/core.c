@@ -53,6 +53,7 @@ typedef struct {
   int model_exchange;
   int event_mode; /* of co-simulation, FMI 3: the importer may ask for the ticks at its points */
   int version;
+  int64_t work; /* steps of solvers so far: what an importer may limit, where time would depend on the machine */
   uint32_t first; /* value reference of the time */
   int logging;
   char *name;

@@ -149,6 +149,7 @@ static int adaptive(Instance *c, double t1, double length) {
   const double steady = implicit ? CUBE(SAFETY) : FIFTH(SAFETY);
   double left = TRIALS + TRIALS_PER_STEP * length / v[STEP];
   while (t < t1) {
+    c->work += 1;
     if (!(left-- > 0))
       return report(c, ERROR, "%s: %g solver steps from %.9g s on have only reached %.9g s; loosen "
                     "solver.tolerance or use a fixed-step method", MODEL,

@@ -79,6 +79,7 @@ static int integrate(Instance *c, double t1, double length) {
       n = (int)count;
       h = length / n;
     }
+    c->work += n;
     for (int i = 0; i < n; i++) {
       const double t = t0 + i * h;
       if (v[METHOD] == RK4) rk4(&c->m, t, h, v + IX);
@@ -95,6 +96,9 @@ static int integrate(Instance *c, double t1, double length) {
   if (status != OK) v[0] = t0;
   return status;
 }
+
+/* No function of FMI: steps of solvers that an instance has made in co-simulation, tried ones included. */
+EXPORT int64_t cosim_work(const Instance *c) { return c->work; }
 
 static int do_step(Instance *c, double t, double h) {
   double *v = c->m.v;

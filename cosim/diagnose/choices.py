@@ -1,0 +1,84 @@
+"""Which shapes of a law are simulated: those that its parameters say nature has.
+
+A parameter that tells nothing but near its right value (a time constant, cycles per turn, a place
+on the floor) is tried over its range, one parameter at a time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.parts import Parameter
+from ..calibrate.simulator import Simulator
+from .linear import SampleStack
+from .orders import peaks, spectrum
+from .probes import Probe
+from .visits import followed, visited
+
+Vector = NDArray[np.float64]
+PLACES = 24
+"""Places along a run that are tried: half a metre apart on a path of 12 m."""
+APART = 10.0**0.5
+"""Factor between the sizes that are tried. At the frequency where it shows most, a first-order lag
+with a time constant that is wrong by a factor f has a cosine of 2 sqrt(f) / (1 + f) with the right
+one: 0.96 at f = sqrt(APART), the worst between two tries, which hides 8 % of what it explains."""
+
+
+def choices(
+    probe: Probe, simulator: Simulator, theta: Vector, stack: SampleStack, residual: Vector
+) -> list[dict[str, float]]:
+    """Values of a candidate's parameters to try, by name.
+
+    Args:
+        probe: the candidate in its system.
+        simulator: of the system without it.
+        theta: its parameters.
+        stack: of the runs that are looked at.
+        residual: over the noise, what calibration absorbs taken away.
+    """
+    found = []
+    for p in probe.others:
+        found += [{p.name: value} for value in (*p.hints.tries, *sizes(p))]
+        if p.hints.cycles:
+            found += [{p.name: n} for n in _orders(probe, p, simulator, theta, stack, residual)]
+    visits = [(p.name, p.hints.visits) for p in probe.others if p.hints.visits]
+    if visits:
+        names, variables = zip(*visits, strict=True)
+        points = visited(simulator, theta, stack.runs, variables, PLACES)
+        found += [dict(zip(names, point.tolist(), strict=True)) for point in points]
+    return found
+
+
+def sizes(parameter: Parameter) -> list[float]:
+    """Sizes of a parameter that nature leaves open over decades, none of others.
+
+    They are evenly spaced in the logarithm, within its bounds; the FMU's own value is tried anyway.
+    """
+    if not parameter.hints.decades:
+        return []
+    low, high = parameter.hints.decades
+    low, high = max(low, parameter.minimum), min(high, parameter.maximum)
+    count = max(1, round(math.log(high / low) / math.log(APART)))
+    values = [low * (high / low) ** (k / count) for k in range(count + 1)]
+    return [value for value in values if value != parameter.nominal]
+
+
+def _orders(
+    probe: Probe,
+    parameter: Parameter,
+    simulator: Simulator,
+    theta: Vector,
+    stack: SampleStack,
+    residual: Vector,
+) -> list[float]:
+    """Cycles per turn that the residual has over the angle of the effect, which is absent."""
+    whole = probe.problem.nominal
+    whole[: theta.size] = theta
+    paths = followed(
+        simulator.of(probe.problem), whole, stack.runs, [parameter.hints.cycles]
+    )  # fmt: skip
+    angles = [path[:, 0] for path in paths]
+    return peaks(spectrum([run.times for run in stack.runs], angles, stack.by_run(residual)))

@@ -1,0 +1,1 @@
+"""What a diagnosis says to people: facts of its JSON, and sentences that are made of them."""

@@ -1,0 +1,193 @@
+"""The facts of a diagnosis: its JSON, and how each of its numbers is printed.
+
+Sentences and tables of a report print a fact by its path in the JSON and mark it with that path
+(`data-fact`), so that whatever shows the same fact shows the same digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from ...display.html import Cell, Html, number, quantity, tag, text, unit
+from ..whiteness import CALIBRATED
+
+
+def place_in_words(place: str) -> str:
+    """`load.left.axle` as "the axle of left of load"."""
+    parts = [part.replace("_", " ") for part in reversed(place.split("."))]
+    return " of ".join([f"the {parts[0]}", *parts[1:-1], *(f"the {p}" for p in parts[1:][-1:])])
+
+
+def sentence(of: str) -> str:
+    """A text without its full stop."""
+    return of.strip().rstrip(".")
+
+
+def inside(of: str) -> str:
+    """A text as part of a sentence: its first letter small where the word is no name."""
+    whole = sentence(of)
+    named = {"Coulomb", "Stribeck", "PWM"}
+    first = whole.partition(" ")[0]
+    return whole if first in named or first.isupper() else whole[:1].lower() + whole[1:]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a diagnosis found.
+
+    Attributes:
+        table: as of `cosim diagnose --json`.
+        signals: channel -> what it is in the model.
+    """
+
+    table: Mapping[str, Any]
+    signals: Mapping[str, str] = field(default_factory=dict)
+
+    def at(self, *path: str | int) -> Any:
+        """The value at a path of the JSON."""
+        found: Any = self.table
+        for key in path:
+            found = found[key]
+        return found
+
+    # -- printed ----------------------------------------------------------------------------------
+
+    def _shown(self, printed: str, kind: str, path: Sequence[str | int], class_: str = "") -> Html:
+        return tag(
+            "span", printed, data_fact=f"{kind}: {' > '.join(map(str, path))}", class_=class_
+        )
+
+    def number(self, *path: str | int) -> Html:
+        """A number at a path."""
+        return self._shown(number(self.at(*path)), "number", path)
+
+    def percent(self, *path: str | int) -> Html:
+        """A share at a path."""
+        return self._shown(f"{100.0 * self.at(*path):.1f} %", "percent", path)
+
+    def ratio(self, *path: str | int) -> Html:
+        """An error at a path, over its channel's noise."""
+        return self._shown(f"{self.over_noise(*path):.2f}×", "ratio", path)
+
+    def error_cell(self, *path: str | int) -> Cell:
+        """An error with its ratio to the noise, as a cell."""
+        value = self.at(*path)
+        if value is None:
+            return Cell("–")
+        ratio = self.over_noise(*path)
+        shown = text(number(value)) + " (" + self.ratio(*path) + ")"
+        return Cell(Html(shown), ratio, "over" if ratio > CALIBRATED else "good")
+
+    def value(self, *path: str | int) -> Html:
+        """A parameter's value with its unit; the path leads to its entry."""
+        entry = self.at(*path)
+        of = entry.get("unit", "") or self.at(*path[:-1]).get("unit", "")
+        return self._shown(quantity(entry["value"], of), "value", path)
+
+    def interval(self, *path: str | int) -> Html:
+        """A parameter's 95 % interval; "open" where the data say no more than the bounds."""
+        return self._shown(interval(self.at(*path)), "interval", path)
+
+    def over_noise(self, *path: str | int) -> float:
+        """An error at `channels > NAME > ...` over the channel's noise."""
+        error: float = self.at(*path)
+        noise: float = self.at(*path[:2], "noise_rms") if path[0] == "channels" else self.at(
+            *path[:4], "noise_rms")  # fmt: skip
+        return error / noise if noise else float("nan")
+
+    # -- what follows ------------------------------------------------------------------------------
+
+    @property
+    def verdict(self) -> str:
+        """The verdict's name."""
+        return str(self.table["verdict"])
+
+    @property
+    def effects(self) -> list[dict[str, Any]]:
+        """The effects that were found."""
+        return list(self.table["effects"])
+
+    @property
+    def rivals(self) -> list[Mapping[str, str]]:
+        """Other explanations that do as well: the last effect of each."""
+        found = {}
+        for item in self.table["alternatives"]:
+            effect, _, place = item["effects"][-1].partition(" at ")
+            text = item.get("text", effect.replace("_", " "))
+            found[effect, place] = {"effect": effect, "place": place, "text": text}
+        return list(found.values())
+
+    @cached_property
+    def purpose(self) -> str:
+        """The runs that judge: unused ones, or those that were fitted where there are no others."""
+        rows = self.table["channels"].values()
+        unused = any(row["before"]["validation"] is not None for row in rows)
+        return "validation" if unused else "identification"
+
+    @property
+    def runs_in_words(self) -> str:
+        """The runs that judge."""
+        return (
+            "runs that were not used for fitting" if self.purpose == "validation"
+            else "the fitted runs"
+        )  # fmt: skip
+
+    @cached_property
+    def worst(self) -> str:
+        """The channel that the declared model misses most, "" where nothing was simulated."""
+        sizes = {
+            name: row["before"][self.purpose] / row["noise_rms"]
+            for name, row in self.table["channels"].items()
+            if row["before"][self.purpose] is not None and row["noise_rms"]
+        }
+        return max(sizes, key=lambda name: sizes[name], default="")
+
+    @cached_property
+    def left(self) -> list[str]:
+        """Channels whose residual holds more than noise in the end."""
+        found = [
+            test["channel"]
+            for key, tests in self.table["structure"].items()
+            if key.startswith("after")
+            for test in tests
+            if test["structured"]
+        ]
+        return [name for name in self.table["channels"] if name in found]
+
+    @property
+    def errors(self) -> list[dict[str, str]]:
+        """What makes the data useless."""
+        return [f for f in self.table.get("findings", []) if f["severity"] == "error"]
+
+    def concerned(self, finding: Mapping[str, str]) -> list[str]:
+        """Channels that a finding on the data names."""
+        named = finding["column"].replace(",", " ").split()
+        return [name for name in self.signals if name in named]
+
+    def faulty_instances(self) -> dict[str, list[str]]:
+        """Instance -> channels with a fault that are measured there."""
+        found: dict[str, list[str]] = {}
+        for name in dict.fromkeys(n for f in self.errors for n in self.concerned(f)):
+            found.setdefault(self.signals[name].partition(".")[0], []).append(name)
+        return found
+
+    def main_parameter(self, effect: Mapping[str, Any]) -> str:
+        """Name of an effect's strength, "" where it has no parameters."""
+        entry = self.table["power"].get(f"{effect['effect']} at {effect['place']}", {})
+        known = str(entry.get("parameter", "")).rpartition(".")[2]
+        names = list(effect["parameters"])
+        return known if known in names else next(iter(names), "")
+
+
+def interval(entry: Mapping[str, Any]) -> str:
+    """Both ends, and "open" if the data say no more than the bounds."""
+    low, high = entry["ci95"]
+    return f"{number(low)} to {number(high)}{'' if entry['identifiable'] else ', open'}"
+
+
+def named_unit(of: str) -> str:
+    """A unit in a column of its own."""
+    return unit(of) or "–"

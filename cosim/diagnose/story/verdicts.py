@@ -1,0 +1,390 @@
+"""What a verdict means and what to do next, in sentences that show facts only."""
+
+from __future__ import annotations
+
+import shlex
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ...calibrate.checks.finding import LASTING
+from ...display.html import Html, command, join, quantity, tag, words
+from .facts import Facts, inside, place_in_words, sentence
+
+ADVICE = Path(__file__).parent / "advice.toml"
+LABELS = {
+    "effect_found": "Something is missing, and it has a name",
+    "nothing_missing": "Nothing is missing",
+    "confounded": "Something is missing, with more than one explanation",
+    "unexplained": "Something is missing that has no name here",
+    "bad_data": "The data cannot be used",
+}
+SMALL = 3
+"""Effects whose smallest visible size is said beside `nothing_missing`."""
+
+
+@dataclass(frozen=True)
+class Story:
+    """The first screen in words.
+
+    Attributes:
+        label: the verdict in a few words.
+        headline: one sentence.
+        meaning: paragraphs.
+        steps: what to do next, in order.
+    """
+
+    label: str
+    headline: Html
+    meaning: tuple[Html, ...]
+    steps: tuple[Html, ...]
+
+
+@cache
+def advice() -> Mapping[str, Mapping[str, str]]:
+    """Effect -> `means`, `check`."""
+    return tomllib.loads(ADVICE.read_text(encoding="utf-8"))
+
+
+def told(facts: Facts) -> Story:
+    """The story of a diagnosis."""
+    write = {
+        "effect_found": _effect_found, "nothing_missing": _nothing_missing,
+        "confounded": _confounded, "unexplained": _unexplained, "bad_data": _bad_data,
+    }[facts.verdict]  # fmt: skip
+    headline, meaning, steps = write(facts)
+    return Story(LABELS[facts.verdict], headline, tuple(meaning), tuple(steps))
+
+
+# -- parts -----------------------------------------------------------------------------------------
+
+
+def named(effect: Mapping[str, Any]) -> Html:
+    """An effect with its place, in words."""
+    at = place_in_words(effect["place"])
+    return join(inside(effect["text"]), ", at ", at)
+
+
+def label(effect: str, place: str) -> Html:
+    """An effect with its place, as the tables name it."""
+    return tag("code", f"{effect} at {place}" if place else effect)
+
+
+def size(facts: Facts, number: int) -> Html:
+    """The strength of an effect with its interval."""
+    effect = facts.effects[number]
+    name = facts.main_parameter(effect)
+    if not name:
+        return Html("")
+    path = ("effects", number, "parameters", name)
+    return join(facts.value(*path), " (95 %: ", facts.interval(*path), ")")
+
+
+def _misses(facts: Facts, which: str) -> Html:
+    """How far a model is off, in its worst channel."""
+    return facts.ratio("channels", facts.worst, which, facts.purpose)
+
+
+def _meant(effect: str, text: str) -> Html:
+    return join(advice().get(effect, {}).get("means", f"{sentence(text)}."))
+
+
+def _check(effect: str, place: str) -> Html:
+    found = advice().get(effect, {}).get("check")
+    what = found or "Look at this place of the machine and repeat the run that shows it most."
+    return join(tag("b", "Check"), " (", place_in_words(place), "): ", what)
+
+
+def _before_after(facts: Facts) -> Html:
+    worst = facts.worst
+    if not worst:
+        return Html("")
+    return join(
+        "On ", facts.runs_in_words, ", the declared model misses ", tag("b", worst), " by ",
+        _misses(facts, "before"), " its sensor's noise; with what was found, by ",
+        _misses(facts, "after"), ". 1× is the best that any model can do.",
+    )  # fmt: skip
+
+
+def same_traces(effect: Mapping[str, Any]) -> Html:
+    """What leaves the same traces as an effect: itself elsewhere, or laws that are one with it."""
+    if not effect["other_places"]:
+        return Html("")
+    others = words([tag("code", place) for place in effect["other_places"]], "or")
+    return join(
+        "The same effect at another place, or a law that contains it, leaves the same traces as ",
+        label(effect["effect"], effect["place"]), ": these runs cannot tell it from ", others, ".",
+    )  # fmt: skip
+
+
+def _left(facts: Facts) -> Html:
+    if not facts.left:
+        return Html("")
+    names = words([tag("b", name) for name in facts.left])
+    return join(
+        "More is missing: the residual of ", names, " still holds more than noise.",
+    )  # fmt: skip
+
+
+def run_line(facts: Facts) -> str:
+    """The command that runs the scenario with what was found, "" without a scenario."""
+    model = facts.at("model")
+    if not model["scenario"]:
+        return ""
+    changes = [f"--set {name}={variant}" for name, variant in model["variants"].items()]
+    values = [f"--param {name}={value:.6g}" for name, value in model["values"].items()]
+    return " ".join(["cosim run", shlex.quote(model["scenario"]), *changes, *values])
+
+
+def _add(facts: Facts) -> list[Html]:
+    """How to run the model as it was found."""
+    model, line = facts.at("model"), run_line(facts)
+    if not model["variants"]:
+        return []
+    changes = words([tag("code", f'{n} = "{v}"') for n, v in model["variants"].items()])
+    parts: list[object] = [
+        tag("b", "Add it to the model"), ": write ", changes, " under ",
+        tag("code", "[instances]"), " of the system file. The FMU that carries it is in ",
+        tag("code", "fmus/"), " beside this page.",
+    ]  # fmt: skip
+    if line:
+        parts += [
+            " Or run the scenario ", tag("code", model["scenario"]), " with it and all calibrated "
+            "values (it compares with its own logs):", command(line),
+        ]  # fmt: skip
+    return [join(*parts)]
+
+
+def _again(when: str) -> Html:
+    return join(tag("b", "Diagnose again"), " (", tag("code", "cosim diagnose"), f") {when}.")
+
+
+# -- verdicts --------------------------------------------------------------------------------------
+
+
+def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    effects = facts.effects
+    several = len(effects) > 1
+    items = [
+        join(named(effect), *([" – ", size(facts, n)] if size(facts, n) else []))
+        for n, effect in enumerate(effects)
+    ]
+    headline = join(
+        f"The machine has {len(effects)} things that the model lacks: " if several
+        else "The machine has something that the model lacks: ", words(items, "and"), ".",
+    )  # fmt: skip
+    meaning = [_meant(effect["effect"], effect["text"]) for effect in effects]
+    meaning.append(_before_after(facts))
+    meaning += [same_traces(effect) for effect in effects]
+    meaning.append(_left(facts))
+    steps = [_check(effect["effect"], effect["place"]) for effect in effects]
+    steps.append(
+        join(tag("b", "Repair"), " what should not be there, or keep it and ", tag("b", "tell the "
+             "model"), ".")
+    )  # fmt: skip
+    steps += _add(facts)
+    steps.append(_again("with new logs after a repair; the effect should be gone"))
+    return headline, _some(meaning), steps
+
+
+def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    effects = facts.effects
+    first = words([named(effect) for effect in effects])
+    others = [named(rival) for rival in facts.rivals]
+    headline = join(
+        "The machine has something that the model lacks, and these runs fit more than one "
+        "explanation: ", first, "; or ", words(others, "or"), ".",
+    )  # fmt: skip
+    meaning = [
+        join("Either of them would leave the same traces in these runs. A wrong one may predict "
+             "other motions badly, so measure before you repair.")
+    ]  # fmt: skip
+    causes = [*effects, *facts.rivals]
+    meaning += [
+        join(label(e["effect"], e["place"]), ": ", _meant(e["effect"], e["text"])) for e in causes
+    ]
+    meaning += [same_traces(effect) for effect in effects]
+    meaning += [_before_after(facts), _left(facts)]
+    steps = []
+    proposal = facts.at("proposed_experiment")
+    if proposal:
+        factor = proposal["input_factor"]
+        how = "as it was" if factor == 1.0 else f"with its inputs times {factor:g}"
+        steps.append(
+            join(tag("b", "Measure"), f" run {proposal['run']} {how}, "
+                 f"{proposal['repetitions']} time(s): there the explanations stay ",
+                 facts.number("proposed_experiment", "distance"), " σ apart after calibration.")
+        )  # fmt: skip
+        steps.append(_again("with these runs added to the data set"))
+    steps += [_check(e["effect"], e["place"]) for e in causes]
+    steps += _add(facts)
+    return headline, _some(meaning), steps
+
+
+def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    headline = join(
+        "The model describes the machine as far as these runs can tell: what it misses is sensor "
+        "noise."
+    )
+    meaning = [
+        join("After calibration, the worst channel, ", tag("b", facts.worst), ", is missed by ",
+             _misses(facts, "after"), " its sensor's noise on ", facts.runs_in_words,
+             ". 1× is the best that any model can do.")
+        if facts.worst else Html(""),
+        join("No effect of the catalogue makes it better on unused runs. What is smaller than the "
+             "sizes ", tag("a", "listed below", href="#power"), " may still be there unseen",
+             _smallest(facts), "."),
+    ]  # fmt: skip
+    line = run_line(facts)
+    steps = []
+    if line:
+        steps.append(join(tag("b", "Use the model"), " with its calibrated values:", command(line)))
+    else:
+        steps.append(
+            join(tag("b", "Use the model"), " with the ",
+                 tag("a", "calibrated values", href="#parameters"), ".")
+        )  # fmt: skip
+    open_ones = [
+        name for name, entry in facts.at("parameters").items()
+        if not entry.get("after", entry.get("before", {})).get("identifiable", True)
+    ]  # fmt: skip
+    if open_ones:
+        names = words([tag("code", name) for name in open_ones])
+        steps.append(
+            join(tag("b", "Measure"), " ", names, " otherwise, or add runs that move more: these "
+                 "runs alone do not determine ", "it." if len(open_ones) == 1 else "them.")
+        )  # fmt: skip
+    steps.append(
+        join(tag("b", "If you still suspect something"), ": measure runs that would show it "
+             "(faster, slower, loaded, reversing), and diagnose them.")
+    )  # fmt: skip
+    return headline, _some(meaning), steps
+
+
+def _smallest(facts: Facts) -> Html:
+    """Some effects with the size from which they would have been seen, by name."""
+    found = [
+        (label, entry) for label, entry in facts.at("power").items()
+        if entry["smallest_detectable"] is not None
+    ]  # fmt: skip
+    plain = ("viscous", "coulomb", "unbalance", "delay", "gain", "backlash", "payload")
+    chosen = {}
+    for kind in plain:
+        for name, entry in found:
+            if name.startswith(f"{kind} at ") and kind not in chosen:
+                chosen[kind] = (name, entry)
+    shown = [
+        join(label(*name.split(" at ")), " below ",
+             tag("span", quantity(entry["smallest_detectable"], entry["unit"]),
+                 data_fact=f"smallest: power > {name}"))
+        for name, entry in list(chosen.values())[:SMALL]
+    ]  # fmt: skip
+    return join(" (", words(shown), ")") if shown else Html("")
+
+
+CREDIBLE = 0.5
+"""Share of what exceeds the noise from which an unknown input at a place is said to explain it."""
+
+
+def likely_place(facts: Facts) -> Mapping[str, Any] | None:
+    """The place at which an unknown input explains most of what is missing, if there is one."""
+    places = facts.at("localisation")
+    where: Mapping[str, Any] | None = places[0] if places else None
+    return where if where and best_curve(where)[1]["explained"] >= CREDIBLE else None
+
+
+def best_curve(place: Mapping[str, Any]) -> tuple[int, Mapping[str, Any]]:
+    """Number and content of the curve of greatest evidence at a place."""
+    curves = place["curves"]
+    number = max(range(len(curves)), key=lambda n: float(curves[n]["evidence_nats"]))
+    return number, curves[number]
+
+
+def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    where = likely_place(facts)
+    at = f"{where['component']}.{where['port']}" if where else ""
+    headline = join(
+        "The machine does something that neither the model nor the catalogue knows: the model "
+        "misses ", tag("b", facts.worst), " by ", _misses(facts, "after"), " its sensor's noise",
+        join("; what is missing enters most likely at ", place_in_words(at)) if at else "", ".",
+    )  # fmt: skip
+    meaning = [
+        join("Calibration and every effect of the catalogue were tried; none explains what is left "
+             "of ", words([tag("b", name) for name in facts.left]), " on unused runs."),
+    ]  # fmt: skip
+    driver = ""
+    if where is not None:
+        number, best = best_curve(where)
+        driver = best["driver"].replace("_", " ")
+        meaning.append(
+            join("An unknown input at ", tag("code", at), ", free in its course over ",
+                 tag("b", driver), ", would take away ",
+                 facts.percent("localisation", 0, "curves", number, "explained"),
+                 " of what exceeds the noise in the run that shows it most. ",
+                 tag("a", "Its curve", href="#where"), " is what the missing law looks like.")
+        )  # fmt: skip
+    elif facts.at("localisation"):
+        meaning.append(
+            join("No unknown input at a single place that was probed explains half of it (",
+                 tag("a", "places", href="#where"), "): the cause may lie elsewhere, or in several "
+                 "places.")
+        )  # fmt: skip
+    steps = []
+    hints = facts.table.get("hints") or []
+    if hints:
+        steps.append(
+            join(tag("b", "Compare"), " with the ", tag("a", "nearest laws", href="#hints"),
+                 ": what they would take, and what they leave.")
+        )  # fmt: skip
+    if where is not None:
+        steps.append(
+            join(tag("b", "Look"), " at ", place_in_words(at), ": what there depends on ",
+                 tag("b", driver), "?")
+        )  # fmt: skip
+    steps += [
+        join(tag("b", "Repeat"), " the run that shows it most, once slower and once with another "
+             "load: what changes tells what it hangs on."),
+        join(tag("b", "Write the law"), " as an effect (one file with its equation), or use a "
+             "finer variant of the component, and diagnose again."),
+    ]  # fmt: skip
+    return headline, _some(meaning), steps
+
+
+def _bad_data(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    errors = facts.errors
+    first = _found_in(errors[0]) if errors else Html(sentence(str(facts.at("reason"))))
+    more = f" There are {len(errors)} faults in all." if len(errors) > 1 else ""
+    headline = join("These logs cannot be used. ", first, ".", more)
+    meaning = [
+        join("Nothing was calibrated and no effect was looked for: with such data, a search would "
+             "find a cause in the machine for what is a fault of the logs.")
+    ]  # fmt: skip
+    steps = [
+        join(tag("b", "Repair the logs"), ": the faults are listed ",
+             tag("a", "below", href="#findings"), ", each with run and column.")
+    ]  # fmt: skip
+    kinds = list(dict.fromkeys(f["kind"] for f in errors if f["kind"] not in LASTING))
+    if kinds:
+        allowed = ", ".join(f'"{kind}"' for kind in kinds)
+        steps.append(
+            join(tag("b", "If the data are right"), " and the machine is so, let them pass in ",
+                 tag("code", "dataset.toml"), ": ", tag("code", f"[checks] allow = [{allowed}]"),
+                 ".")
+        )  # fmt: skip
+    steps.append(_again("afterwards"))
+    return headline, meaning, steps
+
+
+def _found_in(finding: Mapping[str, str]) -> Html:
+    """A finding with its place."""
+    run = f"Run {finding['run']}" if finding["run"] else ""
+    where = ", ".join(part for part in (run, finding["column"]) if part)
+    said = sentence(finding["text"].partition("; ")[0])
+    return join(f"{where[:1].upper()}{where[1:]}: " if where else "", said)
+
+
+def _some(items: list[Html]) -> list[Html]:
+    return [item for item in items if item]

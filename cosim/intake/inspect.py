@@ -1,0 +1,133 @@
+"""What is in a log: columns, units, clocks, and what is odd."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..calibrate.checks.finding import Finding
+from ..calibrate.checks.smooth import ENOUGH, ORDER, roughness
+from .clock import Clock, find_clock
+from .guess import Guess, guess_unit
+from .rules import cells, copies, limits, spiking, still, times, turning
+from .sources import open_source
+from .topic import Source, Topic
+
+RULES = (times, cells, still, limits, spiking, turning, copies)
+
+
+@dataclass(frozen=True)
+class ColumnReport:
+    """A column.
+
+    Attributes:
+        name: of it.
+        unit: and why.
+        count, missing: cells, and those without a number.
+        low, high: extreme values, NaN if there are none.
+        resolution: smallest difference of two values, 0 if there is none.
+        noise: deviation of what is white in it, 0 where it is too short or not measured.
+    """
+
+    name: str
+    unit: Guess
+    count: int
+    missing: int
+    low: float
+    high: float
+    resolution: float
+    noise: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "name": self.name, "unit": self.unit.unit, "reason": self.unit.reason,
+            "sure": self.unit.sure, "count": self.count, "missing": self.missing,
+            "min": _json(self.low), "max": _json(self.high), "resolution": self.resolution,
+            "noise": self.noise,
+        }  # fmt: skip
+
+
+def _json(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """A topic with all that was found about it."""
+
+    topic: Topic
+    clock: Clock
+    columns: tuple[ColumnReport, ...]
+    findings: tuple[Finding, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "name": self.topic.name, "kind": self.topic.kind, "frames": self.topic.frames,
+            "clock": self.clock.to_dict(), "columns": [c.to_dict() for c in self.columns],
+            "findings": [f.to_dict() for f in self.findings],
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """A file with its topics."""
+
+    source: Source
+    topics: tuple[TopicReport, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "file": str(self.source.path), "kind": self.source.kind,
+            "topics": [t.to_dict() for t in self.topics], "left_out": self.source.left,
+        }  # fmt: skip
+
+
+def inspect(
+    path: Path | str, topics: Iterable[str] = (), clock: str = "", received: bool = False
+) -> FileReport:
+    """What is in a file.
+
+    Args:
+        path: of the log.
+        topics: only these, all if not given.
+        received: of a bag, take the times of recording instead of the stamps in headers.
+        clock: column of times of the topics that have it; found by itself if not given.
+
+    Raises:
+        ScenarioError: it cannot be read.
+    """
+    source = open_source(Path(path), tuple(topics), received)
+    if clock:
+        timed = [replace(t, clock=clock) if clock in t.log.columns else t for t in source.topics]
+        source = replace(source, topics=tuple(timed))
+    return FileReport(source, tuple(inspect_topic(topic) for topic in source.topics))
+
+
+def inspect_topic(topic: Topic) -> TopicReport:
+    """What is in a topic."""
+    clock = find_clock(topic)
+    columns = tuple(
+        _column(topic, name) for name in topic.log.columns if name != clock.column
+    )  # fmt: skip
+    findings = tuple(finding for rule in RULES for finding in rule.check(topic, clock))
+    return TopicReport(topic, clock, columns, findings)
+
+
+def _column(topic: Topic, name: str) -> ColumnReport:
+    values = topic.log[name]
+    good = values[np.isfinite(values)]
+    guess = guess_unit(name, values, topic.log.units.get(name, ""))
+    distinct = np.unique(good)
+    resolution = float(np.min(np.diff(distinct))) if distinct.size > 1 else 0.0
+    return ColumnReport(
+        name, guess, values.size, values.size - good.size,
+        float(good.min()) if good.size else np.nan, float(good.max()) if good.size else np.nan,
+        resolution, roughness(good, ORDER) if good.size > ENOUGH else 0.0,
+    )  # fmt: skip

@@ -1,0 +1,24 @@
+"""Cells without a number, and columns of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...calibrate.checks.finding import Finding
+from ..clock import Clock
+from ..topic import Topic
+
+
+def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
+    """What is lacking, counted."""
+    for name, gaps in topic.log.gaps.items():
+        if name in topic.log.columns and not np.isfinite(topic.log[name]).any():
+            yield Finding("warning", "empty", topic.name, name, "holds no number at all")
+        else:
+            yield Finding("note", "gaps", topic.name, name, str(gaps))
+    for name, held in topic.log.texts.items():
+        yield Finding("note", "reading", topic.name, name, f"holds text, {held.example!r} first")
+    for note in (*topic.log.notes, *topic.notes):
+        yield Finding("note", "reading", topic.name, "", note)

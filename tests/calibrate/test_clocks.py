@@ -1,0 +1,174 @@
+"""Clocks of channels that are estimated, and inputs that change on a clock of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.own_robot import FRAME, RADIUS, TRACK, drive, write_csv
+from cosim.calibrate import Problem, read_problem
+from cosim.calibrate.clocks import clocked, offsets
+from cosim.calibrate.fit import fit
+from cosim.calibrate.simulator import Simulator
+from cosim.errors import ScenarioError, UnitError, UnknownNameError, ValueRangeError
+
+LATE = 0.11
+MAPPING = f"""
+system = "robot.toml"
+step = 0.01
+period = 0.01
+algorithm = "gauss_seidel"
+time = "pose.stamp_ns"
+relative = [["x", "y", "yaw"]]
+[columns]
+left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
+y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
+yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
+[inputs]
+"base.w_l" = "left"
+"base.w_r" = "right"
+[channels]
+x = {{ signal = "base.x", sigma = 0.002 }}
+y = {{ signal = "base.y", sigma = 0.002 }}
+yaw = {{ signal = "base.phi", sigma = 0.004 }}
+[[parameter]]
+name = "r"
+unit = "m"
+nominal = {RADIUS}
+min = 0.01
+max = 0.1
+targets = "base.r"
+[[run]]
+name = "one"
+files = {{ cmd = "one_cmd.csv", pose = "one_pose.csv" }}
+purpose = "identification"
+"""
+CLOCK = """
+[[nuisance]]
+name = "clock"
+unit = "s"
+nominal = 0.0
+min = -0.5
+max = 0.5
+targets = ["clock:x", "clock:y", "clock:yaw"]
+"""
+START = "".join(
+    f"""
+[[nuisance]]
+name = "start of {name}"
+unit = "{unit}"
+per_run = true
+nominal = "first:{name}"
+span = 0.3
+targets = "base.pose_{state}"
+"""
+    for name, unit, state in (("x", "m", "x"), ("y", "m", "y"), ("yaw", "rad", "phi"))
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("clocks")
+    write_csv(drive(7, late=LATE), "one", made)
+    (made / "robot.toml").write_text(
+        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
+        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
+    )
+    return made
+
+
+def problem(folder: Path, clock: str = CLOCK) -> Problem:
+    path = folder / "dataset.toml"
+    path.write_text(MAPPING + clock)
+    return read_problem(folder)
+
+
+def misfit(it: Problem, late: float) -> float:
+    theta = it.nominal
+    theta[it.index("clock")] = late
+    apart = (it.runs[0].data - Simulator(it).simulate(theta, "one")) / it.sigma
+    return float(np.nanmean(apart**2))
+
+
+def test_a_late_clock_shifts_what_the_channels_read(folder: Path) -> None:
+    it = problem(folder)
+    assert clocked(it.parameters) == {"x", "y", "yaw"}
+    assert misfit(it, LATE) < 0.2 * misfit(it, 0.0)
+    assert misfit(it, LATE) < 0.2 * misfit(it, 2 * LATE)
+
+
+def test_a_late_clock_is_estimated(folder: Path) -> None:
+    """The true clock, with a start pose that is estimated: what is left is the noise."""
+    path = folder / "dataset.toml"
+    path.write_text(MAPPING.replace("relative", "#") + CLOCK + START)
+    estimate = fit(Simulator(read_problem(folder)))
+    (clock,) = offsets(estimate).values()
+    assert abs(clock["value"] - LATE) < clock["ci95"][1] - clock["ci95"][0]  # four deviations
+    ((_, residual),) = estimate.residuals
+    # 3 x 280 samples: the deviation of the mean square is 0.05, rounding adds 0.001
+    assert np.nanmean(residual**2) == pytest.approx(1.0, abs=0.2)
+
+
+def test_values_that_a_clock_may_move_out_of_the_run_do_not_count(folder: Path) -> None:
+    run = problem(folder).runs[0]
+    out = (run.times < 0.5) | (run.times > run.times[-1] - 0.5)
+    assert np.array_equal(np.isnan(run.data).all(axis=1), out)
+    assert np.isfinite(problem(folder, "").runs[0].data).all()
+
+
+def test_a_held_clock_stays(folder: Path) -> None:
+    it = problem(folder)
+    theta = it.nominal
+    theta[it.index("clock")] = LATE
+    held = it.hold({"clock": LATE})
+    assert held.names == ("r",)
+    one, other = Simulator(it).simulate(theta, "one"), Simulator(held).simulate(held.nominal, "one")
+    assert np.array_equal(one, other)
+
+
+def test_clocks_have_units_and_names(folder: Path) -> None:
+    it = problem(folder, CLOCK.replace('unit = "s"', 'unit = "ms"').replace("0.5", "500.0"))
+    theta = it.nominal
+    theta[it.index("clock")] = 20.0
+    # 20 * 0.001 rounds
+    assert it.lateness(theta, "one") == pytest.approx(dict.fromkeys(("x", "y", "yaw"), 0.02))
+    with pytest.raises(
+        UnknownNameError, match=r"no channel 'yow' that is measured; did you mean 'yaw'"
+    ):
+        problem(folder, CLOCK.replace("clock:yaw", "clock:yow"))
+    with pytest.raises(UnitError, match=r"nuisance clock: clock:x"):
+        problem(folder, CLOCK.replace('unit = "s"', 'unit = "m"'))
+    with pytest.raises(ValueRangeError, match="parameter clock"):
+        problem(folder, CLOCK.replace("nominal = 0.0", "nominal = 0.7"))
+
+
+def test_clocks_of_single_runs(folder: Path) -> None:
+    it = problem(folder, CLOCK.replace('name = "clock"', 'name = "clock"\nper_run = true'))
+    assert it.names == ("r", "clock@one")
+
+
+def test_held_inputs_change_at_their_own_times(folder: Path) -> None:
+    """Commands come between the samples of the camera, on whose clock the run is."""
+    run = problem(folder, "").runs[0]
+    assert np.diff(run.times) == pytest.approx(FRAME, abs=1e-9)
+    signal = run.inputs["base.w_l"]
+    truth = drive(7, late=LATE)
+    asked = truth.commanded + 0.001  # just after each command
+    known = asked[(asked > LATE) & (asked < truth.stamped[-1])]
+    wanted = truth.left[(asked > LATE) & (asked < truth.stamped[-1])]
+    # twelve digits in the file
+    assert signal.at(known - LATE) == pytest.approx(wanted, rel=1e-9)
+    # on a grid they are what they are at its points
+    path = folder / "dataset.toml"
+    path.write_text(MAPPING.replace("period = 0.01", f"resample = {FRAME}"))
+    coarse = read_problem(folder).runs[0].inputs["base.w_l"]
+    assert np.max(np.abs(coarse.at(known - LATE) - wanted)) > 1.0
+
+
+def test_what_a_run_begins_with_belongs_to_a_run(folder: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"'first:x' is another value in each run; .* per_run"):
+        problem(folder, START.replace("per_run = true", ""))

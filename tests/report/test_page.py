@@ -1,0 +1,175 @@
+"""A report says one thing: in its sentences, its tables and its JSON."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cosim.diagnose.story.facts import Facts, inside, place_in_words
+from cosim.diagnose.story.verdicts import ADVICE, LABELS, run_line, told
+from cosim.report import page as pages
+from cosim.report.page import rendered
+from sources.variant import effects
+from tests.report.marked import Marked, expected
+from tests.report.stories import VERDICTS, material, table
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_sentences_tables_and_json_say_the_same(verdict: str) -> None:
+    shown = material(verdict)
+    found = Marked(rendered(shown))
+    for fact, texts in found.facts.items():
+        assert set(texts) == {expected(dict(shown.table), fact)}, fact
+    if verdict != "bad_data":
+        # the worst channel is told in a sentence, as a figure and in a table
+        assert len(found.facts["ratio: channels > speed > before > validation"]) >= 2
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_verdict_has_its_own_words_and_those_of_no_other(verdict: str) -> None:
+    text = Marked(rendered(material(verdict))).text
+    assert LABELS[verdict] in text
+    assert not [other for name, other in LABELS.items() if name != verdict and other + "." in text]
+    lacks, known = "the model lacks" in text, "describes the machine" in text
+    assert lacks == (verdict in ("effect_found", "confounded"))
+    assert known == (verdict == "nothing_missing")
+    assert ("cannot be used" in text) == (verdict == "bad_data")
+    story = told(Facts(table(verdict)))
+    assert story.meaning and len(story.steps) >= 2
+    assert "nan" not in text and "None" not in text
+
+
+def test_what_a_technician_needs_comes_first() -> None:
+    text = Marked(rendered(material("effect_found"))).text
+    order = ["Something is missing, and it has a name",
+             "Coulomb friction of a shaft, at the flange of the load",
+             "Dry friction: a constant torque", "Raise the torque slowly", "cosim run motor_bench",
+             "Before → after: speed", "What was found", "Errors of the model"]  # fmt: skip
+    places = [text.find(part) for part in order]
+    assert -1 not in places and places == sorted(places)
+
+
+def test_more_that_is_missing_is_said_only_where_it_is() -> None:
+    content = table("effect_found")
+    said = "More is missing"
+    assert said not in "".join(told(Facts(content)).meaning)
+    content["structure"]["after validation"][0]["structured"] = True
+    assert said in "".join(told(Facts(content)).meaning)
+
+
+def test_a_place_is_named_only_where_it_explains_most() -> None:
+    content = table("unexplained")
+    assert "the flange of the load" in told(Facts(content)).headline
+    content["localisation"][0]["curves"][0]["explained"] = 0.3
+    story = told(Facts(content))
+    assert "flange" not in story.headline and "in several places" in "".join(story.meaning)
+
+
+def test_findings_that_cannot_be_let_pass_are_not_offered_to_be() -> None:
+    content = table("bad_data")
+    assert "allow = [&quot;spikes&quot;]" in "".join(told(Facts(content)).steps)
+    content["findings"][0]["kind"] = "short"  # too few samples: nothing can be fitted to them
+    assert "allow" not in "".join(told(Facts(content)).steps)
+
+
+def test_without_a_scenario_no_command_is_invented() -> None:
+    content = table("effect_found")
+    assert run_line(Facts(content)).startswith("cosim run motor_bench --set load=")
+    content["model"]["scenario"] = ""
+    assert run_line(Facts(content)) == "" and "cosim run" not in "".join(told(Facts(content)).steps)
+
+
+@pytest.mark.slow  # builds an FMU
+def test_the_command_of_a_report_runs() -> None:
+    import cosim
+
+    words = shlex.split(run_line(Facts(table("effect_found"))))
+    assert words[:3] == ["cosim", "run", "motor_bench"]
+    variants = {name: value for flag, name, value in _options(words) if flag == "--set"}
+    values = {name: float(value) for flag, name, value in _options(words) if flag == "--param"}
+    assert variants and values
+    result = cosim.run("motor_bench", variants=variants, parameters=values, duration=0.02)
+    assert not any(run.recording.error for run in result.runs.values())
+
+
+def _options(words: list[str]) -> list[tuple[str, str, str]]:
+    """(option, name, value) of a command's options."""
+    found = []
+    for flag, pair in zip(words[3::2], words[4::2], strict=True):
+        name, _, value = pair.partition("=")
+        found.append((flag, name, value))
+    return found
+
+
+def test_optional_parts_are_shown_only_where_they_are() -> None:
+    shown = material("unexplained")
+    plain = rendered(shown)
+    assert 'id="hints"' not in plain and 'id="law"' not in plain
+    more = dict(shown.table)
+    value = {"value": -1.5, "ci95": [-2.0, -1.0], "unit": "N.m", "identifiable": True}
+    law = {"effect": "stribeck", "component": "load", "port": "flange", "place": "load.flange",
+           "parameters": {"tau_s": value}}  # fmt: skip
+    left = {"channel": "speed", "purpose": "validation", "times_noise": 2.5}
+    more["hints"] = [{"effects": [law], "explained": 0.61, "left": left, "first_order": False,
+                      "why": ["its strength has the wrong sign"]}]  # fmt: skip
+    more["law_from_data"] = {
+        "place": "load.flange", "unit": "N.m",
+        "curve": {"driver": "velocity", "at": [-1.0, 0.0, 1.0], "value": [0.4, 0.0, -0.4],
+                  "deviation": [0.1, 0.1, 0.1]},
+        "channels": {"speed": {"noise_rms": 0.155, "before": 0.5, "after": 0.16}},
+    }  # fmt: skip
+    text = Marked(rendered(replace(shown, table=more))).text
+    for part in (
+        "Nearest laws",
+        "tau_s = -1.5 N·m",
+        "61.0 %",
+        "speed at 2.50×",
+        "A law from the data",
+        "0.16 (1.03×)",
+    ):
+        assert part in text
+
+
+def test_every_effect_has_advice_and_no_advice_is_for_nothing() -> None:
+    known = tomllib.loads(ADVICE.read_text("utf-8"))
+    asked = {name for name, module in effects().items() if not module.EFFECT.probe}
+    assert set(known) == asked | {"elastic"}  # a fidelity that is looked for like an effect
+    for name, entry in known.items():
+        assert set(entry) == {"means", "check"}, name
+        assert all(text.endswith(".") and len(text) < 260 for text in entry.values()), name
+
+
+def test_places_and_effects_are_put_in_words() -> None:
+    assert place_in_words("load.flange") == "the flange of the load"
+    assert place_in_words("base.left.axle") == "the axle of left of the base"
+    assert place_in_words("gearbox") == "the gearbox"
+    assert (
+        inside("Coulomb friction.") == "Coulomb friction" and inside("Play in it.") == "play in it"
+    )
+
+
+def test_a_page_asks_for_nothing_outside_itself() -> None:
+    html = rendered(material("effect_found"))
+    outside = re.findall(r'(?:src|href|url\()\s*=?\s*["\'(]?(?:https?:|//)[^"\' )]*', html)
+    assert outside == []
+    assert "<script src" not in html and "@import" not in html
+
+
+def test_names_from_outside_cannot_break_the_page(tmp_path: Path) -> None:
+    shown = material("nothing_missing")
+    content = dict(shown.table) | {"dataset": "</title><script>alert(1)</script>"}
+    channels = (shown.channels[0], replace(shown.channels[1], name="a</script>b"))
+    content["channels"] = {"speed": content["channels"]["speed"]}
+    html = rendered(replace(shown, table=content, channels=channels))
+    assert "<script>alert" not in html and "a</script>b" not in html
+
+
+def test_the_page_is_written_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "collected", lambda result: material("nothing_missing"))
+    pages.write_page(None, tmp_path / "report.html")  # type: ignore[arg-type]
+    assert (tmp_path / "report.html").read_text("utf-8").endswith("</html>\n")
