@@ -297,7 +297,7 @@ def _searched(
     out: Path | None,
     say: Callable[[str], None],
     begun: float,
-    asked: Site | None,
+    asked: Site | None = None,
 ) -> Diagnosis:
     problem = search.raw
     result = Diagnosis(problem, "", "", search, base, findings=findings)
