@@ -13,8 +13,14 @@ from benchmarks.law_from_data import late_drag
 from benchmarks.shaft_plant import FRICTION, SIGMA, shaft
 from cosim.calibrate.problem import Problem
 from cosim.diagnose import Diagnosis, diagnose
+from cosim.diagnose.grey_box import unnamed
+from cosim.diagnose.grey_box.result import Writer
+from cosim.diagnose.localise import Curve, Place
 from cosim.diagnose.models import GATE
-from cosim.errors import UnknownNameError
+from cosim.diagnose.search import Search
+from cosim.errors import UnknownNameError, VariantError
+from cosim.installation.builder import default_provider
+from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 PLACE = "load.flange"
@@ -103,3 +109,28 @@ def test_a_place_that_is_none_is_refused_with_those_that_are() -> None:
     problem: Problem = shaft(lambda w, phi: 0.0, 7)
     with pytest.raises(UnknownNameError, match=r"load\.flange.*as place of a law"):
         diagnose(problem, law_at="load.flunge")
+
+
+def test_only_a_place_with_evidence_gets_a_law_unasked() -> None:
+    problem = shaft(lambda w, phi: 0.0, 7)
+    search = Search(simulator(problem), only=[])
+    base = search.calibrated()
+    at = np.linspace(0.0, 1.0, 9)
+
+    def place(evidence: float) -> Place:
+        curve = Curve("velocity", "", at, at, at, evidence, 1.0)
+        return Place("load", "flange", "", "N.m", [curve])
+
+    assert unnamed(search, base, []) is None
+    assert unnamed(search, base, [place(0.9 * GATE)]) is None
+    found = unnamed(search, base, [place(2.0 * GATE), place(1.5 * GATE)])
+    assert found is not None and not found.made
+    assert "It may as well act at load.flange." in found.reason
+    search.close()
+
+
+def test_a_start_value_of_no_variable_is_refused(tmp_path: Path) -> None:
+    builder = default_provider()
+    assert isinstance(builder, Writer)
+    with pytest.raises(VariantError, match=r"inertia/disc: .*angle.*as variable"):
+        builder.written("inertia/disc", {"angel": 1.0}, tmp_path / "disc.fmu")
