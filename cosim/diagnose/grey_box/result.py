@@ -95,7 +95,11 @@ class LawFromData:
             ],
             "coefficients": self._coefficients(law),
             "curve": {
-                "shape": grid, "x": points[0].tolist(), "y": points[1].tolist(),
+                "driver": law.shape.axes[0].signal,
+                "shape": grid, "deviation": deviation.tolist(),
+                **({} if None not in (law.shape.x, law.shape.y)
+                   else {"at": points[0 if law.shape.x else 1].tolist()}),
+                "x": points[0].tolist(), "y": points[1].tolist(),
                 "value": value.tolist(), "low": (value - BAND * deviation).tolist(),
                 "high": (value + BAND * deviation).tolist(), "visited": visits.tolist(),
                 "low_others_held": (value - BAND * narrow).tolist(),
@@ -107,7 +111,12 @@ class LawFromData:
                 "unused_runs": [r.name for r in self.search.checking.runs
                                 if r.purpose != "identification"],
             },
-            "error": self.errors(law),
+            "error": (errors := self.errors(law)),
+            "channels": {
+                name: {"unit": row["unit"], "noise_rms": row["noise_rms"],
+                       **{which: row[which]["validation"] for which in ("before", "after")}}
+                for name, row in errors.items()
+            },
             "declared": {
                 p.name: {"value": float(law.fitted.estimate.theta[i]), "unit": p.unit,
                          "ci95": [float(law.fitted.estimate.low[i]),
