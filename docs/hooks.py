@@ -190,12 +190,30 @@ def mapping_keys() -> str:
     parts = [
         "# Keys of a mapping",
         "Every key of a `dataset.toml`, with the kind of its value; another key or kind is an "
-        "error with near names. What they mean: [Data sets](../datasets.md).",
+        "error with near names. How they work together: [Data sets](../datasets.md).",
     ]
     for title, keys in tables:
-        rows = [f"| `{key}` | {_kind(check)} |" for key, check in keys.items()]
-        parts += [f"## {title}", "\n".join(["| key | value |", "|---|---|", *rows])]
+        told = max(_meanings(), key=lambda known: len(set(known) & set(keys)))
+        if 2 * len(set(told) & set(keys)) < len(keys):  # a table of other things
+            told = {}
+        rows = [f"| `{k}` | {_kind(check)} | {told.get(k, '')} |" for k, check in keys.items()]
+        parts += [f"## {title}", "\n".join(["| key | value | meaning |", "|---|---|---|", *rows])]
     return "\n\n".join(parts) + "\n"
+
+
+def _meanings() -> list[dict[str, str]]:
+    """Tables of keys and meanings in the page of data sets."""
+    found: list[dict[str, str]] = []
+    before = ""
+    for line in (DOCS / "datasets.md").read_text(encoding="utf-8").splitlines():
+        if line[:1] == "|" and before[:1] != "|":
+            found.append({})
+        cells = line.strip("| ").split(" | ", 1)
+        if line[:1] == "|" and len(cells) == 2:
+            keys = re.findall(r"`\[*([\w.]+?)(?:\.NAME)?\]*(?: = \w+)?`", cells[0])
+            found[-1] |= dict.fromkeys(keys, cells[1].strip())
+        before = line
+    return found
 
 
 def _kind(check: Any) -> str:

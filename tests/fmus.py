@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
@@ -20,7 +21,9 @@ from cosim.spec.cache import cache_folder
 from sources.packaging import catalog
 from sources.packaging.build import build
 
-OUT = cache_folder() / "fmus"
+_CHECKOUT = hashlib.sha256(str(Path(__file__).resolve().parents[1]).encode()).hexdigest()[:12]
+OUT = cache_folder() / "tests" / _CHECKOUT
+"""Each checkout has its own: the same name may stand for other equations in another one."""
 _KEPT: dict[str, ctypes.CDLL] = {}
 _HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
 

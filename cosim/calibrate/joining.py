@@ -336,11 +336,6 @@ class Joined(MappedLogs):
         """
         if isinstance(entry, (int, float)):
             return float(entry)
-        if not run:
-            raise ScenarioError(
-                f"{where}: nominal {entry!r} is another value in each run; say per_run = true, or "
-                "give a number"
-            )
         if entry.startswith("begin:"):
             begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
@@ -474,6 +469,8 @@ class Joined(MappedLogs):
         gain, offset, unit = self.conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))
+        last = np.append(np.diff(times) > 0.0, True)  # of a burst of commands the last one counts
+        times, values = times[last], values[last]
         how = str(entry.get("interpolation", "hold"))
         if how == "slope":  # of the interval that begins
             values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"

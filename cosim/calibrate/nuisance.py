@@ -114,6 +114,18 @@ def starts(problem: Problem) -> list[float]:
     ]
 
 
+def late_values(problem: Problem) -> dict[str, dict[str, float]]:
+    """Late values that runs begin with, by run and name."""
+    found: dict[str, dict[str, float]] = {}
+    for p in problem.late:
+        starts = problem.run(p.run).starts
+        for name, factor in p.targets[:1]:
+            if name in starts:
+                short = p.name.partition("@")[0]
+                found.setdefault(p.run, {})[short] = starts[name] / factor
+    return found
+
+
 def late_estimated(problem: Problem) -> bool:
     """Whether late values of a problem have been estimated."""
     moved = np.subtract(starts(problem), [p.nominal for p in problem.late])

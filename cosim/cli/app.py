@@ -15,6 +15,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -124,6 +125,7 @@ def run_command(
 
     Example: `cosim run motor_bench --set gearbox=elastic+backlash --param gearbox.eta=0.8`
     """
+    from ..report.run_page import write_run_page
     from ..running.runner import run
 
     changes = pairs(variants, "--set", "INSTANCE=VARIANT")
@@ -131,6 +133,7 @@ def run_command(
     chosen = values(options, "--option", "NAME=VALUE")
     if fmus is not None and not fmus.is_dir():
         raise InputError(f"--fmus {fmus}: there is no such folder")
+    folder = out or Path("out") / _folder_name(name)
     with Display() as display:
         provider: Provider = (
             FolderProvider(fmus) if fmus is not None else default_provider(display.building)
@@ -144,11 +147,13 @@ def run_command(
             step=step,
             duration=duration,
             provider=provider,
-            out=out or Path("out") / _folder_name(name),
+            out=folder,
             progress=lambda item, fraction: display.update(item, fraction, 1.0),
             isolate=time_limit if isolate else None,
             guard=True,
         )
+        page = write_run_page(result, provider, folder / "report.html")
+    result = replace(result, files=(*result.files, page))
     for note in dict.fromkeys(note for item in result.runs.values() for note in item.notes):
         say(f"note: {note}")
     if as_json:
@@ -211,6 +216,7 @@ def _print_result(result: Result) -> None:
         console.print(f"in {len(folders) - 1} folders below {folders[-1]}", soft_wrap=True)
     for folder in folders if len(folders) <= SHOWN_FOLDERS else ():
         console.print(f"in {folder}", soft_wrap=True)
+    console.print(f"page: {result.files[-1]}", soft_wrap=True)
     pictures = [path for path in result.files if path.suffix == ".png"]
     for path in pictures[-1:] if pictures and pictures[-1].name == "overview.png" else pictures:
         console.print(f"picture: {path}", soft_wrap=True)

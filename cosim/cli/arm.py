@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -103,8 +104,8 @@ def import_command(
         for k, (joint, body) in enumerate(zip(arm.joints, arm.bodies, strict=True)):
             unit, effort = ("m", "N") if joint.kind == "prismatic" else ("rad", "N.m")
             table.add_row(
-                str(k + 1), joint.name, joint.kind, f"{joint.lower:.4g} {unit}",
-                f"{joint.upper:.4g} {unit}", f"{joint.effort:.4g} {effort}", f"{body.mass:.4g} kg",
+                str(k + 1), joint.name, joint.kind, _shown(joint.lower, unit),
+                _shown(joint.upper, unit), _shown(joint.effort, effort), f"{body.mass:.4g} kg",
             )  # fmt: skip
         console = open_console()
         console.print(table)
@@ -113,6 +114,10 @@ def import_command(
             console.print(variant, soft_wrap=True)
     if not searched:
         say(f"note: to use it by name, set {devices.VARIABLE}={out.resolve()}")
+
+
+def _shown(limit: float, unit: str) -> str:
+    return f"{limit:.4g} {unit}" if math.isfinite(limit) else "no limit"
 
 
 def _built(variants: list[str], out: Path, path: Path) -> list[Path]:

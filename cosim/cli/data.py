@@ -138,6 +138,21 @@ def clock_line(topic: TopicReport) -> str:
     )
 
 
+@data_app.command("example")
+def example_command(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="To write.")],
+) -> None:
+    """Write the logs of an example robot, and a system for it: CSV files, and ROS 2 bags.
+
+    Example: `cosim data example robot`
+    """
+    from ..intake.example import write
+
+    if not write(folder):
+        say("note: without bags, which need the library rosbags: pip install rosbags")
+    print(folder)
+
+
 @data_app.command("import")
 def import_command(
     files: Annotated[

@@ -55,7 +55,7 @@ def diagnose_command(
     """
     from ..calibrate.mapping import read_problem
     from ..diagnose import diagnose
-    from ..report import write_page
+    from ..report.page import write_page
 
     begun, stage = time.monotonic(), "checking the data"
     with Display() as display:

@@ -106,7 +106,8 @@ def _variants(component: str, containing: str) -> list[dict[str, Any]]:
     if component and component not in known:
         return []
     with naming_errors():
-        return [catalog.describe(n) for n in catalog.names(component) if containing in n]
+        names = [*catalog.names(component), *catalog.own_names(component)]
+        return [catalog.describe(name) for name in names if containing in name]
 
 
 def _print_components(entries: list[dict[str, Any]]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError, ValueRangeError
 from ..running.opening import open as open_twin
+from ..spec.distribution import way_out
 
 
 def environment(
@@ -42,13 +43,13 @@ def environment(
         import gymnasium
     except ImportError:
         raise InputError(
-            "an environment needs gymnasium, which is not installed; pip install 'cosim[gym]'"
+            f"an environment needs gymnasium, which is not installed; {way_out('gym')}"
         ) from None
     for name, (low, high) in actions.items():
         if not low < high:
             raise ValueRangeError(f"action {name}: its bounds {low:g} and {high:g} are not rising")
 
-    class Environment(gymnasium.Env):  # type: ignore[misc]
+    class Environment(gymnasium.Env):
         """See `environment`."""
 
         metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012

@@ -17,6 +17,7 @@ from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
 from ..calibrate.clocks import offsets
 from ..calibrate.deferred import step_error
+from ..calibrate.nuisance import late_values
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
@@ -182,15 +183,7 @@ class Diagnosis:
 
     def start_values(self) -> dict[str, dict[str, float]]:
         """Late values that were estimated, by run."""
-        found: dict[str, dict[str, float]] = {}
-        if self.after is not None:
-            for p in self.after.problem.late:
-                starts = self.after.problem.run(p.run).starts
-                for name, factor in p.targets[:1]:
-                    if name in starts:
-                        short = p.name.partition("@")[0]
-                        found.setdefault(p.run, {})[short] = starts[name] / factor
-        return found
+        return late_values(self.after.problem) if self.after is not None else {}
 
     def effects(self) -> list[dict[str, Any]]:
         """The effects that were found."""

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from html import escape
 
 UNITLESS = ("", "-", "1")
+VOID = ("img",)
+"""Elements that have no end."""
 
 
 class Html(str):
@@ -33,7 +35,7 @@ def tag(name: str, *items: object, **attributes: object) -> Html:
         for key, value in attributes.items()
         if value is not None and value != ""
     )
-    return Html(f"<{name}{given}>{join(*items)}</{name}>")
+    return Html(f"<{name}{given}>" + ("" if name in VOID else f"{join(*items)}</{name}>"))
 
 
 def number(value: float | None) -> str:

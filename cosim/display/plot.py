@@ -16,7 +16,7 @@ class Curve:
 
     Attributes:
         name: as shown, "" for a line without a key.
-        colour: `measured`, `before`, `after` or `other`.
+        colour: `measured`, `before`, `after`, `other`, `fourth` or `fifth`.
         x, y: signals; where there is a signal `y^`, it has the largest values, y the smallest.
         less: two signals whose difference is meant where there is no signal y.
         width: [px].

@@ -20,8 +20,9 @@ PER_VALUE = 8.0 / 3.0
 """Characters for a number: two bytes in base64."""
 LEVELS = 65534
 """Steps between the smallest and the largest value of a signal."""
-EVEN = 1e-6
-"""Part of an interval by which times of an even grid may be off it."""
+EVEN = 1e-3
+"""Part of an interval by which times of an even grid may be off it: logs keep them rounded, often
+to 32 bits, and no screen shows it."""
 
 
 def stretch(samples: int, room: float, longest: int) -> int:

@@ -23,6 +23,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from ..errors import CosimError, InputError, listing
+from ..spec.distribution import needed
 
 Line = tuple[float, bytes]
 """Arrival by `time.monotonic` [s], and the line."""
@@ -216,13 +217,7 @@ def _udp(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
 
 
 def _mqtt(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
-    try:
-        from paho.mqtt import client as mqtt
-    except ImportError:
-        raise InputError(
-            f"--source {address}: needs paho-mqtt, which is not installed; "
-            "pip install 'cosim[live]'"
-        ) from None
+    mqtt = needed("paho.mqtt.client", f"--source {address}", "live")
     parts = urlsplit(address)
     topic = unquote(parts.path.lstrip("/"))
     if not parts.hostname or not topic:

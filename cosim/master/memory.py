@@ -88,7 +88,7 @@ class Memory:
         for array, content in zip(_arrays(run), self.arrays, strict=True):
             array[:] = content
         run.previous = list(self.previous)
-        run.index, run.row = self.index, self.row
+        run.index, run.row, run.beside = self.index, self.row, None
         for name, items in self.kept.items():
             run.passing.kept[name][:] = items
         for instance in run.instances:

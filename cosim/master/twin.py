@@ -78,10 +78,8 @@ class Twin:
         about: Mapping[str, Any] | None = None,
     ) -> None:
         if not isinstance(master, Master):
-            raise wrong(
-                "the master of a Twin", master, "a Master",
-                'write Twin(Master(system)), or cosim.open("motor_bench/ST1") for a scenario',
-            )  # fmt: skip
+            way = 'write Twin(Master(system)), or cosim.open("motor_bench/ST1") for a scenario'
+            raise wrong("the master of a Twin", master, "a Master", way)
         need_number("the duration of a Twin", duration, "give it in seconds")
         self._made = (master, duration, inputs, record, every, start, about)
         self.master, endless = master, duration == math.inf
@@ -97,7 +95,7 @@ class Twin:
         self._start = start
         self._stack = ExitStack()
         self._failed = self.ended = ""
-        self._begun = self._closed = self._complete = False
+        self._begun = self._closed = False
         self._base = self._taken = 0
         self._blocks: list[tuple[Vector, Vector]] = []
         self._saved: list[Saved] = []
@@ -239,15 +237,11 @@ class Twin:
                 f"at {self.end:.9g} s; open the twin with a longer duration, or duration=math.inf"
             )
         try:
-            while left:
-                if run.index == self._outline.count:
-                    self._roll()
-                last = min(run.index + left, self._outline.count)
-                left -= last - run.index
-                self._inputs.put(run.index, last + 1)
-                self._stepper.advance(last)
-        except EndRequest as request:
-            self.ended, self._complete = str(request), request.complete
+            try:
+                self._go(left)
+            except EndRequest as request:  # an end that an FMU asks for is one
+                self.ended = str(request)
+                self._execution.finish(request)
         except (FmuCallError, AlgebraicLoopError) as error:
             self._failed = str(error)
             stopped = self._execution.stopped(error, keep=False)
@@ -255,6 +249,17 @@ class Twin:
                 str(stopped), stopped.messages, time=stopped.time, recording=self.recording
             ) from error
         return self.time
+
+    def _go(self, left: int) -> None:
+        """Make some communication steps."""
+        run = self._run
+        while left:
+            if run.index == self._outline.count:
+                self._roll()
+            last = min(run.index + left, self._outline.count)
+            left -= last - run.index
+            self._inputs.put(run.index, last + 1)
+            self._stepper.advance(last)
 
     def _begin(self) -> None:
         """Initialize, with the inputs that have been set."""
@@ -458,10 +463,7 @@ class Twin:
     def _present(self, objects: dict[str, list[Any]]) -> Vector | None:
         """The present point as a run that ends here records it; nothing changes by this."""
         run, layout = self._run, self._run.layout
-        between = run.index % run.every != 0
-        if between and not (self.ended and self._complete):  # where all FMUs ended is recorded
-            return None
-        if not between and run.row > run.index // run.every:
+        if self.ended or run.index % run.every or run.row > run.index // run.every:
             return None
         self._inputs.put(run.index, run.index + 1)
         with Memory.exchange(run):

@@ -1,5 +1,1 @@
-"""Reports of diagnoses and calibrations as web pages that need nothing else."""
-
-from .page import write_page
-
-__all__ = ["write_page"]
+"""Reports of diagnoses, calibrations and runs as web pages that need nothing else."""

@@ -216,7 +216,10 @@ def _parameters(
         ("within its bounds", "Dot: value, bar: 95 % interval, tick: nominal value, line: bounds."),
         ("weight", "RMS change of the channels, in their noise, for a change over all bounds."),
     ]  # fmt: skip
-    return section("parameters", "Parameters", table(head, rows, "calibrated parameters"))
+    return section(
+        "parameters", "Parameters", table(head, rows, "calibrated parameters"),
+        sections.clocks(facts),
+    )  # fmt: skip
 
 
 def _errors(facts: Facts, material: Material) -> Html:

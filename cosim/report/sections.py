@@ -180,7 +180,24 @@ def parameters(facts: Facts, symbols: Mapping[str, str]) -> Html:
         head += [which if changed else "value", "95 % interval"]
     return section(
         "parameters", "Parameters", table(_head(*head), rows, "calibrated parameters"),
-        starts(facts.at("start_values")),
+        clocks(facts), starts(facts.at("start_values")),
+    )  # fmt: skip
+
+
+def clocks(facts: Facts) -> Html:
+    """How late clocks were found to be."""
+    rows = [
+        [name, Cell(facts.value("clocks", name), item["value"]),
+         Cell(facts.interval("clocks", name), item["ci95"][0],
+              "" if item["identifiable"] else "over"),
+         "at a bound" if item["at_bound"] else ""]
+        for name, item in facts.table.get("clocks", {}).items()
+    ]  # fmt: skip
+    if not rows:
+        return Html("")
+    return join(
+        tag("h3", "Clocks that were estimated: late by"),
+        table(["clock", "late by", ("95 % interval", WORDS["95 % interval"]), ""], rows, "clocks"),
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ def _log_columns(values: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
     kinds = (
         ("q", "arm.q", [NOISE[unit] for unit in _units(values, "rad", "m")]),
         ("qd", "arm.qd", [NOISE[unit] for unit in _units(values, "rad/s", "m/s")]),
-        ("tau", "drive.tau", _sigmas(values)),
+        ("tau", "drive.tau_motor", _sigmas(values)),
     )
     for column, signal, noises in kinds:
         for k, noise in enumerate(noises):
@@ -120,9 +120,12 @@ def _blocks(device: str, values: Mapping[str, Any], payload: float) -> dict[str,
         )
     return {
         "device": device,
-        "n": str(count),
-        "q_signals": ", ".join(f'"arm.q[{k}]"' for k in numbers),
-        "tau_signals": ", ".join(f'"drive.tau[{k}]"' for k in numbers),
+        "plots": _plots(values),
+        "inputs": "\n".join(
+            f'"arm.{signal}[{k}]" = {{ column = "{column}_{k}", interpolation = "linear" }}'
+            for signal, column in (("q", "q"), ("qd", "speed"), ("qdd", "acceleration"))
+            for k in numbers
+        ),
         "rotors": f"arm.J_m = {values['J_rotor']['value']}   # as those of arm_drive",
         "columns": "\n".join(columns),
         "channels": "\n".join(
@@ -133,6 +136,26 @@ def _blocks(device: str, values: Mapping[str, Any], payload: float) -> dict[str,
         "differs": f"a load of {payload:g} kg on the flange, which the mapping does not know of,",
         "limits": _limits(values),
     }
+
+
+def _plots(values: Mapping[str, Any]) -> str:
+    """Positions and torques of joints that turn and of those that slide, and the first's error."""
+    slides = values["prismatic"]["value"]
+    parts = []
+    for flag, (positions, torques) in enumerate(
+        (("joints", "torques of the motors"), ("sliding joints", "forces of the motors"))
+    ):
+        chosen = [k for k, slide in enumerate(slides, 1) if slide == flag]
+        for label, signal in ((positions, "arm.q"), (torques, "drive.tau_motor")):
+            if chosen:
+                listed = ", ".join(f'"{signal}[{k}]"' for k in chosen)
+                parts.append(f'[[plots]]\nlabel = "{label}"\nsignals = [{listed}]')
+    unit = "mm" if slides[0] else "mrad"
+    parts.append(
+        '[[plots]]\nlabel = "joint 1 less set"\nsignals = ["arm.q[1]"]\nminus = "path.q_set[1]"\n'
+        f'unit = "{unit}"'
+    )
+    return "\n\n".join(parts)
 
 
 def _limits(values: Mapping[str, Any]) -> str:

@@ -23,6 +23,8 @@ LINE = 0.025
 """Distance of the frequencies of an excitation [Hz]; it takes 40 s."""
 FAST = 0.7
 """Share of a joint's largest speed that an excitation may reach."""
+SMOOTH = 0.05
+"""Speed below which Coulomb friction fades [rad/s]: servos and links exchange every millisecond."""
 NO_LIMIT = 1e6
 """Torque [N.m] or force [N] that no arm reaches."""
 
@@ -122,12 +124,15 @@ def text(arm: Arm, source: str) -> str:
     add("tau_max", [min(j.effort, NO_LIMIT) for j in arm.joints], "N.m",
         "Limits of the torques; 1e6 where the file has none.", along="N")  # fmt: skip
     add("F_v", [j.damping for j in arm.joints], "N.m.s/rad",
-        "For `moved_arm`: viscous friction. `serial_arm` has friction as effects.",
+        "Viscous friction, of `arm_drive` and `moved_arm`.",
         along="N.s/m")  # fmt: skip
-    add("F_c", [j.friction for j in arm.joints], "N.m", "For `moved_arm`: Coulomb friction.",
+    add("F_c", [j.friction for j in arm.joints], "N.m", "Coulomb friction, of the same.",
         along="N")  # fmt: skip
 
     made = "computed by cosim arm import"
+    out += ["# Speed over which the sign of the Coulomb friction is smoothed.", "[w_0]",
+            f"value = {SMOOTH}", 'unit = "rad/s"', f'origin = "{made}"', "assumed = true",
+            ""]  # fmt: skip
     add("angle", middle, "rad", "Start of `serial_arm`: the middle of each range.", along="m",
         origin=made)  # fmt: skip
     add("J_link", inertias, "kg.m2",

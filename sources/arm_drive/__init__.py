@@ -14,6 +14,7 @@ QD_SET = Quantity("qd_set", "rad/s", "set speeds of the joints", size=2)
 Q = Quantity("q", "rad", "angles of the joints (gear outputs)", size=2)
 QD = Quantity("qd", "rad/s", "speeds of the joints (gear outputs)", size=2)
 TAU = Quantity("tau", "N.m", "torques of the gears on the joints", size=2)
+TAU_MOTOR = Quantity("tau_motor", "N.m", "torques of the motors, behind the gears", size=2)
 J_OUT = Quantity(
     "J_b", "kg.m2", "inertias that the joints carry for the rotors", size=2, passed_on=True
 )

@@ -1,11 +1,12 @@
 """Servos whose torque follows from the error at once: spring, damper and integral part.
 
     e = q_set - q,   s' = k_i e  (held while the torque is at its limit)
-    tau = sat(k e + d (qd_set - qd) + s, tau_max)
+    tau_motor = sat(k e + d (qd_set - qd) + s, tau_max)
+    tau = tau_motor - F_v qd - F_c tanh(qd / w_0)
 
 For arms whose motors and controller are not known. What the servos need is supplied.
 
-Not modelled: motors, gears, sampling, friction (attach it as an effect).
+Not modelled: motors, gears, sampling, other friction (attach it as an effect).
 
 Source: Siciliano et al., Robotics: Modelling, Planning and Control, 2009, ch. 8.5.
 """
@@ -28,6 +29,9 @@ TAU_MAX = Quantity("tau_max", "N.m", "limits of the torques", start=1e6, minimum
 J_B = Quantity(
     "J_rotor", "kg.m2", "inertias of the rotors, seen at the joints", minimum=0.0, size=2
 )
+F_V = Quantity("F_v", "N.m.s/rad", "viscous friction", minimum=0.0, size=2)
+F_C = Quantity("F_c", "N.m", "Coulomb friction", minimum=0.0, size=2)
+W_0 = Quantity("w_0", "rad/s", "speed over which the sign is smoothed", start=0.05, minimum=1e-6)
 INTEGRAL = Quantity("integral", "N.m", "state: integral parts of the torques", size=2)
 
 
@@ -42,8 +46,12 @@ def equations(m: Model) -> None:
     wanted = p.k * error + p.d * (u.qd_set - u.qd) + x.integral
     hold = ca.fmax(-p.tau_max, ca.fmin(wanted, p.tau_max))
     m.derivative(x.integral, ca.if_else(ca.fabs(wanted) < p.tau_max, p.k_i * error, 0))
-    torque = hold + joints.efforts(m, speed=u.qd, angle=u.q, load=hold)
+    drag = m.parameters(joints.sized(F_V), joints.sized(F_C), W_0)
+    friction = drag.F_v * u.qd + drag.F_c * ca.tanh(u.qd / drag.w_0)
+    torque = hold - friction + joints.efforts(m, speed=u.qd, angle=u.q, load=hold)
     m.output(joints.sized(qs.TAU), torque)
+    m.output(joints.sized(qs.TAU_MOTOR), hold)
     m.output(joints.sized(qs.J_OUT), p.J_rotor)
     m.port(joints.port(qs.JOINT), torque, u.qd)
     m.supply(ca.dot(hold, u.qd))
+    m.loss("friction", ca.dot(friction, u.qd))

@@ -6,7 +6,9 @@ from ..component import Component, Port
 from ..dc_motor import TAU, W
 from ..quantity import Quantity
 
-U_SET = Quantity("u_set", "V", "voltage that the amplifier is told to apply", nominal=10.0)
+U_SET = Quantity(
+    "u_set", "V", "voltage that the amplifier is told to apply", start=10.0, nominal=10.0
+)
 
 SHAFT = Port("shaft", TAU, W, "gives_effort", -1, "shaft end; the rotor's inertia is outside")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-V_X = Quantity("v_x", "m/s", "velocity of the pivot, body x axis (forward)", nominal=1.0)
+V_X = Quantity("v_x", "m/s", "velocity of the pivot, body x axis (forward)", start=0.3, nominal=1.0)
 V_Y = Quantity("v_y", "m/s", "velocity of the pivot, body y axis (left)", nominal=0.1)
 W_Z = Quantity("w_z", "rad/s", "yaw rate of the body, positive turns left", nominal=1.0)
 F_N = Quantity("f_n", "N", "normal force on the wheel", start=200.0, nominal=200.0)

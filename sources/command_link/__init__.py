@@ -13,7 +13,7 @@ from ..trajectory import PHI_D, V_D, W_D, XD_D, YD_D
 
 SX = Any
 
-V_SET = Quantity("v_set", "m/s", "forward speed as commanded")
+V_SET = Quantity("v_set", "m/s", "forward speed as commanded", start=0.3)
 W_SET = Quantity("w_set", "rad/s", "yaw rate as commanded")
 XD_SET = Quantity("xd_set", "m/s", "speed along the world's x axis as commanded")
 YD_SET = Quantity("yd_set", "m/s", "speed along the world's y axis as commanded")

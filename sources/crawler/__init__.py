@@ -5,8 +5,12 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-W2 = Quantity("w2", "rad/s", "speed of the right track wheel, positive drives forward", nominal=4.0)
-W3 = Quantity("w3", "rad/s", "speed of the left track wheel, positive drives forward", nominal=4.0)
+W2 = Quantity(
+    "w2", "rad/s", "speed of the right track wheel, positive drives forward", start=4.0, nominal=4.0
+)
+W3 = Quantity(
+    "w3", "rad/s", "speed of the left track wheel, positive drives forward", start=3.0, nominal=4.0
+)
 
 X = Quantity("x", "m", "world position of the body frame origin O1")
 Y = Quantity("y", "m", "world position of the body frame origin O1")

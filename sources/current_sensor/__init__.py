@@ -11,7 +11,7 @@ from ..quantity import Quantity
 
 SX = Any
 
-I = Quantity("i", "A", "current, positive drives forward")  # noqa: E741 - the field's symbol
+I = Quantity("i", "A", "current, positive drives forward", start=1.0)  # noqa: E741 - the field's symbol
 I_MEAS = Quantity("i_meas", "A", "measured current")
 BANDWIDTH = Quantity("bandwidth", "Hz", "corner frequency", 2000.0, minimum=1e-3)
 I_F = Quantity("i_f", "A", "current after the sensor's low pass")

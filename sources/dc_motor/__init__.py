@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-W_REF = Quantity("w_ref", "rad/s", "set speed of the motor", nominal=100.0)
+W_REF = Quantity("w_ref", "rad/s", "set speed of the motor", start=50.0, nominal=100.0)
 W = Quantity("w", "rad/s", "speed of the shaft, given by what the motor drives", nominal=100.0)
 TAU = Quantity("tau", "N.m", "torque on the driven side, positive accelerates it")
 I = Quantity("i", "A", "winding current, positive drives forward")  # noqa: E741

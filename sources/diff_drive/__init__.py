@@ -5,8 +5,12 @@ from __future__ import annotations
 from ..component import Component
 from ..quantity import Quantity
 
-W_L = Quantity("w_l", "rad/s", "speed of the left wheel, positive drives forward", nominal=3.0)
-W_R = Quantity("w_r", "rad/s", "speed of the right wheel, positive drives forward", nominal=3.0)
+W_L = Quantity(
+    "w_l", "rad/s", "speed of the left wheel, positive drives forward", start=3.0, nominal=3.0
+)
+W_R = Quantity(
+    "w_r", "rad/s", "speed of the right wheel, positive drives forward", start=2.0, nominal=3.0
+)
 X = Quantity("x", "m", "world position of the middle of the axle")
 Y = Quantity("y", "m", "world position of the middle of the axle")
 PHI = Quantity("phi", "rad", "heading, unwrapped, positive turns left")

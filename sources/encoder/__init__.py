@@ -6,7 +6,7 @@ from ..component import Component
 from ..quantity import Quantity
 
 PHI = Quantity("phi", "rad", "angle of the shaft")
-W = Quantity("w", "rad/s", "speed of the shaft")
+W = Quantity("w", "rad/s", "speed of the shaft", start=10.0)
 PHI_MEAS = Quantity("phi_meas", "rad", "measured angle")
 W_MEAS = Quantity("w_meas", "rad/s", "measured speed")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-TAU_A = Quantity("tau_a", "N.m", "torque of the motor on flange a", nominal=1.0)
+TAU_A = Quantity("tau_a", "N.m", "torque of the motor on flange a", start=1.0, nominal=1.0)
 W_A = Quantity("w_a", "rad/s", "speed of flange a")
 TAU_B = Quantity("tau_b", "N.m", "torque on the load at flange b, positive accelerates it")
-W_B = Quantity("w_b", "rad/s", "speed of flange b", nominal=10.0)
+W_B = Quantity("w_b", "rad/s", "speed of flange b", start=1.0, nominal=10.0)
 J_A = Quantity(
     "J_a", "kg.m2", "inertia of the rotor on flange a", start=2.0e-4, minimum=0.0, nominal=1e-4
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-TAU = Quantity("tau", "N.m", "torque on the load, positive accelerates it", nominal=1.0)
+TAU = Quantity("tau", "N.m", "torque on the load, positive accelerates it", start=1.0, nominal=1.0)
 J_ADDED = Quantity(
     "J_added", "kg.m2", "inertia that the load carries for its drive (a gearbox's `J_b`)"
 )

@@ -12,7 +12,7 @@ SCENE = [
     ]),
     node("disc", [move(0.02, 0, 0.12), turn("x", "phi")], [
         cylinder(0.1, 0.02, "x", colour=STEEL),
-        cylinder(0.012, 0.12, "x", (-0.05, 0, 0), DARK),
+        cylinder(0.012, 0.12, "x", (-0.055, 0, 0), DARK),
         box(0.022, 0.02, 0.085, (0, 0, 0.05), ACCENT),
     ]),
 ]  # fmt: skip

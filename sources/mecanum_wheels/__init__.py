@@ -9,6 +9,7 @@ W = Quantity(
     "w",
     "rad/s",
     "speeds of the wheels front left, front right, rear left, rear right, positive drives forward",
+    start=3.0,
     size=4,
 )
 X = Quantity("x", "m", "world position of the base's centre")

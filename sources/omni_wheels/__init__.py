@@ -5,7 +5,9 @@ from __future__ import annotations
 from ..component import Component
 from ..quantity import Quantity
 
-W = Quantity("w", "rad/s", "speeds of the wheels, positive drives counter-clockwise", size=3)
+W = Quantity(
+    "w", "rad/s", "speeds of the wheels, positive drives counter-clockwise", start=3.0, size=3
+)
 X = Quantity("x", "m", "world position of the base's centre")
 Y = Quantity("y", "m", "world position of the base's centre")
 PHI = Quantity("phi", "rad", "heading, unwrapped, positive turns left")

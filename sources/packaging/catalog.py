@@ -62,6 +62,16 @@ def names(component: str = "") -> tuple[str, ...]:
     return tuple(found)
 
 
+def own_names(component: str = "") -> list[str]:
+    """Variants of the user's own devices, every fidelity of each component that has such."""
+    return [
+        f"{each}.{device}/{fidelity}"
+        for each in ([component] if component else components())
+        for device in own_devices.own(each)
+        for fidelity in fidelities(each)
+    ]
+
+
 def overview() -> list[dict[str, Any]]:
     """Every component with its fidelities, simplest first, and its devices.
 

@@ -99,7 +99,7 @@ def _logs_and_experiment(root: ET.Element) -> None:
     for category in LOG_CATEGORIES:
         ET.SubElement(categories, "Category", name=category)
     ET.SubElement(
-        root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=1.0, stepSize=1e-3)
+        root, "DefaultExperiment", _attributes(startTime=0.0, stopTime=3.0, stepSize=1e-3)
     )
 
 

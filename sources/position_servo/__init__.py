@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-Q_REF = Quantity("q_ref", "rad", "set angle of the shaft")
+Q_REF = Quantity("q_ref", "rad", "set angle of the shaft", start=0.5)
 PHI = Quantity("phi", "rad", "angle of the shaft, given by what the drive moves")
 W = Quantity("w", "rad/s", "speed of the shaft, given by what the drive moves", nominal=10.0)
 TAU = Quantity("tau", "N.m", "torque on the driven side, positive accelerates it")

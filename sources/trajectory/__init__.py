@@ -16,9 +16,9 @@ SEGMENTS = 4
 
 V_SET = Quantity("v_set", "m/s", "forward speed commanded from outside, added to the profile")
 W_SET = Quantity("w_set", "rad/s", "yaw rate commanded from outside, added to the profile")
-V_D = Quantity("v_d", "m/s", "set forward speed of the base")
-W_D = Quantity("w_d", "rad/s", "set yaw rate, positive to the left")
-XD_D = Quantity("xd_d", "m/s", "set speed along the world's x axis")
+V_D = Quantity("v_d", "m/s", "set forward speed of the base", start=0.5)
+W_D = Quantity("w_d", "rad/s", "set yaw rate, positive to the left", start=0.2)
+XD_D = Quantity("xd_d", "m/s", "set speed along the world's x axis", start=0.5)
 YD_D = Quantity("yd_d", "m/s", "set speed along the world's y axis")
 PHI_D = Quantity("phi_d", "rad", "set heading in the world, unwrapped")
 HEADING = Quantity("heading", "rad", "set heading in the world at present")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from ..component import Component
 from ..quantity import Quantity
 
-STEER = Quantity("steer", "rad", "angle of the steering's encoder, positive turns left")
-W = Quantity("w", "rad/s", "speed of the driven wheel, positive drives forward", nominal=3.0)
+STEER = Quantity("steer", "rad", "angle of the steering's encoder, positive turns left", start=0.1)
+W = Quantity(
+    "w", "rad/s", "speed of the driven wheel, positive drives forward", start=3.0, nominal=3.0
+)
 X = Quantity("x", "m", "world position of the middle of the fixed axle")
 Y = Quantity("y", "m", "world position of the middle of the fixed axle")
 PHI = Quantity("phi", "rad", "heading, unwrapped, positive turns left")

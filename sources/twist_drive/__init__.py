@@ -6,7 +6,9 @@ from ..component import Component, Port
 from ..omni_base import BETA_RATE, PHI_RATE, TAU_BETA, TAU_PHI
 from ..quantity import Quantity
 
-VX_SET = Quantity("vx_set", "m/s", "set velocity of the reference point forward, platform axes")
+VX_SET = Quantity(
+    "vx_set", "m/s", "set velocity of the reference point forward, platform axes", start=0.2
+)
 VY_SET = Quantity("vy_set", "m/s", "set velocity of the reference point to the left")
 W_SET = Quantity("w_set", "rad/s", "set yaw rate, positive turns left")
 I_D = Quantity("i_d", "A", "currents of the rolling motors, positive drives forward", size=3)

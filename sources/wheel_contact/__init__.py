@@ -5,11 +5,15 @@ from __future__ import annotations
 from ..component import Component, Port
 from ..quantity import Quantity
 
-TAU = Quantity("tau", "N.m", "torque of the drive on the axle, positive accelerates forward")
+TAU = Quantity(
+    "tau", "N.m", "torque of the drive on the axle, positive accelerates forward", start=5.0
+)
 J_ADDED = Quantity(
     "J_added", "kg.m2", "inertia that the wheel carries for its drive (a gearbox's `J_b`)"
 )
-V_X = Quantity("v_x", "m/s", "velocity of the wheel centre, body x axis (forward)", nominal=1.0)
+V_X = Quantity(
+    "v_x", "m/s", "velocity of the wheel centre, body x axis (forward)", start=0.5, nominal=1.0
+)
 V_Y = Quantity("v_y", "m/s", "velocity of the wheel centre, body y axis (left)", nominal=0.1)
 V_Z = Quantity("v_z", "m/s", "velocity of the wheel centre, up", nominal=0.01)
 W_Z = Quantity("w_z", "rad/s", "yaw rate of the body, positive turns left", nominal=1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..component import Component
 from ..quantity import Quantity
 
-V_SET = Quantity("v_set", "m/s", "forward speed as commanded")
+V_SET = Quantity("v_set", "m/s", "forward speed as commanded", start=0.3)
 W_SET = Quantity("w_set", "rad/s", "yaw rate as commanded, positive turns left")
 W_L = Quantity("w_l", "rad/s", "speed of the left wheel, positive drives forward", nominal=3.0)
 W_R = Quantity("w_r", "rad/s", "speed of the right wheel, positive drives forward", nominal=3.0)

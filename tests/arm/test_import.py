@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,7 @@ def test_inertia_gravity_and_regressor_are_those_of_pinocchio(seed: int, tmp_pat
     assert_near(torques, pin.rnea(model, data, q, qd, qdd))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "size"), [(1, 2), (2, 4), (30, 6)])
 def test_fmus_move_as_pinocchio_says(seed: int, size: int, tmp_path: Path, devices: Path) -> None:
     text = random_chain(seed, size)
@@ -105,6 +107,7 @@ def test_fmus_move_as_pinocchio_says(seed: int, size: int, tmp_path: Path, devic
     assert_near(torques, pin.rnea(model, data, q, qd, qdd))
 
 
+@pytest.mark.slow
 def test_the_account_of_energy_closes_with_sliding_joints(tmp_path: Path, devices: Path) -> None:
     text = random_chain(2, 4)
     assert "prismatic" in text
@@ -118,6 +121,7 @@ def test_the_account_of_energy_closes_with_sliding_joints(tmp_path: Path, device
         assert abs(defect) < ROUNDING * largest
 
 
+@pytest.mark.slow
 def test_a_panda_has_43_base_parameters_and_torques_follow_them(
     tmp_path: Path, devices: Path
 ) -> None:
@@ -144,6 +148,30 @@ def test_a_panda_has_43_base_parameters_and_torques_follow_them(
     assert_near(after - before, np.column_stack(columns) @ changes)
 
 
+@pytest.mark.slow
+def test_base_parameters_of_other_masses_make_the_arm_move_like_one_with_them(
+    tmp_path: Path, devices: Path
+) -> None:
+    text, heavier = random_chain(6, 4), random_chain(6, 4)
+    for mass in re.findall(r'mass value="([\d.]+)"', text):
+        heavier = heavier.replace(f'mass value="{mass}"', f'mass value="{1.5 * float(mass)!r}"')
+    (devices / "robot.toml").write_text(device.text(read(text, tmp_path, "tool"), "test"), "utf-8")
+    other = values(read(heavier, tmp_path, "tool"))
+    standard = base.standard_parameters(other["mass"], other["centre"], other["inertia"])
+    found = base.find(other["rotation"], other["offset"], other["prismatic"])
+    changed = {item.name: item.value(standard) for item in found}
+    free = Oracle(build_model("serial_arm.robot/rigid"))
+    q, qd, tau = np.random.default_rng(3).uniform(-2.0, 2.0, (3, 4))
+    state = named(angle=q, speed=qd, tau=tau)
+    model = pin.buildModelFromXML(heavier)
+    wanted = pin.aba(model, model.createData(), q, qd, tau)
+    moved = vector(free.derivatives(state | changed), "speed")
+    # the formulas are rounded to nine decimals; the lightest joint carries 0.1 kg.m2
+    np.testing.assert_allclose(moved, wanted, rtol=1e-6, atol=1e-6)
+    assert np.max(np.abs(vector(free.derivatives(state), "speed") - wanted)) > 0.1
+
+
+@pytest.mark.slow
 def test_masses_that_show_in_no_torque_do_not_change_the_base_parameters(tmp_path: Path) -> None:
     given = values(read(panda(), tmp_path))
     geometry = given["rotation"], given["offset"], given["prismatic"]

@@ -59,7 +59,7 @@ def test_held_side_force_drifts_as_the_formula_says(v_c: float, known: float) ->
     drift = force * v_c / (1.5 * mu_s * load)
     assert drift == pytest.approx(known, rel=4e-3)  # known to three digits
     wheel = Oracle(build_model("wheel_contact/stick_slip"))
-    y = wheel.outputs({"v_y": -drift, "v_c": v_c, "mu_s": mu_s, "f_n": load})
+    y = wheel.outputs({"v_x": 0.0, "v_y": -drift, "v_c": v_c, "mu_s": mu_s, "f_n": load})
     # the cubic term of mu(v) lowers the force by (v/v_c)^2/3
     assert y["f_y"] == pytest.approx(force, rel=(drift / v_c) ** 2)
 
@@ -113,7 +113,8 @@ def test_brush_sticks_at_rest_and_slips_sideways_when_it_rolls() -> None:
 
 
 def test_brush_breaks_away_at_the_static_limit_and_slides_at_the_dynamic_one() -> None:
-    wheel = Stiff("wheel_contact/brush", {"J_added": 1e6, "v_y": 1e-3, "f_n": 200.0})
+    still = {"tau": 0.0, "v_x": 0.0, "J_added": 1e6}
+    wheel = Stiff("wheel_contact/brush", {**still, "v_y": 1e-3, "f_n": 200.0})
     slow = wheel.run(6.0, h=1e-2)["f_y"]
     wheel.set({"v_y": 0.5})
     fast = wheel.run(6.1, h=1e-3)["f_y"]

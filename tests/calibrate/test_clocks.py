@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.own_robot import FRAME, RADIUS, TRACK, drive, write_csv
 from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.clocks import clocked, offsets
 from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
-from cosim.errors import ScenarioError, UnitError, UnknownNameError, ValueRangeError
+from cosim.errors import UnitError, UnknownNameError, ValueRangeError
+from cosim.intake.example import FRAME, RADIUS, TRACK, drive, write_csv
 
 LATE = 0.11
 MAPPING = f"""
@@ -169,6 +169,13 @@ def test_held_inputs_change_at_their_own_times(folder: Path) -> None:
     assert np.max(np.abs(coarse.at(known - LATE) - wanted)) > 1.0
 
 
-def test_what_a_run_begins_with_belongs_to_a_run(folder: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"'first:x' is another value in each run; .* per_run"):
-        problem(folder, START.replace("per_run = true", ""))
+def test_of_a_burst_of_commands_the_last_one_counts(tmp_path: Path, folder: Path) -> None:
+    for name in ("robot.toml", "one_pose.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    head, *rows = (folder / "one_cmd.csv").read_text().splitlines()
+    stamp = int(rows[100].partition(",")[0])
+    rows.insert(101, f"{stamp + 1000},1.0,2.0")  # a microsecond later
+    (tmp_path / "one_cmd.csv").write_text("\n".join([head, *rows]))
+    signal = problem(tmp_path, "").runs[0].inputs["base.w_r"]
+    at = np.array([100 * 0.02 - LATE + 0.005])
+    assert signal.at(at) == pytest.approx(2.0 * np.pi / 30, rel=1e-9)  # digits of the file

@@ -78,5 +78,5 @@ def test_an_input_that_an_fmu_drives_is_no_action() -> None:
 
 def test_without_gymnasium_it_says_what_to_install(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    with pytest.raises(InputError, match=r"cosim\[gym\]"):
+    with pytest.raises(InputError, match=r"cosim-robotics\[gym\]"):
         environment("motor_bench/ST1", **GIVEN)

@@ -42,8 +42,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "set.toml").write_text("[[run]]".join(parts), "utf-8")
     (place / "runs").mkdir()
     for name in ("ST1", "MX1"):
-        source = bench / f"data/MB-12/runs/{name}.parquet"
-        (place / f"runs/{name}.parquet").write_bytes(source.read_bytes())
+        source = bench / f"data/MB-12/runs/{name}.npz"
+        (place / f"runs/{name}.npz").write_bytes(source.read_bytes())
     (place / "motor_bench.toml").write_bytes((bench / "data/motor_bench.toml").read_bytes())
     system = (places.scenarios() / "systems/motor_bench.toml").read_text("utf-8")
     (place / "warm_bench.toml").write_text(system, "utf-8")

@@ -203,16 +203,20 @@ def test_friction_fades_while_the_shaft_turns_and_returns_at_rest() -> None:
     assert oracle.derivatives({"temperature_drift.h": 0.6})[rate] == pytest.approx(-0.01)
 
 
+AT_REST = {"tau_a": 0.0, "w_b": 0.0}
+"""Inputs of a gearbox that nothing turns; alone, it carries a torque."""
+
+
 @pytest.mark.parametrize(("twist", "torque"), [(1e-3, 0.0), (-1.5e-3, 0.0), (2.5e-3, 6.0)])
 def test_backlash_leaves_a_gap(twist: float, torque: float) -> None:
     oracle = Oracle(build_model("gearbox/elastic+backlash"))
-    out = oracle.outputs({"twist": twist, "backlash.gap": 3e-3})
+    out = oracle.outputs({"twist": twist, "backlash.gap": 3e-3, **AT_REST})
     assert out["tau_b"] == pytest.approx(torque, abs=1e-12)  # 6000 N.m/rad beyond 1.5 mrad
 
 
 def test_spring_that_stiffens() -> None:
     oracle = Oracle(build_model("gearbox/elastic+cubic_stiffness"))
-    out = oracle.outputs({"twist": 2e-3, "cubic_stiffness.k_3": 1e9})
+    out = oracle.outputs({"twist": 2e-3, "cubic_stiffness.k_3": 1e9, **AT_REST})
     assert out["tau_b"] == pytest.approx(6000 * 2e-3 + 1e9 * 8e-9, rel=1e-12)
 
 
@@ -231,6 +235,7 @@ def test_hysteresis_loses_the_area_of_its_loop() -> None:
             "twist": amplitude * math.sin(t),
             "rotor_speed": 10.167 * twist_rate,
             "hysteresis.z": y[0],
+            **AT_REST,
         }
         args = oracle.arguments(values)
         xdot, out = oracle.functions.outputs(*args)

@@ -21,7 +21,7 @@ def inspected(path: Path) -> None:
 @lru_cache(maxsize=None)
 def bag(plugin: str) -> bytes:
     """The file in a ROS 2 bag."""
-    from benchmarks.own_robot import drive, write_bag
+    from cosim.intake.example import drive, write_bag
 
     with tempfile.TemporaryDirectory() as folder:
         path = write_bag(drive(1, duration=1.0), Path(folder) / "bag", plugin)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.own_robot import RADIUS, SYSTEM, TRACK, drive, stamp, write_csv
 from cosim.calibrate import read_problem
 from cosim.errors import InputError, ScenarioError
 from cosim.installation.builder import default_provider
+from cosim.intake.example import RADIUS, SYSTEM, TRACK, drive, stamp, write_csv
 from cosim.intake.importing import Wishes, import_logs
 from cosim.intake.inspect import inspect
 from cosim.intake.topic import Topic

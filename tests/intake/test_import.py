@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from benchmarks.own_robot import RADIUS, SYSTEM, TRACK, drive, write_csv
 from cosim.calibrate import read_problem
 from cosim.calibrate.clocks import offsets
 from cosim.calibrate.fit import fit
@@ -23,6 +22,7 @@ from cosim.cli.app import app
 from cosim.errors import CosimError, InputError, UnknownNameError
 from cosim.files import read_toml
 from cosim.installation.builder import default_provider
+from cosim.intake.example import RADIUS, SYSTEM, TRACK, drive, write_csv
 from cosim.intake.importing import Imported, Wishes, import_logs
 from cosim.intake.matching import Column, Match, Place
 from cosim.intake.runs import grouped, purposes

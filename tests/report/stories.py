@@ -94,7 +94,7 @@ def table(verdict: str) -> dict[str, Any]:
             "R_a": {"unit": "ohm", "before": value, "after": value},
             "eta": {"unit": "-", "before": unknown, "after": unknown},
         },
-        "start_values": {}, "bursts": {}, "unstable_from": {},
+        "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {},
         "structure": {
             f"{which} {purpose}": structured(*([] if which == "after" and after < 1.1
                                                else ["speed"]))

@@ -162,6 +162,18 @@ def test_a_law_over_two_signals_is_shown_in_slices_and_none_with_its_reason() ->
     assert "No law from the data" in text and "Nothing varies." in text
 
 
+def test_clocks_that_were_estimated_are_told() -> None:
+    shown = material("effect_found")
+    assert "Clocks that were estimated" not in rendered(shown)
+    late = {"value": 0.3014, "ci95": [0.2991, 0.3035], "unit": "s", "identifiable": True,
+            "at_bound": False}  # fmt: skip
+    content = dict(shown.table) | {"clocks": {"camera_late": late}}
+    found = Marked(rendered(replace(shown, table=content)))
+    assert "camera_late" in found.text
+    assert found.facts["value: clocks > camera_late"] == ["0.3014 s"]
+    assert found.facts["interval: clocks > camera_late"] == ["0.2991 to 0.3035"]
+
+
 def test_every_effect_has_advice_and_no_advice_is_for_nothing() -> None:
     known = tomllib.loads(ADVICE.read_text("utf-8"))
     asked = {name for name, module in effects().items() if not module.EFFECT.probe}

@@ -18,9 +18,9 @@ from cosim.installation.builder import Builder, Installed, default_provider
 from cosim.robots import arms, device, reader
 from cosim.system.provider import FolderProvider
 from sources.laws import base_parameters as base
+from sources.packaging.catalog import names, own_names
 from sources.variant import UnknownVariantError, build_model, device_values, devices
 
-pytestmark = pytest.mark.slow
 URDF = """<robot name="two link">
   <link name="base"/>
   <link name="upper"><inertial><origin xyz="0.3 0.02 0"/><mass value="4"/>
@@ -80,6 +80,7 @@ def fitted(folder: Path, payload: float) -> dict[str, tuple[float, float]]:
     return dict(zip(names, intervals, strict=True))
 
 
+@pytest.mark.slow
 def test_masses_are_identified_and_a_load_is_where_it_is(here: Path) -> None:
     nominal = base_values()
     # planar arm: two first moments and an inertia of each link, Khalil and Dombre 2002, ch. 9
@@ -97,12 +98,14 @@ def test_masses_are_identified_and_a_load_is_where_it_is(here: Path) -> None:
     assert low > nominal["base_h_x_2"] + 0.2
 
 
+@pytest.mark.slow
 def test_without_a_load_nothing_is_found(here: Path) -> None:
     nominal = base_values()
     for name, (low, high) in fitted(here / "bare", 0.0).items():
         assert abs((low + high) / 2 - nominal[name]) < WIDE * (high - low) / 2, name
 
 
+@pytest.mark.slow
 def test_a_changed_device_file_is_built_anew_beside_it(here: Path) -> None:
     path = here / "devices" / "two.toml"
     before = path.read_text(encoding="utf-8")
@@ -128,10 +131,14 @@ def test_devices_are_found_by_folder_and_by_the_environment(
     assert "two" not in devices("serial_arm")
     with pytest.raises(UnknownVariantError, match="'serial_arm' has no device 'two'"):
         build_model("serial_arm.two/kinematic")
+    assert own_names() == []
     monkeypatch.setenv("COSIM_DEVICES", str(here / "devices"))
     assert build_model("serial_arm.two/kinematic").device == "two"
+    assert "serial_arm.two/rigid" in own_names() and own_names("gearbox") == []
+    assert not any(".two/" in name for name in names("arm_drive"))
 
 
+@pytest.mark.slow
 def test_without_the_sources_fmus_beside_the_device_file_serve(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -166,6 +173,7 @@ def test_an_arm_that_nobody_has_imported(here: Path) -> None:
     assert not (here / "x").exists() and not (here / "y").exists()
 
 
+@pytest.mark.slow
 def test_the_command_line(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,6 @@ from cosim.installation.builder import default_provider
 from cosim.robots import composed, create, templates
 from cosim.system.toml import read_system
 
-pytestmark = pytest.mark.slow
 KINDS = [name for name in templates.names() if name != "arm"]
 STARTS = ("x_start", "y_start", "yaw_start")
 
@@ -41,6 +40,7 @@ def misfit(folder: Path, values: dict[str, float]) -> float:
     return float(np.sqrt(np.nanmean(left**2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_example_logs_fit_with_their_values_and_not_with_the_nominal_ones(
     kind: str, tmp_path: Path
@@ -57,6 +57,7 @@ def test_example_logs_fit_with_their_values_and_not_with_the_nominal_ones(
     assert misfit(folder, {}) > 2.0
 
 
+@pytest.mark.slow
 def test_dimensions_go_into_all_files(tmp_path: Path) -> None:
     folder = made("diff_drive", tmp_path / "robot", track=0.8, r=0.25)
     assert read_system(folder / "system.toml").parameters == {"base.r": 0.25, "base.track": 0.8}
@@ -71,6 +72,7 @@ def test_dimensions_go_into_all_files(tmp_path: Path) -> None:
     assert at["camera.phi_meas"][index] == pytest.approx(0.2 / 0.8 * 2.5, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_car_turns_about_the_rear_axle(tmp_path: Path) -> None:
     folder = made("ackermann", tmp_path / "robot", l=2.0, r=0.3)
     recording = cosim.run(str(folder / "scenario.toml")).runs["identification"].recording
@@ -115,6 +117,7 @@ def test_wrong_wishes_are_named_and_write_nothing(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     folder = made("diff_drive", tmp_path / "robot")
     before = (folder / "system.toml").read_text()
@@ -123,6 +126,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert (folder / "system.toml").read_text() == before
 
 
+@pytest.mark.slow
 def test_components_are_connected_at_their_power_ports_and_run(tmp_path: Path) -> None:
     files = composed.write(
         "drive", tmp_path, ["dc_motor/sampled", "gearbox", "inertia", "encoder"],

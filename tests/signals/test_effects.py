@@ -206,7 +206,7 @@ def test_effects_take_the_unit_of_their_balance() -> None:
 
 
 def test_share_selects_an_element_of_a_vector() -> None:
-    values = {"v_d": 1.0, "command.gain.error": 0.1, "command.gain.share[1]": 0.0}
+    values = {"v_d": 1.0, "w_d": 0.0, "command.gain.error": 0.1, "command.gain.share[1]": 0.0}
     out = outputs("inverse_kinematics/body+gain@command", values)
     assert out["w_l_ref"] == pytest.approx(101.67, rel=1e-14)
     assert out["w_r_ref"] == pytest.approx(1.1 * 101.67, rel=1e-14)

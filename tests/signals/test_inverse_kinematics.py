@@ -12,6 +12,9 @@ from tests.support import Stepper
 
 R, TRACK, RATIO = 0.100, 0.410, 10.167  # digital twin paper, Table 1
 
+STILL = {"v_d": 0.0, "w_d": 0.0, "xd_d": 0.0, "yd_d": 0.0, "phi_d": 0.0}
+"""Set motion of a base that stands; alone, it moves."""
+
 
 def base_motion(outputs: dict[str, float]) -> tuple[float, float]:
     """Speed and yaw rate of a rigid base whose wheels roll: its wheel centres move with r w / N."""
@@ -44,7 +47,7 @@ def test_base_turns_by_the_commanded_angle(fidelity: str) -> None:
 def test_half_the_track_is_the_lever() -> None:
     for fidelity in ("body", "world"):
         oracle = Oracle(build_model(f"inverse_kinematics/{fidelity}"))
-        spot = oracle.outputs({"w_d": 1.0})
+        spot = oracle.outputs({**STILL, "w_d": 1.0})
         # The right wheel of a base turning on the spot runs on a circle of half the track.
         assert spot["w_r_ref"] == pytest.approx(RATIO * 0.205 / 0.1, rel=1e-15)
         assert spot["w_l_ref"] == -spot["w_r_ref"]
@@ -52,9 +55,10 @@ def test_half_the_track_is_the_lever() -> None:
 
 def test_world_form_uses_the_set_heading_and_loses_the_sideways_part() -> None:
     oracle = Oracle(build_model("inverse_kinematics/world"))
-    along = oracle.outputs({"xd_d": 0.3 * math.cos(0.8), "yd_d": 0.3 * math.sin(0.8), "phi_d": 0.8})
+    turned = {**STILL, "phi_d": 0.8}
+    along = oracle.outputs({**turned, "xd_d": 0.3 * math.cos(0.8), "yd_d": 0.3 * math.sin(0.8)})
     assert along["w_l_ref"] == pytest.approx(RATIO * 0.3 / R, rel=1e-15)
-    across = oracle.outputs({"xd_d": -math.sin(0.8), "yd_d": math.cos(0.8), "phi_d": 0.8})
+    across = oracle.outputs({**turned, "xd_d": -math.sin(0.8), "yd_d": math.cos(0.8)})
     assert across["w_l_ref"] == pytest.approx(0.0, abs=1e-14)  # sin cos - cos sin, times 100
 
 

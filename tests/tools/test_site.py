@@ -89,6 +89,7 @@ def test_references_say_what_the_code_says(site: Path) -> None:
     assert "cosim fmus build" in commands and "--param" in commands
     keys = (site / "reference/mapping_keys.html").read_text("utf-8")
     assert "despike" in keys and "true or false" in keys
+    assert "single samples that stand out are gaps" in keys  # of the page of data sets
     python = (site / "reference/python.html").read_text("utf-8")
     assert "bond_turnover" in python and "read_problem" in python
 

@@ -1,21 +1,22 @@
-"""Logs of a robot on two wheels, made by exact arcs: no code of ours is in them.
+"""Logs of a robot on two wheels, made by exact arcs: no FMU is in them.
 
-    python -m benchmarks.own_robot FOLDER
-
-writes four runs as a robot gives them, each as two tables (commands on one clock, poses of a camera
-on another, late one; rpm, mm, and degrees that begin anew at 180), as ROS 2 bags, if the library
+Four runs as a robot gives them, each as two tables (commands on one clock, poses of a camera on
+another, late one; rpm, mm, and degrees that begin anew at 180), as ROS 2 bags, if the library
 `rosbags` is installed, and `robot.toml`, a system that knows the robot's sizes roughly and nothing
 of its left wheel, which is larger than its right one.
 """
 
 from __future__ import annotations
 
-import sys
+import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..files import make_folder, write_text
 
 Vector = NDArray[np.float64]
 RADIUS, TRACK = 0.05, 0.2
@@ -60,7 +61,7 @@ def drive(seed: int, *, late: float = 0.0, larger: float = 0.0, duration: float 
     """
     chance = np.random.default_rng(seed)
     count = round(duration / PERIOD)
-    times = PERIOD * np.arange(count)
+    times = np.linspace(0.0, PERIOD * count, count, endpoint=False)
     held = 25
     speeds = np.repeat(chance.uniform(1.0, 8.0, (count // held + 1, 2)), held, axis=0)[:count]
     left, right = speeds.T
@@ -105,7 +106,7 @@ def write_bag(run: Drive, path: Path, plugin: str = "MCAP") -> Path:
     store = get_typestore(Stores.ROS2_HUMBLE)
     types = store.types
 
-    def header(time: int, frame: str) -> object:
+    def header(time: int, frame: str) -> Any:
         moment = types["builtin_interfaces/msg/Time"](time // 10**9, time % 10**9)
         return types["std_msgs/msg/Header"](moment, frame)
 
@@ -144,19 +145,18 @@ base = "diff_drive/rolling"
 """Its radius and track are a tenth off."""
 
 
-def main(folder: Path) -> None:
-    """Write the example."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "robot.toml").write_text(SYSTEM)
+def write(folder: Path) -> bool:
+    """Write the example.
+
+    Returns:
+        Whether bags are among it.
+    """
+    make_folder(folder)
+    write_text(folder / "robot.toml", SYSTEM)
+    bags = importlib.util.find_spec("rosbags") is not None
     for seed, name in enumerate(RUNS):
         run = drive(seed, late=LATE, larger=LARGER, duration=20.0)
         write_csv(run, name, folder)
-        try:
+        if bags and not (folder / f"{name}_bag").exists():
             write_bag(run, folder / f"{name}_bag")
-        except ImportError:
-            print("no bags: pip install rosbags")
-    print(folder)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "robot"))
+    return bags
