@@ -17,6 +17,9 @@ from .models import Fitted
 if TYPE_CHECKING:
     from .fitter import Fitter
 
+EVIDENT = 5.0
+"""Deviations by which the cost exceeds that of noise: half a sum of n squares varies by
+sqrt(n / 2)."""
 STEPS = Effort("near", "draft", iterations=4)
 """Each costs as many simulations as there are parameters, at a step that is ten times as fine."""
 
@@ -31,7 +34,8 @@ def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
     """
     raw = fitter.raw
     coarse = raw.ticks and raw.search.step != raw.step
-    if not coarse or raw.unstable or not fitter.lacking(winner):
+    noise = 0.5 * winner.estimate.count
+    if not coarse or raw.unstable or winner.estimate.cost < noise + EVIDENT * noise**0.5:
         return winner
     measured = {run.name: run.data for run in raw.runs}
     problem = winner.simulator.problem.with_data(measured).changed(step=raw.step)
