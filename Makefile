@@ -45,7 +45,7 @@ bench: $(STAMP)
 
 PLATFORM ?= host
 wheel: $(RUNS)
-	$(BIN)/python -m distribution --platform $(PLATFORM)
+	$(BIN)/python -m sources.distribution --platform $(PLATFORM)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
 
 # what runs, builds FMUs and diagnoses; the tools of the tests are three times as much

@@ -23,7 +23,7 @@ from .model import Attachment, Model, ModelError
 from .units import coherent
 
 _ROOT = Path(__file__).parent
-_OTHER_FOLDERS = ("effects", "laws", "packaging", "tools")
+_OTHER_FOLDERS = ("distribution", "effects", "laws", "packaging", "tools")
 """Folders of `sources/` that are no components."""
 
 

@@ -26,7 +26,7 @@ CATALOGUE = "catalogue.json"
 
 
 class Library:
-    """Provider of the FMUs in a folder that `python -m distribution` made.
+    """Provider of the FMUs in a folder that `python -m sources.distribution` made.
 
     Args:
         folder: with `catalogue.json`, `fmus` and `packs`.

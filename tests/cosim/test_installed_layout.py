@@ -13,7 +13,7 @@ import pytest
 
 from cosim.errors import CosimError, VariantError
 from cosim.installation.library import Library
-from distribution.make import make, write_pack
+from sources.distribution.make import make, write_pack
 from tests.fmus import fmu
 
 pytestmark = pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`python -m distribution`: build what a wheel carries into `build/library`."""
+"""`python -m sources.distribution`: build what a wheel carries into `build/library`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes what a wheel carries: `python -m distribution`, then `pip wheel`; `make wheel` does both.
+"""Makes what a wheel carries: `python -m sources.distribution`, then `pip wheel` (`make wheel`).
 
 FMUs of the catalogue as files, in FMI 2 and 3; in packs those of other devices, in both, and
 variants with effects, which diagnoses need, in FMI 2; the compiled executor; and what the sources

@@ -1,7 +1,7 @@
 """Build hook of the wheel: put sources, scenarios, FMUs and the licence below `cosim_library`.
 
-FMUs are those that `python -m distribution` has made; a wheel without them builds its own, if the
-extra `build` is installed. An editable installation takes all from the checkout.
+FMUs are those that `python -m sources.distribution` has made; a wheel without them builds its own,
+if the extra `build` is installed. An editable installation takes all from the checkout.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ class LibraryHook(BuildHookInterface):  # type: ignore[misc]
         made = root / "build" / "library"
         if not (made / "tag").is_file():
             self.app.display_warning(
-                "the wheel carries no FMUs: run 'make wheel', or 'python -m distribution' before"
+                "the wheel carries no FMUs: run 'make wheel', or 'python -m sources.distribution' "
+                "before"
             )
             return
         for name in ("fmus", "packs", "catalogue.json"):
