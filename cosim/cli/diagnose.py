@@ -17,6 +17,8 @@ from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..diagnose import Diagnosis
     from ..diagnose.further import Further
 
@@ -34,6 +36,14 @@ def diagnose_command(
         typer.Option(help="A dataset.toml, or a name of `cosim scenarios` [by the rig]."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
+    law_from_data: Annotated[
+        str,
+        typer.Option(
+            metavar="PLACE",
+            help="Make a law from the data at a place, load.flange or arm.joint[2], "
+            "and ask no catalogue.",
+        ),
+    ] = "",
     workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
     without: Annotated[
         list[str] | None,
@@ -67,7 +77,9 @@ def diagnose_command(
             display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
 
         with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
-            result = diagnose(problem, folder, told, workers=workers, without=without or ())
+            result = diagnose(
+                problem, folder, told, workers=workers, without=without or (), law_at=law_from_data
+            )
     page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
     result.files += [models, page, table]
     write_page(result, page)
@@ -91,6 +103,8 @@ def _print(result: Diagnosis) -> None:
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
     for hint in result.answer.hints:
         console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
+    if (law := result.to_dict()["law_from_data"]) is not None:
+        _print_law(law, console)
     for text in clock_lines(result.to_dict()["clocks"]):
         console.print(f"  {text}", soft_wrap=True)
     table = Table()
@@ -108,6 +122,27 @@ def _print(result: Diagnosis) -> None:
     for item in result.further:
         console.print(_spread(item), soft_wrap=True)
     console.print(f"report: {result.files[-2]}", soft_wrap=True)
+
+
+def _print_law(law: dict[str, Any], console: Console) -> None:
+    """A law made from the data: what it is, what it changes, which named laws are near."""
+    if not law["made"]:
+        console.print(f"  no law at {law['place']}: {law['reason']}", soft_wrap=True)
+        return
+    console.print(f"  law at {law['place']}: {law['formula']}", soft_wrap=True)
+    for name, row in law["error"].items():
+        sizes = [row[which].get("validation") for which in ("before", "after")]
+        if None not in sizes:
+            console.print(
+                f"    {name}: {sizes[0]:.4g} -> {sizes[1]:.4g} {row['unit']} on validation runs, "
+                f"noise {row['noise_rms']:.4g}", soft_wrap=True,
+            )  # fmt: skip
+    for named in law["nearest"]:
+        console.print(
+            f"    near it: {named['effect']}, {named['rms_difference']:.3g} {law['unit']} away "
+            f"(RMS), worse by {named['unused_runs_prefer_the_law_by_nats']:.0f} nats on unused "
+            "runs", soft_wrap=True,
+        )  # fmt: skip
 
 
 def _spread(further: Further) -> str:

@@ -107,15 +107,17 @@ def _recording(place: Path) -> Path:
     """
     if place.is_file():
         return place
-    file = place / "recording.parquet"
-    if file.is_file():
-        return file
-    found = sorted(path.parent for path in place.glob("*/recording.parquet"))
+    kinds = ("recording.parquet", "recording.npz")  # the second where pyarrow is not installed
+    for file in (place / kind for kind in kinds):
+        if file.is_file():
+            return file
+    found = sorted(path for kind in kinds for path in place.glob(f"*/{kind}"))
     if len(found) == 1:
-        return found[0] / "recording.parquet"
+        return found[0]
     if found:
+        folders = sorted({str(path.parent) for path in found})
         raise UnknownNameError(
-            f"{place} has {len(found)} runs; take one of them: {listing(map(str, found))}"
+            f"{place} has {len(folders)} runs; take one of them: {listing(folders)}"
         )
     raise UnknownNameError(
         f"{place}: there is no recording.parquet; give the folder that 'cosim run' wrote"

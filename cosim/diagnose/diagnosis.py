@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -17,14 +16,14 @@ from ..calibrate.deferred import step_error
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
-from ..files import atomic
-from ..system.provider import locate
 from .answer import Verdict
 from .bursts import bursts, times
+from .carriers import leave_fmus
 from .exchange import reconsidered
 from .experiment import propose
 from .facts import Table
 from .further import judged
+from .grey_box import Site, site, unnamed
 from .linear import SampleStack
 from .localise import localise
 from .models import Fitted, is_open
@@ -49,6 +48,7 @@ def diagnose(
     *,
     workers: int | None = None,
     without: Iterable[str] = (),
+    law_at: str = "",
 ) -> Diagnosis:
     """Close the loop on one data set.
 
@@ -59,16 +59,19 @@ def diagnose(
         workers: threads, one per core if not given.
         without: effects that are left out of the catalogue, to see what it says of data that have
             them: it should end with `unexplained`, or with laws that do the same.
+        law_at: make a law from the data there (`load.flange`), and do not ask the catalogue.
 
     Raises:
-        CosimError: the declared system cannot be simulated, or no effect of that name fits it.
+        CosimError: the declared system cannot be simulated, no effect of that name fits it, or no
+            law can enter there.
+        UnknownNameError: there is no such place.
     """
-    begun = time.perf_counter()
+    begun, asked = time.perf_counter(), site(problem, law_at) if law_at else None
     simulator = Simulator(problem, workers=workers)
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
-    search = Search(simulator, say, without=without)
+    search = Search(simulator, say, None if asked is None else [], without=without)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
@@ -78,7 +81,7 @@ def diagnose(
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, begun)
-            return _searched(search, base, findings, out, say, begun)
+            return _searched(search, base, findings, out, say, begun, asked)
     finally:
         search.close()
 
@@ -100,6 +103,7 @@ def _searched(
     out: Path | None,
     say: Callable[[str], None],
     begun: float,
+    asked: Site | None = None,
 ) -> Diagnosis:
     problem = search.raw
     result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
@@ -108,7 +112,7 @@ def _searched(
     search.note(base)
     current = base
     winners: list[Round] = []
-    for number in range(ROUNDS):
+    for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         try:
             stage = search.round(current)
@@ -151,9 +155,14 @@ def _searched(
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
     _tested(result)
+    result.asked = asked is not None
+    if asked or result.verdict == "unexplained":
+        result.law = unnamed(search, result.after, result.located, asked)
+    if result.law is not None:
+        result.files += result.law.leave_fmu(out)
     _look_further(result)
     if out is not None and result.answer.laws:
-        result.files += _leave_fmus(result, out)
+        result.files += leave_fmus(problem, result.after.effects, out, result.warnings)
     result.wall = time.perf_counter() - begun
     return result
 
@@ -272,23 +281,3 @@ def _look_further(result: Diagnosis) -> None:
             result.further.append(judged(simulator, result.problem, result.before, result.after))
         except CosimError as error:  # they are an extra: the verdict stands without them
             result.warnings.append(f"further runs are not judged: {error}")
-
-
-def _leave_fmus(result: Diagnosis, out: Path) -> list[Path]:
-    """Copy the FMUs that carry the effects into the output folder."""
-    assert result.after is not None
-    model = result.problem.model
-    for item in result.after.effects:
-        model = model.changed(item.change)
-    files = []
-    for name in dict.fromkeys(item.instance for item in result.after.effects):
-        try:
-            source = locate(model.instances[name], result.problem.provider)
-        except CosimError as error:
-            result.warnings.append(str(error))
-            continue
-        target = out / "fmus" / source.name
-        with atomic(target) as temporary:
-            shutil.copyfile(source, temporary)
-        files.append(target)
-    return files

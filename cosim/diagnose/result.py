@@ -17,6 +17,7 @@ from .adding import made_of
 from .answer import Verdict
 from .facts import Table
 from .further import Further
+from .grey_box import LawFromData
 from .localise import Place
 from .models import Fitted
 from .search import Search
@@ -45,6 +46,8 @@ class Diagnosis:
         ended: run -> time from which it does not count: what happens there hangs on small changes
             of start values (see `unstable`).
         further: the models on runs that need another system.
+        asked: whether a law was asked for, and no catalogue.
+        law: made from the data where something enters that has no name.
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
         findings: on the data.
@@ -63,6 +66,8 @@ class Diagnosis:
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
     further: list[Further] = field(default_factory=list)
+    asked: bool = False
+    law: LawFromData | None = None
     bursts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     withheld: tuple[str, ...] = ()
@@ -83,7 +88,9 @@ class Diagnosis:
     @property
     def reason(self) -> str:
         """The verdict in sentences."""
-        return self.answer.reason
+        parts = ["" if self.asked else self.answer.reason]
+        parts += [self.law.reason] if self.law is not None else []
+        return " ".join(parts).strip() or self.answer.reason
 
     def rms(self, which: str, purpose: str) -> dict[str, float | None]:
         """Channel -> RMS residual in its unit over the runs of a purpose."""
@@ -110,11 +117,13 @@ class Diagnosis:
             "dataset": self.problem.name,
             "system": self.problem.file.path.stem,
             **self.answer.to_dict(),
+            "reason": self.reason,
             "warnings": self.warnings,
             "findings": [finding.to_dict() for finding in self.findings],
             "model": made_of(self.problem, self.after),
             "withheld": list(self.withheld),
             "localisation": [place.to_dict() for place in self.located],
+            "law_from_data": None if self.law is None else self.law.to_dict(),
             "power": self.power,
             "proposed_experiment": self.experiment,
             "channels": {},

@@ -21,6 +21,7 @@ from .candidates import Candidate, candidates
 from .established import needed, settle
 from .exchange import challenged, nearly, reconsidered, restarted
 from .fitter import ITERATIONS, Say
+from .grounding import grounded
 from .late import LateFitter
 from .linear import SampleStack, holm
 from .models import GATE, Fitted, compare, is_open, more_general
@@ -257,6 +258,7 @@ class Search(LateFitter):
             if current.winner is None:
                 return current
             current.follow(self.sharpened(current.winner, base))
+            current.follow(grounded(self, current.winner, base))
             settle(self, base, current)
         return current
 

@@ -9,7 +9,7 @@ import importlib
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -176,6 +176,11 @@ class Builder:
             found.append(name)
         return found
 
+    def written(self, variant: str, starts: Mapping[str, float], path: Path) -> Path:
+        """Write the variant's FMU with start values (by variable) of its own; returns the path."""
+        with naming_errors():
+            return Path(self._packaging.build_with(variant, starts, path))
+
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""
         with naming_errors():
@@ -245,6 +250,10 @@ class Installed:
         """As of `Builder`, for those that must be built."""
         if names := self._lacks(variants):
             self._built(names[0]).prepare(names)
+
+    def written(self, variant: str, starts: Mapping[str, float], path: Path) -> Path:
+        """Write the variant's FMU with start values (by variable) of its own; returns the path."""
+        return self._built(variant).written(variant, starts, path)
 
     def candidates(self, variant: str) -> list[tuple[str, str, str]]:
         """(effect, balance, one line) for every effect that could be added to a variant."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.columns import EPOCHS
 from ..files import atomic, make_folder, writing
+from ..spec.distribution import needed
 from ..spec.units import parse
 from .clock import Clock
 from .runs import Part, Run, plain
@@ -78,9 +79,13 @@ def place(run: Run, folder: Path, whole: bool) -> dict[str, str]:
 
 
 def write_part(part: Part, path: Path) -> None:
-    """Write a part as Parquet: its clock as `time` [ns], its columns with their units."""
+    """Write a part as Parquet: its clock as `time` [ns], its columns with their units.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     topic, clock = part.report.topic, part.report.clock
     fields, arrays = [], []

@@ -7,16 +7,18 @@ import math
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ..calibrate.mapping import find_system
 from ..files import make_folder, read_toml, write_text
+from ..spec.distribution import needed
 from .messages import Sample
 from .reading import Reading
+
+if TYPE_CHECKING:
+    import pyarrow.parquet as pq
 
 PURPOSES = ("identification", "validation")
 """Of the runs in turn, unless they say so."""
@@ -30,12 +32,16 @@ class Folder:
     Args:
         place: where it shall be; made, and must be empty of runs.
         reading: whose columns and mapping it has.
+
+    Raises:
+        InputError: pyarrow is not installed.
     """
 
     def __init__(self, place: Path, reading: Reading) -> None:
         self.place, self.reading = make_folder(place), reading
         make_folder(place / "runs")
         self._runs: list[dict[str, Any]] = []
+        self._parquet = needed("pyarrow.parquet", f"{place}: writing Parquet", "tables")
         self._writer: pq.ParquetWriter | None = None
         self._columns: list[str] = []
         self._waiting: list[Sample] = []
@@ -53,8 +59,10 @@ class Folder:
         self._runs.append({"name": name, "file": file, "purpose": purpose, **kept})
         clock = self.reading.clock
         self._columns = [clock, *(column for column in first.values if column != clock)]
+        import pyarrow as pa
+
         schema = pa.schema([(column, pa.float64()) for column in self._columns])
-        self._writer = pq.ParquetWriter(self.place / file, schema)
+        self._writer = self._parquet.ParquetWriter(self.place / file, schema)
         self._span = (first.time, first.time)
         return name
 
@@ -70,6 +78,8 @@ class Folder:
         if self._writer is None or not self._waiting:
             return
         begin = self._span[0]
+        import pyarrow as pa
+
         arrays = [pa.array(np.array([sample.time - begin for sample in self._waiting]))]
         arrays += [
             pa.array(np.array([sample.values.get(c, math.nan) for sample in self._waiting]))

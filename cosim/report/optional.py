@@ -51,31 +51,58 @@ def law(facts: Facts, store: Store) -> Html:
     found = facts.table.get("law_from_data")
     if not found:
         return Html("")
+    if "curve" not in found:  # none could be made
+        return section("law", "No law from the data", tag("p", found["reason"]))
     curve: Mapping[str, Any] = found["curve"]
-    at, value = np.array(curve["at"]), np.array(curve["value"])
-    edge = 2.0 * np.array(curve["deviation"])
-    store.put_axis("law/at", at)
-    store.put("law/value", value)
-    store.put("law/edge", value - edge)
-    store.put("law/edge^", value + edge)
     of = f" [{unit(found.get('unit', ''))}]" if unit(found.get("unit", "")) else ""
     rows = []
     for name, row in found.get("channels", {}).items():
         noise = row["noise_rms"]
         rows.append([name, *(_error(row.get(which), noise) for which in ("before", "after"))])
+    near = [
+        [tag("code", f"{item['effect']} at {item['place']}"), item["rms_difference"],
+         item["unused_runs_prefer_the_law_by_nats"]]
+        for item in found.get("nearest", [])
+    ]  # fmt: skip
+    lines = _line(curve, store) if "at" in curve else _slices(found, curve, store)
     return section(
         "law", "A law from the data",
-        tag("p", "No law of the catalogue fits, so a free curve was fitted with all parameters and "
-            "judged on unused runs. It says what the missing law looks like, not what it is."),
+        tag("p", "A law without a name was fitted with all parameters and judged on unused runs. "
+            "It says what the missing law looks like, not what it is. ", found.get("reason", "")),
+        tag("p", "Its form: ", found["formula"], ".") if found.get("formula") else Html(""),
         plot(
             f"law from the data at {found.get('place', '')}",
-            [Panel(f"added at {found.get('place', '')}{of}", [
-                Curve("± 2 σ", "measured", "law/at", "law/edge", fill=0.3),
-                Curve("law", "after", "law/at", "law/value", dots=True)], height=240, short="law")],
+            [Panel(f"added at {found.get('place', '')}{of}", lines, height=240, short="law")],
             axis=str(curve["driver"]).replace("_", " "), group="law",
         ),
         table(["channel", "before", "after"], rows, "errors with the law"),
+        table(["named law", f"differs by (RMS){of}", "worse on unused runs [nats]"], near,
+              "named laws beside it") if near else Html(""),
     )  # fmt: skip
+
+
+def _line(curve: Mapping[str, Any], store: Store) -> list[Curve]:
+    value, edge = np.array(curve["value"]), 2.0 * np.array(curve["deviation"])
+    store.put_axis("law/at", np.array(curve["at"]))
+    store.put("law/value", value)
+    store.put("law/edge", value - edge)
+    store.put("law/edge^", value + edge)
+    return [Curve("± 2 σ", "measured", "law/at", "law/edge", fill=0.3),
+            Curve("law", "after", "law/at", "law/value", dots=True)]  # fmt: skip
+
+
+def _slices(found: Mapping[str, Any], curve: Mapping[str, Any], store: Store) -> list[Curve]:
+    """A surface along its first signal at three values of its second one."""
+    grid = [np.array(curve[name]).reshape(curve["shape"]) for name in ("x", "y", "value")]
+    second = found["signals"][-1]["name"].replace("_", " ")
+    store.put_axis("law/at", grid[0][:, 0])
+    lines = []
+    for colour, share in (("before", 0.25), ("after", 0.5), ("other", 0.75)):
+        column = round(share * (grid[1].shape[1] - 1))
+        store.put(f"law/value {column}", grid[2][:, column])
+        name = f"{second} {grid[1][0, column]:.3g}"
+        lines.append(Curve(name, colour, "law/at", f"law/value {column}"))
+    return lines
 
 
 def _error(value: float | None, noise: float) -> Cell:

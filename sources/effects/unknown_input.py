@@ -19,6 +19,7 @@ import casadi as ca
 
 from ..effect import KINDS, Effect
 from ..effect_model import EffectModel
+from ..laws.drivers import MOVING, drivers
 from ..quantity import Quantity
 
 KNOTS = 9
@@ -29,27 +30,15 @@ S_LAST = Quantity("s_last", "1", "driver at the last knot", start=1.0)
 SHARE = Quantity("share", "1", "part of it that each element of the balance gets", start=1.0)
 S = Quantity("s", "1", "what drives the curve")
 U = Quantity("u", "1", "the unknown effort or error")
-STATIC = ("position", "gravity")
-"""Kinds of balances that a component takes as constant in time: a mass centre that moves would have
-to be accelerated, which no equation accounts for."""
-SIDE = ("longitudinal", "side", "radius", "resistance", "emf_constant", "stiffness", "mass")
-"""Signals that hardly vary or mean a configuration."""
 
 EFFECT = Effect(
     "unknown_input",
     "Curve of an unknown effort against its driver.",
-    tuple(kind for kind in KINDS if kind not in STATIC),
+    MOVING,
     G,
     source="hat functions",
     probe=True,
 )
-
-
-def drivers(e: EffectModel) -> list[str]:
-    """Signals of the balance that may drive the curve."""
-    kind = KINDS[e.kind]
-    names = [*kind.signals, *kind.optional]
-    return [n for n in names if n not in SIDE and e.offers(n) and e.signal(n).numel() == 1]
 
 
 def law(e: EffectModel) -> None:

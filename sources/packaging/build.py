@@ -8,9 +8,9 @@ import inspect
 import json
 import platform as host
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from html import escape
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Literal
 import casadi as ca
 
 from cosim import spec
+from cosim.errors import listing
 from cosim.spec import devices, hints
 from cosim.spec.archive import pack
 from cosim.spec.variant import Name
@@ -48,12 +49,16 @@ class Variant:
     entries: list[Entry]
 
 
-def collect(name: str) -> Variant:
+def collect(name: str, starts: Mapping[str, float] | None = None) -> Variant:
     """Collect the equations, functions and variables of a variant.
+
+    Args:
+        name: of the variant.
+        starts: variable -> start value, in place of that of the device and the declaration.
 
     Raises:
         UnknownVariantError, ModelError: see `variant.build_model`.
-        ModelError: the period of a sample clock is not fixed.
+        ModelError: the period of a sample clock is not fixed, or no variable has such a name.
     """
     parsed = parse_name(name)
     model = build_model(parsed)
@@ -65,7 +70,11 @@ def collect(name: str) -> Variant:
                 f"{parsed}: the period of clock {clock.name!r} depends on "
                 f"{', '.join(sorted(varying))}; it may depend on fixed parameters only"
             )
-    return Variant(parsed, model, build_functions(model), layout(model))
+    entries, given = layout(model), dict(starts or {})
+    for unknown in sorted(given.keys() - {entry.name for entry in entries}):
+        raise ModelError(f"{parsed}: {listing([e.name for e in entries], unknown)} as variable")
+    entries = [replace(e, start=given.get(e.name, e.start)) for e in entries]
+    return Variant(parsed, model, build_functions(model), entries)
 
 
 def _token(*contents: str) -> str:
@@ -295,19 +304,49 @@ def build(
     if done is not None:
         return done
     path = target_path(parsed, out, fmi, kind)
+    content = _packed(name, fmi, kind, platform)
+    write_atomically(path, content)
+    stamp = _stamp(parsed, fmi, kind, platform)
+    write_atomically(stamp, hashlib.sha256(content).hexdigest().encode())
+    return path
+
+
+def build_with(
+    name: str,
+    starts: Mapping[str, float],
+    path: Path,
+    *,
+    fmi: Literal[2, 3] = 2,
+    platform: Literal["host", "all"] = "host",
+) -> Path:
+    """Build a native FMU of a variant with start values of its own; returns its path.
+
+    Args:
+        name: of the variant.
+        starts: variable -> start value; the others keep that of the device or the declaration.
+        path: of the file.
+        fmi, platform: as in `build`.
+
+    Raises:
+        as `build`; ModelError: no variable has such a name.
+    """
+    write_atomically(path, _packed(name, fmi, "native", platform, starts))
+    return path
+
+
+def _packed(
+    name: str, fmi: int, kind: Kind, platform: str, starts: Mapping[str, float] | None = None
+) -> bytes:
+    """The archive of a variant."""
     with _EQUATIONS:
-        variant = collect(name)
+        variant = collect(name, starts)
         files, source = _native_files(variant, fmi) if kind == "native" else _python_files(variant)
         files["documentation/index.html"] = _documentation(variant)
         files["extra/cosim/component.json"] = component_json(variant)
         files |= rights.files()
     if kind == "native":
-        files |= _libraries(source, parsed.identifier, fmi, _platforms(platform))
-    content = pack(files)
-    write_atomically(path, content)
-    stamp = _stamp(parsed, fmi, kind, platform)
-    write_atomically(stamp, hashlib.sha256(content).hexdigest().encode())
-    return path
+        files |= _libraries(source, variant.name.identifier, fmi, _platforms(platform))
+    return pack(files)
 
 
 def build_many(

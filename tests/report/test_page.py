@@ -135,6 +135,33 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
         assert part in text
 
 
+def test_a_law_over_two_signals_is_shown_in_slices_and_none_with_its_reason() -> None:
+    shown = material("unexplained")
+    more = dict(shown.table)
+    grid = [[x, y] for x in (-1.0, 1.0) for y in (0.0, 1.0, 2.0, 3.0, 4.0)]
+    more["law_from_data"] = {
+        "place": "load.flange", "unit": "N.m", "reason": "It holds.",
+        "formula": "smooth surface over velocity x angle",
+        "signals": [{"name": "velocity"}, {"name": "angle"}],
+        "curve": {"driver": "velocity", "shape": [2, 5], "x": [x for x, _ in grid],
+                  "y": [y for _, y in grid], "value": [x * y for x, y in grid]},
+        "nearest": [{"effect": "coulomb", "place": "load.flange", "rms_difference": 0.25,
+                     "unused_runs_prefer_the_law_by_nats": 30.0}],
+    }  # fmt: skip
+    text = rendered(replace(shown, table=more))
+    for part in (
+        "smooth surface over velocity x angle",
+        "angle 1",
+        "angle 2",
+        "angle 3",
+        "coulomb",
+    ):
+        assert part in text
+    more["law_from_data"] = {"place": "load.flange", "made": False, "reason": "Nothing varies."}
+    text = rendered(replace(shown, table=more))
+    assert "No law from the data" in text and "Nothing varies." in text
+
+
 def test_clocks_that_were_estimated_are_told() -> None:
     shown = material("effect_found")
     assert "Clocks that were estimated" not in rendered(shown)

@@ -1,0 +1,7 @@
+"""A law from data where the catalogue has none: smooth curves at a place, through the FMU."""
+
+from .bench import Site, site
+from .chain import unnamed
+from .result import LawFromData
+
+__all__ = ["LawFromData", "Site", "site", "unnamed"]

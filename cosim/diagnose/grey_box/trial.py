@@ -1,0 +1,353 @@
+"""Laws of different shapes at one place, tried to first order and fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from ...calibrate.deferred import corrected
+from ...calibrate.estimate import Estimate
+from ...calibrate.fit import CORRECTION, Effort, fit
+from ...calibrate.normal import BOUNDS
+from ...calibrate.parts import Parameter, Sensitivity
+from ...calibrate.simulator import Simulator
+from ...errors import CosimError
+from ...system.variants import component
+from ..candidates import Candidate
+from ..models import GATE, Fitted, compare, is_open
+from .basis import Axis, Shape
+from .bench import EFFECT, LawBench
+from .regression import Gram, Regression, regress
+
+Vector = NDArray[np.float64]
+DIRECTIONS = 20
+"""Directions of the coefficients that are fitted at most, those that gain most first."""
+GAINS = 0.5
+"""Least gain of a direction that is fitted [nats]: what one parameter gains on noise."""
+SHARES = (1.0, 0.5, 0.2, 0.05)
+"""Of the law that first orders ask for, where a fit begins: whichever is best."""
+SMALL = 1e-6
+"""Share of a law that need not be kept."""
+POINTS = 4000
+"""Points along the runs from which a law is redrawn on other knots."""
+WIDE = 100.0
+"""Span of a direction in its standard deviations: differences take a hundredth of it."""
+FARTHEST = 1e4
+"""Bound on a direction in its prior standard deviations: none."""
+NARROWER = (0.1, 1e-2, 1e-3)
+"""Widths of the jump that are tried, over the usual one."""
+QUICK = Effort("near", "draft", iterations=4)
+FAR = Effort("far", "draft", iterations=4)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A law to first order around a point.
+
+    Attributes:
+        shape: of the law.
+        grams: of the runs, for the free coefficients, the residual being that of no law.
+        regression: their values.
+        expansion: the coefficients c by the free ones.
+        words: name of each free coefficient of a law of named terms, () of a smooth one.
+    """
+
+    shape: Shape
+    grams: tuple[Gram, ...]
+    regression: Regression
+    expansion: Vector
+    words: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> float:
+        """See `Regression.expected`."""
+        return self.regression.expected
+
+
+@dataclass(frozen=True)
+class Law:
+    """A fitted law.
+
+    Attributes:
+        trial: its shape, and what it came from.
+        fitted: the model with it.
+        directions: free coefficients (rows) by what was fitted (columns).
+        rest: directions that were not fitted, each as long as its standard deviation.
+    """
+
+    trial: Trial
+    fitted: Fitted
+    directions: Vector
+    rest: Vector
+
+    @property
+    def shape(self) -> Shape:
+        """What it depends on."""
+        return self.trial.shape
+
+    @property
+    def fits(self) -> slice:
+        """Where what was fitted of it is among the model's parameters."""
+        return slice(self.fitted.free - self.directions.shape[1], self.fitted.free)
+
+    @property
+    def free(self) -> Vector:
+        """Free coefficients."""
+        return np.asarray(self.directions @ self.fitted.estimate.theta[self.fits])
+
+    @property
+    def coefficients(self) -> Vector:
+        """The 13 x 8 of the effect."""
+        return np.asarray(self.trial.expansion @ self.free)
+
+    @property
+    def formula(self) -> str:
+        """As a line of text: named terms with their numbers, or what kind of curve it is."""
+        if not self.trial.words:
+            kind = {"x + y": "sum of two curves", "x * y": "surface"}.get(self.shape.form, "curve")
+            return f"smooth {kind} over {self.shape.label}"
+        parts = [f"{value:+.4g} {word}" for value, word in zip(self.free, self.trial.words,
+                                                               strict=True)]  # fmt: skip
+        return " ".join(parts).removeprefix("+")
+
+    def values(self, x: Vector, y: Vector, *, held: bool = False) -> tuple[Vector, Vector]:
+        """The law at points, and its standard deviations there.
+
+        Args:
+            x, y: points.
+            held: with all other parameters as they were fitted: what these could do as well is no
+                uncertainty then.
+        """
+        design = self.design(x, y)
+        if held:
+            count = self.free.size
+            precision = self.trial.regression.prior.law + np.sum(
+                [gram.matrix[:count, :count] for gram in self.trial.grams], axis=0
+            )
+            variance = np.einsum("ij,ji->i", design, np.linalg.solve(precision, design.T))
+            return design @ self.free, np.sqrt(variance)
+        covariance = self.fitted.estimate.covariance[self.fits, self.fits]
+        known = design @ self.directions
+        variance = np.einsum("ij,jk,ik->i", known, covariance, known)
+        variance += np.sum((design @ self.rest) ** 2, axis=1)
+        return design @ self.free, np.sqrt(variance)
+
+    def design(self, x: Vector, y: Vector) -> Vector:
+        """Functions of the free coefficients (columns) at points."""
+        columns = self.shape.design(x, y)
+        return np.asarray(columns @ np.linalg.pinv(self.shape.expansion) @ self.trial.expansion)
+
+
+def tempered(grams: Sequence[Gram]) -> list[Gram]:
+    """The same with residuals that count as if the noise were as large as they are.
+
+    Where a model is far off, first orders are wrong by a share of that; as if exact, they would ask
+    for anything.
+    """
+    square = sum(float(g.matrix[-1, -1]) for g in grams)
+    factor = min(sum(g.count for g in grams) / max(square, 1e-300), 1.0)
+    return [replace(g, matrix=factor * g.matrix) for g in grams]
+
+
+class Maker:
+    """Tries and fits laws at a place.
+
+    Args:
+        bench: the model with a law there.
+
+    Attributes:
+        start: the model without a law around which laws are tried; where that is far off with
+            parameters at their bounds, at nominal values: what was calibrated made the best of a
+            wrong law.
+    """
+
+    def __init__(self, bench: LawBench) -> None:
+        self.bench = bench
+        self.search = bench.search
+        far = self.search.far(bench.base)
+        self.start = self.search.unfitted(bench.base) if far else bench.base
+        base = bench.base.problem
+        self.count = len(base.parameters)
+        self.declared = np.array(
+            [(s / p.prior) ** 2 if p.prior else BOUNDS
+             for s, p in zip(base.scale.tolist(), base.parameters, strict=True)]
+        )  # fmt: skip
+
+    def point(
+        self, fitted: Fitted
+    ) -> tuple[Vector, dict[str, Vector], list[Sensitivity], tuple[str, ...]]:
+        """Declared parameters, residuals by run, derivatives and held parameters of a model."""
+        rows = self.search.fitting.by_run(self.search.fit_data - fitted.fit)
+        residual = dict(zip(self.search.fitting.names, rows, strict=True))
+        slopes = []
+        for item in fitted.estimate.jacobian:
+            if item.run in residual:
+                mine = item.columns < self.count
+                slopes.append(
+                    item._replace(columns=item.columns[mine], values=item.values[:, :, mine])
+                )
+        held = tuple(n for n in fitted.estimate.at_bound if n in self.bench.base.problem.names)
+        return fitted.estimate.theta[: self.count], residual, slopes, held
+
+    def tried(
+        self, shape: Shape, around: Law | None = None, directions: Vector | None = None,
+        forms: Sequence[str] = (), *, beyond: bool = False, names: Sequence[str] = (),
+    ) -> list[Trial]:  # fmt: skip
+        """Laws of a shape to first order, around a model without one or with one.
+
+        Args:
+            shape: the widest one.
+            around: a law of part of the shape.
+            directions: of its free coefficients, all if not given.
+            forms: narrower ones that the same responses tell, too.
+            names: runs, all identification runs if not given.
+            beyond: what is to be added to the law around which it is taken, and not in its place.
+        """
+        bench = self.bench
+        fitted = self.start if around is None else around.fitted
+        theta, residual, slopes, held = self.point(fitted)
+        now = np.zeros(shape.expansion.shape[0]) if around is None else around.coefficients
+        directions = np.eye(shape.expansion.shape[1]) if directions is None else directions
+        asked = shape.expansion @ directions
+        grams = bench.grams(shape, asked, theta, now, residual, slopes, held, names)
+        grams = tempered(grams)
+        inner = np.linalg.pinv(asked)
+        found = []
+        for one in (shape, *(shape.narrowed(form) for form in forms)):
+            turn, penalties, jumps = one.expansion, one.penalties(), one.jumps
+            if one is shape:
+                turn, penalties = asked, [directions.T @ p @ directions for p in penalties]
+                jumps = np.any(directions[jumps] != 0.0, axis=0)
+            mine = tuple(g.form(inner @ turn, None if beyond else inner @ now) for g in grams)
+            found.append(Trial(one, mine, regress(mine, penalties, self.declared, jumps), turn))
+        return found
+
+    def fitted(self, trial: Trial, around: Law | None = None, *, final: bool = False) -> Law:
+        """A law fitted through the FMU together with all declared parameters.
+
+        Args:
+            trial: where it begins.
+            around: the law around which that was taken, if one.
+            final: with intervals.
+
+        Raises:
+            CosimError: it cannot be simulated.
+        """
+        bench, base, regression = self.bench, self.bench.base, trial.regression
+        precision = regression.prior.law
+        values, vectors = eigh(regression.matrix, precision)
+        values = np.maximum(values, 0.0)
+        start = vectors.T @ precision @ regression.value
+        gains = 0.5 * start**2 * (1.0 + values)
+        order = np.argsort(-gains)
+        kept = order[: max(min(DIRECTIONS, int(np.sum(gains > GAINS))), 1)]
+        if trial.words:
+            kept = order
+        others = np.setdiff1d(order, kept)
+        deviation = 1.0 / np.sqrt(1.0 + values)
+        chosen = np.eye(order.size)[:, kept]
+        if around is not None:  # what was fitted before can stay as it was
+            now = vectors.T @ precision @ np.linalg.pinv(trial.expansion) @ around.coefficients
+            missed = now - chosen @ (chosen.T @ now)
+            if np.linalg.norm(missed) > SMALL * np.linalg.norm(now):
+                chosen = np.column_stack([chosen, missed / np.linalg.norm(missed)])
+        directions, widths = vectors @ chosen, 1.0 / np.sqrt(1.0 + values @ chosen**2)
+        targets = trial.expansion @ directions
+        problem = bench.shaped(trial.shape, self._parameters(targets, WIDE * widths))
+        simulator = self.search.simulator.of(problem).limited(bench.limits)
+        theta = (self.start if around is None else around.fitted).estimate.theta[: self.count]
+        change = regression.declared * base.problem.scale
+        if around is None:
+            starts = [(theta + share * change, share * (start @ chosen)) for share in SHARES]
+        else:
+            starts = [(theta + change, start @ chosen), (theta, now @ chosen)]
+        best = min(
+            (np.clip(np.concatenate(pair), problem.lower, problem.upper) for pair in starts),
+            key=lambda one: self.cost(simulator, one),
+        )
+        far = around is None and is_open(self.start.estimate)
+        result = fit(simulator, best, effort=FAR if far else QUICK)
+        if final:
+            right = corrected(simulator, result.theta, self.search.raw)
+            result = fit(right, result.theta, effort=CORRECTION)
+        rest = vectors[:, others] * deviation[others]
+        return Law(trial, self._judged(result), directions, rest)
+
+    def visited(self, law: Law) -> list[Vector]:
+        """x and y of a law along the identification runs."""
+        theta = law.fitted.estimate.theta[: self.count]
+        return self.bench.recorded(law.shape, theta, law.coefficients)
+
+    def redrawn(self, law: Law, x: Axis) -> Law:
+        """The same law on other knots, as near as these come, fitted from there."""
+        shape = replace(law.shape, x=x)
+        points = [values[:: max(values.size // POINTS, 1)] for values in self.visited(law)]
+        design = shape.design(*points)
+        ridge = 1e-6 * np.trace(design.T @ design) / design.shape[1]
+        normal = design.T @ design + ridge * np.eye(design.shape[1])
+        near = np.linalg.solve(normal, design.T @ law.values(*points)[0])
+        trial = replace(law.trial, shape=shape, expansion=shape.expansion, words=())
+        problem = self.bench.shaped(shape, self._parameters(shape.expansion, np.ones(near.size)))
+        theta = np.concatenate([law.fitted.estimate.theta[: self.count], near])
+        found = self._judged(fit(self.search.simulator.of(problem), theta, effort=QUICK))
+        return Law(trial, found, np.eye(near.size), np.zeros((near.size, 0)))
+
+    def _parameters(self, targets: Vector, spans: Vector) -> list[Parameter]:
+        """Parameters of a law, each setting the coefficients as a column says."""
+        prefix = self.bench.site.prefix
+        return [
+            Parameter(
+                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
+                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
+                "effect", prior=1.0, span=float(min(spans[i], 1.0)),
+            )
+            for i, column in enumerate(targets.T)
+        ]  # fmt: skip
+
+    def _judged(self, estimate: Estimate) -> Fitted:
+        base, search = self.bench.base, self.search
+        found = search.judged(estimate)
+        found.effects = (*base.effects, self.candidate)
+        found.gate = compare(search.check_data, base.check, found.check, search.checking)
+        return found
+
+    def sharper(self, law: Law) -> Law:
+        """The law with the width of its jump that fits best.
+
+        Friction that holds is one whose jump is steep; first orders around one that creeps do not
+        lead there.
+        """
+        x = law.shape.x
+        if x is None:
+            return law
+        estimate = law.fitted.estimate
+        best, least = law, estimate.robust - GATE
+        for jump in (x.jump * factor for factor in NARROWER):
+            shape = replace(law.shape, x=replace(x, jump=jump))
+            constants = {**estimate.problem.constants, **self.bench.constants(shape)}
+            simulator = estimate.simulator.of(estimate.problem.changed(constants=constants))
+            if self.cost(simulator, estimate.theta) > least:
+                continue
+            found = self._judged(fit(simulator, estimate.theta, effort=QUICK))
+            if found.estimate.robust < least:
+                best = Law(replace(law.trial, shape=shape), found, law.directions, law.rest)
+                least = found.estimate.robust
+        return best
+
+    def cost(self, simulator: Simulator, theta: Vector) -> float:
+        """Cost over the identification runs, infinite where they cannot be simulated."""
+        try:
+            return self.search.cost(simulator, theta)
+        except CosimError:  # too strong to be simulated: a smaller share is tried
+            return np.inf
+
+    @property
+    def candidate(self) -> Candidate:
+        """The law as what was added to the model."""
+        site = self.bench.site
+        kind = component(self.bench.base.problem.instances[site.instance])
+        return Candidate(site.instance, kind, EFFECT, site.port, "Law given by numbers.")
