@@ -307,17 +307,18 @@ def _fitted(table: Table) -> set[str]:
 
 
 def _hints(table: Table) -> tuple[Hint, ...]:
-    """Sets that are nearest to the data, the best first, and why they are no names."""
-    declared, found, seen = table.models[0], [], set()
+    """Sets that are nearest to the data, the best first, and why they are no names.
 
-    def order(model: Model) -> tuple[bool, bool, float]:
-        return model.rough, not all(law.there for law in model.laws), -model.score
-
-    for model in sorted(table.models[1:], key=order):
-        explained = _explained(table, model, declared)
-        if not model.laws or model.labels in seen or explained < LEAST:
+    Of a set with laws that add less than `LEAST` to another one, that one is the hint.
+    """
+    declared, found = table.models[0], []
+    shares = [
+        (model, share) for model in table.models[1:]
+        if model.laws and (share := _explained(table, model, declared)) >= LEAST
+    ]  # fmt: skip
+    for model, explained in sorted(shares, key=lambda pair: (pair[0].rough, -pair[0].score)):
+        if any(m.labels < model.labels and share > explained - LEAST for m, share in shares):
             continue
-        seen.add(model.labels)
         left = above(model)
         why = doubts(table, model)
         if left:
@@ -329,8 +330,8 @@ def _hints(table: Table) -> tuple[Hint, ...]:
             why.append(f"a free force at {force.label} would explain more of the worst run")
         if left and model.forces and _most(model.forces).explained >= HALF:
             force = _most(model.forces)
-            share = percent(force.explained)
-            why.append(f"a free force at {force.label} explains {share} of what it leaves")
+            part = percent(force.explained)
+            why.append(f"a free force at {force.label} explains {part} of what it leaves")
         found.append(
             Hint(model.laws, explained, left[0] if left else None, tuple(why), model.rough)
         )

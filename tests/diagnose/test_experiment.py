@@ -48,7 +48,7 @@ def attributed(
         search.close()
 
 
-@pytest.mark.parametrize(("truth", "size"), [("coulomb", 0.04), ("stribeck", 0.1)])
+@pytest.mark.parametrize(("truth", "size"), [("coulomb", 0.04), ("stribeck", 0.07)])
 def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
     truth: str, size: float
 ) -> None:

@@ -376,3 +376,13 @@ def test_a_first_order_is_a_hint_at_most() -> None:
     found = decide(table(FAR, rough))
     assert found.kind == "unexplained"
     assert found.hints[0].rough and "to first order" in found.reason
+
+
+def test_the_nearest_set_is_the_first_hint_without_laws_that_add_nothing() -> None:
+    near, spare = law("delay"), law("viscous", gain=1.0, fitted=1.0, half=9.0)
+    far = model(law("cogging"), rms=4.5, force=0.9)
+    close = model(near, rms=1.3, force=0.9)
+    both = model(near, spare, rms=1.29, force=0.9)
+    found = decide(table(FAR, far, both, close))
+    assert found.kind == "unexplained"
+    assert [[x.effect for x in hint.laws] for hint in found.hints] == [["delay"], ["cogging"]]
