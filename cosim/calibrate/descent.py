@@ -54,6 +54,8 @@ second for drafts."""
 class Descent:
     """A point on its way to the minimum, with what was simulated there last."""
 
+    _met: tuple[Vector, list[tuple[str, Vector]], float] | None = None
+
     def __init__(
         self,
         simulator: Simulator,
@@ -73,7 +75,6 @@ class Descent:
         self.drawn = drawn(problem)
         self.residuals = simulator.residuals(self.theta, self.purpose)
         self.cost = self.total(self.theta, self.residuals)
-        self._met: tuple[Vector, list[tuple[str, Vector]], float] | None = None
 
     def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
         """Cost with the bounds as a weak prior, which decides where the data are silent."""

@@ -91,16 +91,17 @@ def test_builds_are_counted(tmp_path: Path) -> None:
 
 
 def test_json_stays_alone_and_progress_goes_elsewhere(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr(progress, "EVERY", 0.0)
     monkeypatch.chdir(tmp_path)
-    arguments = ["cosim", "run", "motor_bench/ST1", "--duration", "2", "--json"]
+    arguments = ["cosim", "run", "motor_bench/ST1", "--duration", "2", "--step", "5e-6"]
+    arguments += ["--json"]  # a run of some tenths of a second: it is looked at every twentieth
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit) as end:
         cli.main()
     assert not end.value.code
-    out, err = capsys.readouterr()
+    out, err = capfd.readouterr()
     assert json.loads(out)["scenario"] == "motor_bench/ST1"
     assert "motor_bench/ST1: " in err and "%" in err
 

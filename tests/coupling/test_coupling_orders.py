@@ -114,7 +114,7 @@ def stiff(provider) -> System:
     """J w' = -b w with b in another FMU; b / J = 10 000 1/s."""
     system = System("stiff", provider)
     system.add("load", "inertia/disc", {"J": 0.01, "b": 0.0, "speed": 1.0})
-    system.add("brake", "gearbox/ratio", {"ratio": 1.0, "b": 100.0, "J_a": 0.0})
+    system.add("brake", "gearbox/ratio", {"ratio": 1.0, "b": 100.0, "J_a": 0.0, "tau_a": 0.0})
     system.connect("brake.tau_b", "load.tau")
     system.connect("load.w", "brake.w_b")
     return system

@@ -135,7 +135,7 @@ def test_impossible_wishes_of_the_tuner_are_refused() -> None:
 
 def test_without_python_control_the_extra_is_named(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(InputError, match=r"pip install 'cosim\[control\]'"):
+    with pytest.raises(InputError, match=r"pip install 'cosim-robotics\[control\]'"):
         require_control()
 
 

@@ -13,7 +13,7 @@ from cosim.system.system import System
 
 def geared(provider, gearbox: str, *, taken: bool) -> System:
     system = System("bench", provider)
-    system.add("gearbox", gearbox)
+    system.add("gearbox", gearbox, {"tau_a": 0.0})
     system.add("load", "inertia/disc")
     system.connect("gearbox.tau_b", "load.tau")
     system.connect("load.w", "gearbox.w_b")

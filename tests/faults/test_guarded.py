@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cosim.cli.guard import SIZE
-from cosim.master import board
+from cosim.master import board, witness
 from tests.faults import matrix
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and an FMU for Linux")
@@ -159,5 +159,5 @@ def test_what_is_guarded() -> None:
 
 def test_the_memory_holds_what_is_said() -> None:
     assert board.SIZE <= SIZE  # it is made before anything large is imported
-    made = board.kernel.structures.RUN_SIZE + board.TEXT + 8 * (board.THREAD + 1)
+    made = board.kernel.structures.RUN_SIZE + witness.TEXT + 8 * (board.THREAD + 1)
     assert made <= board.SLOT

@@ -90,6 +90,9 @@ def table(verdict: str) -> dict[str, Any]:
             "speed": row("rad/s", 0.155, before, after), "current": row("A", 0.05, 0.98, 0.97),
         },
         "further_runs": [],
+        "law_from_data": None,
+        "withheld": [],
+        "hints": [],
         "parameters": {
             "R_a": {"unit": "ohm", "before": value, "after": value},
             "eta": {"unit": "-", "before": unknown, "after": unknown},

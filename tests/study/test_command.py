@@ -56,7 +56,7 @@ def test_table_and_json(tmp_path: Path) -> None:
     }  # fmt: skip
     assert [row["set.gearbox"] for row in again["rows"]] == ["ratio", "elastic"]
     assert [Path(path).name for path in again["files"]] == [
-        "study.csv", "study.parquet", "study.json", "study.png"
+        "study.csv", "study.json", "study.parquet", "study.png"
     ]  # fmt: skip
     written = json.loads((out / "study.json").read_text())
     assert written["rows"] == again["rows"] and again["units"]["rms.speed"] == "rad/s"
@@ -185,7 +185,7 @@ def test_the_example_says_what_it_runs() -> None:
 
 def test_a_scheduler_needs_dask(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"not installed: pip install 'cosim\[study\]'"):
+    with pytest.raises(InputError, match=r"not installed: pip install 'cosim-robotics\[study\]'"):
         run({}, scheduler="tcp://localhost:1")
 
 
