@@ -74,11 +74,15 @@ def _orders(
     stack: SampleStack,
     residual: Vector,
 ) -> list[float]:
-    """Cycles per turn that the residual has over the angle of the effect, which is absent."""
+    """Cycles per turn that the residual has over the angle of the effect, which is absent.
+
+    Of an effect on several shafts, over any of their angles.
+    """
     whole = probe.problem.nominal
     whole[: theta.size] = theta
-    paths = followed(
-        simulator.of(probe.problem), whole, stack.runs, [parameter.hints.cycles]
-    )  # fmt: skip
-    angles = [path[:, 0] for path in paths]
-    return peaks(spectrum([run.times for run in stack.runs], angles, stack.by_run(residual)))
+    member, variables = probe.problem.system().variables(parameter.hints.cycles)
+    names = [f"{member.name}.{element}" for v in variables for element in v.elements()]
+    paths = followed(simulator.of(probe.problem), whole, stack.runs, names)
+    times, residuals = [run.times for run in stack.runs], stack.by_run(residual)
+    power = [spectrum(times, [path[:, k] for path in paths], residuals) for k in range(len(names))]
+    return peaks(np.sum(power, axis=0))
