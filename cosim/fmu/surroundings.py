@@ -18,7 +18,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE)
+CRASHES = (signal.SIGSEGV, signal.SIGFPE)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *CRASHES)
 """Whose handlers are watched."""
 
 
@@ -61,10 +62,18 @@ def _handlers() -> tuple[Any, ...]:
     return tuple(get(int(number)) for number in SIGNALS)
 
 
-def _put_handlers(wanted: tuple[Any, ...]) -> None:
+def _given_up(number: signal.Signals, handler: Any) -> bool:
+    """Whether a handler was taken off by another thread that is crashing.
+
+    Python's fault handler does so before it reports; put back then, it would report for ever.
+    """
+    return number in CRASHES and not handler  # None: the default
+
+
+def _put_handlers(wanted: dict[signal.Signals, Any]) -> None:
     put = ct.pythonapi.PyOS_setsig
     put.argtypes, put.restype = [ct.c_int, ct.c_void_p], ct.c_void_p
-    for number, handler in zip(SIGNALS, wanted, strict=True):
+    for number, handler in wanted.items():
         put(int(number), handler)
 
 
@@ -113,11 +122,14 @@ class Surroundings:
         if now.point != self.point:
             locale.setlocale(locale.LC_NUMERIC, self.point)
             found.append(f"the locale of numbers to {now.point}")
-        if now.handlers != self.handlers:
-            _put_handlers(self.handlers)
-            pairs = zip(SIGNALS, self.handlers, now.handlers, strict=True)
-            changed = ", ".join(number.name for number, old, new in pairs if old != new)
-            found.append(f"what happens at {changed}")
+        changed = {
+            number: old
+            for number, old, new in zip(SIGNALS, self.handlers, now.handlers, strict=True)
+            if old != new and not _given_up(number, new)
+        }
+        if changed:
+            _put_handlers(changed)
+            found.append(f"what happens at {', '.join(number.name for number in changed)}")
         if now.modes != self.modes:
             modes.put(self.modes)
             found.append(MODES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cProfile
 import stat
 import time
 import zipfile
@@ -20,6 +21,8 @@ from tests.small_fmus import T3, Y3, U, Y, fmi2, fmi3, pack
 
 LARGE = 40_000_000
 """Bytes of the large files here, above the limits that the tests set."""
+LONGEST = 20.0
+"""Time within which a file must be refused, on a busy machine [s]; unlimited it takes minutes."""
 
 
 def refused(path: Path) -> str:
@@ -27,7 +30,7 @@ def refused(path: Path) -> str:
     begin = time.perf_counter()
     with pytest.raises(FmuFileError) as caught:
         open_fmu(path)
-    assert time.perf_counter() - begin < 2.0
+    assert time.perf_counter() - begin < LONGEST
     assert str(path) in str(caught.value)
     return str(caught.value)
 
@@ -70,21 +73,25 @@ def test_a_long_description(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert "raise it: COSIM_MAX_TEXT=200" in text
 
 
+def calls(path: Path) -> int:
+    """Calls of functions, those of C among them, that checking a file takes; all of it is wrong."""
+    profile = cProfile.Profile()
+    found = profile.runcall(check, path)
+    assert "v0" in {finding.variable for finding in found}
+    return sum(entry.callcount for entry in profile.getstats())
+
+
 def test_a_description_that_is_wrong_everywhere_takes_no_longer(tmp_path: Path) -> None:
     taken = []
-    for count in (2000, 16000):
+    for count in (1000, 8000):
         twice = "".join(
             f'<ScalarVariable name="v{i // 2}" valueReference="{i + 9}" causality="local">'
             "<Real/></ScalarVariable>"
             for i in range(count)
         )
-        path = pack(tmp_path / f"{count}.fmu", fmi2(U + Y + twice))
-        begin = time.process_time()
-        found = check(path)
-        taken.append(time.process_time() - begin)
-        assert "v0" in {finding.variable for finding in found}
+        taken.append(calls(pack(tmp_path / f"{count}.fmu", fmi2(U + Y + twice))))
     # eight times as many: 8 if all is looked at once, 64 if all pairs are
-    assert taken[1] < 24.0 * taken[0]
+    assert taken[1] < 8.1 * taken[0]
 
 
 def test_many_elements(monkeypatch: pytest.MonkeyPatch) -> None:
