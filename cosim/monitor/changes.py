@@ -1,0 +1,412 @@
+"""What changed, since when: one change after the other, all dates and names weighed anew each time.
+
+Whether there is one is asked of numbers per log that need no model of their scatter (`profiles`).
+What it is and since when is asked of the likelihood of all residuals, in which the noise is white
+and declared parameters scatter between logs as they do from log to log; gains of other names and
+dates count over the scatter that is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnose.linear import MATERIAL
+from ..diagnose.models import GATE
+from .evidence import Evidence, Moments
+from .patterns import Direction, Patterns
+from .profiles import Profile, constants, profiles, regress, weights
+
+Vector = NDArray[np.float64]
+MOST = 6
+"""Changes that are looked for; with more, the machine is another one."""
+SHARE = 0.05
+"""A further change that is smaller than this share of the largest one is not named: patterns are of
+first order, and of a large change about as much is left."""
+PASSES = 4
+"""Times that names and dates of all changes are weighed anew at most."""
+DATES = 1.92
+"""Fall of the log likelihood at the ends of a 95 % interval [nats]."""
+LEFT = 0.1
+"""Share of the energy that a name explains which may begin to be missing at the same date; beyond,
+the name does not fit."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that is other than in the first logs.
+
+    Attributes:
+        direction: what, None for what no direction explains.
+        profile: how.
+        amounts: per column, in scales (per day for a creep); of a channel, of the logarithm of the
+            mean square of what is left.
+        deviations: of these.
+        gain: log likelihood [nats].
+        low, high: index of the first log that differs, at least and at most, 95 %.
+        rivals: names that do as well.
+        channel: where no direction explains it.
+        p: chance under no change, corrected for all that was asked.
+        fits: whether the name explains what changed.
+        spread: variance over that of the model of scatter.
+    """
+
+    direction: Direction | None
+    profile: Profile
+    amounts: Vector
+    deviations: Vector
+    gain: float
+    low: int
+    high: int
+    rivals: tuple[str, ...] = ()
+    channel: str = ""
+    p: float = 0.0
+    fits: bool = True
+    spread: float = 1.0
+
+
+@dataclass
+class Found:
+    """All that detection found.
+
+    Attributes:
+        changes: by date.
+        tests: how many were made.
+        limit: probability below which one alarms.
+        root: of the scatter of declared parameters between logs.
+        own: values and deviations of each column by log, changes not taken off.
+        left: mean square over the noise by log and channel, declared parameters fitted per log.
+        alone: declared parameters whose successive logs are alike: name -> correlation.
+    """
+
+    changes: list[Change]
+    tests: int
+    limit: float
+    root: Vector
+    own: tuple[Vector, Vector]
+    left: Vector
+    alone: dict[str, float] = field(default_factory=dict)
+
+
+class Detector:
+    """Looks for changes.
+
+    Args:
+        evidence: residuals of the series.
+        rate: probability of any alarm on a series in which nothing changes.
+    """
+
+    def __init__(self, evidence: Evidence, rate: float) -> None:
+        self.evidence, self.patterns = evidence, evidence.patterns
+        logs = evidence.series.logs
+        self.days = np.array([(log.date - logs[0].date).total_seconds() / 86400.0 for log in logs])
+        self.shapes = profiles(self.days)
+        self.matrix = np.array([shape.values for shape in self.shapes])
+        keys = [tuple(self.patterns.keys[name] for name in log.runs) for log in logs]
+        self.known = constants(keys)
+        self.centred = self._centred(self.matrix)
+        self.moments = evidence.moments()
+        own = self.moments.own()[0]
+        self.watched = [k for k in range(self.patterns.width) if np.isfinite(own[:, k]).sum() > 3]
+        self.tests = (len(self.watched) + evidence.channels) * len(self.shapes)
+        self.limit = rate / self.tests
+        self._changes: list[Change] = []
+
+    def _centred(self, shapes: Vector) -> Vector:
+        """Profiles without the constants."""
+        basis = np.linalg.qr(self.known)[0]
+        return np.asarray(shapes - (shapes @ basis) @ basis.T)
+
+    # -- sums with changes taken off -----------------------------------------------------------
+
+    def _columns(self, changes: Iterable[Change]) -> tuple[list[int], Vector]:
+        """Columns of changes and their amounts by log."""
+        columns: list[int] = []
+        rows: list[Vector] = []
+        for change in changes:
+            assert change.direction is not None
+            for column, amount in zip(change.direction.columns, change.amounts, strict=True):
+                columns.append(column)
+                rows.append(amount * change.profile.values)
+        return columns, np.array(rows).reshape(len(columns), self.days.size)
+
+    def _without(self, changes: Sequence[Change]) -> Moments:
+        return self.moments.without(*self._columns(changes))
+
+    def alarms(self, changes: Sequence[Change]) -> tuple[float, NDArray[np.bool_]]:
+        """Smallest probability over all tests, and which profiles alarm."""
+        values, deviations = self._without(changes).own()
+        known = np.column_stack([self.known, *(c.profile.values for c in changes)])
+        least, seen = 1.0, np.zeros(len(self.shapes), dtype=bool)
+        for column in self.watched:
+            series, own = values[:, column], deviations[:, column]
+            p = regress(series, weights(series, own), known, self.matrix).p
+            least = min(least, float(p.min()))
+            seen |= p < self.limit
+        return least, seen
+
+    # -- names and dates ---------------------------------------------------------------------------
+
+    def gains(self, moments: Moments, root: Vector) -> tuple[dict[int, Vector], Vector, Vector]:
+        """Per direction the gain of each profile [nats]; weighted sums."""
+        z, weight = moments.weighted(root)
+        projected = self.centred @ z
+        found = {}
+        for index, direction in enumerate(self.patterns.directions):
+            columns = list(direction.columns)
+            u = projected[:, columns]
+            block = weight[:, columns][:, :, columns]
+            h = np.einsum("an,nij->aij", self.centred**2, block)
+            h = h + 1e-12 * np.eye(len(columns)) * np.maximum(
+                np.trace(h, axis1=1, axis2=2), 1e-300
+            )[:, None, None]
+            solved = np.linalg.solve(h, u[:, :, None])[:, :, 0]
+            found[index] = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
+        return found, z, weight
+
+    def best(
+        self, changes: Sequence[Change], root: Vector, usable: NDArray[np.bool_] | None = None
+    ) -> Change | None:
+        """The change that explains most of what the others leave."""
+        moments = self._without(changes)
+        gains, z, weight = self.gains(moments, root)
+        taken = {(c.direction.name, c.profile.kind) for c in changes if c.direction}
+        best: tuple[float, int, int] | None = None
+        for index, gain in gains.items():
+            direction = self.patterns.directions[index]
+            allowed = np.array(
+                [(direction.name, shape.kind) not in taken or shape.kind == "outlier"
+                 for shape in self.shapes]
+            )  # fmt: skip
+            if usable is not None:
+                allowed &= usable
+            if not allowed.any():
+                continue
+            place = int(np.argmax(np.where(allowed, gain, -np.inf)))
+            if best is None or gain[place] > best[0]:
+                best = float(gain[place]), index, place
+        if best is None:
+            return None
+        gain_, index, place = best
+        return self._change(gains, z, weight, index, place, gain_)
+
+    def _change(
+        self, gains: dict[int, Vector], z: Vector, weight: Vector, index: int, place: int,
+        gain: float,
+    ) -> Change:  # fmt: skip
+        """A direction and a profile as a change, with intervals and rivals."""
+        direction, shape = self.patterns.directions[index], self.shapes[place]
+        columns = list(direction.columns)
+        h = self.centred[place]
+        block = np.einsum("n,nij->ij", h**2, weight[:, columns][:, :, columns])
+        inverse = np.linalg.pinv(block)
+        amounts = inverse @ (h @ z[:, columns])
+        # scatter along the direction beyond what the model has of it
+        first = columns[int(np.argmax(np.abs(amounts)))]
+        own = weight[:, first, first]
+        rest = z[:, first] - (h[:, None] * weight[:, first][:, columns]) @ amounts
+        safe = np.maximum(own, 1e-300)
+        rest = self._centred((rest / safe)[None, :])[0]
+        freedom = max(rest.size - self.known.shape[1] - 1, 1)
+        spread = max(float(np.sum(rest**2 * own)) / freedom, 1.0)
+        alike = [k for k, s in enumerate(self.shapes) if s.kind == shape.kind]
+        near = [
+            self.shapes[k].first for k in alike if gains[index][k] > gain - DATES * spread
+        ]  # fmt: skip
+        rivals = []
+        for other, values in gains.items():
+            if other == index:
+                continue
+            k = int(np.argmax(values))
+            if float(values[k]) > gain - GATE * spread or self._alike(
+                direction, other, amounts, h, weight, shape
+            ):
+                rivals.append((float(values[k]), self.patterns.directions[other].name))
+        rivals.sort(reverse=True)
+        return Change(
+            direction, shape, amounts, np.sqrt(np.diag(inverse) * spread), gain,
+            min(near), max(near), tuple(name for _, name in rivals), spread=spread,
+        )  # fmt: skip
+
+    def _alike(
+        self, direction: Direction, other: int, amounts: Vector, h: Vector, weight: Vector,
+        shape: Profile,
+    ) -> bool:  # fmt: skip
+        """Whether another direction does the same but for less than has a name."""
+        columns = list(direction.columns)
+        rival = list(self.patterns.directions[other].columns)
+        block = np.einsum("n,nij->ij", h**2, weight[:, rival][:, :, rival])
+        cross = np.einsum("n,nij->ij", h**2, weight[:, rival][:, :, columns])
+        theirs = np.linalg.pinv(block) @ cross @ amounts
+        # quick: what of the pattern is left, in the metric of the likelihood
+        own = np.einsum("n,nij->ij", h**2, weight[:, columns][:, :, columns])
+        whole = float(amounts @ own @ amounts)
+        if float(theirs @ block @ theirs) < 0.5 * whole:
+            return False
+        most = float(np.max(np.abs(shape.values)))
+        size = self.evidence.largest(
+            [*columns, *rival], most * np.concatenate([amounts, -theirs]),
+            np.zeros(self.patterns.declared),
+        )  # fmt: skip
+        return size < MATERIAL
+
+    # -- all together ------------------------------------------------------------------------------
+
+    def refitted(self, changes: Sequence[Change], root: Vector) -> list[Change]:
+        """The changes with their amounts fitted together."""
+        if not changes:
+            return []
+        z, weight = self.moments.weighted(root)
+        columns = [c for change in changes for c in change.direction.columns]  # type: ignore[union-attr]
+        shapes = self._centred(
+            np.array(
+                [change.profile.values for change in changes for _ in change.amounts]
+            )
+        )
+        normal = np.einsum(
+            "kn,ln,nkl->kl", shapes, shapes, weight[:, columns][:, :, columns], optimize=True
+        )
+        inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+        amounts = inverse @ np.einsum("kn,nk->k", shapes, z[:, columns])
+        spreads = np.array([change.spread for change in changes for _ in change.amounts])
+        deviations = np.sqrt(np.diag(inverse) * spreads)
+        found, place = [], 0
+        for change in changes:
+            size = change.amounts.size
+            part = slice(place, place + size)
+            found.append(replace(change, amounts=amounts[part], deviations=deviations[part]))
+            place += size
+        return found
+
+    def weighed(self, changes: list[Change], root: Vector) -> list[Change]:
+        """All names and dates weighed anew, each with the others taken off."""
+        for _ in range(PASSES):
+            before = [(c.direction, c.profile) for c in changes]
+            for place in range(len(changes)):
+                others = [c for k, c in enumerate(changes) if k != place]
+                again = self.best(others, root)
+                if again is None:
+                    continue
+                again = replace(again, p=changes[place].p)
+                changes = [*changes[:place], again, *changes[place + 1 :]]
+                changes = self.refitted(changes, root)
+            if before == [(c.direction, c.profile) for c in changes]:
+                break
+        return changes
+
+    def sharpened(self, changes: list[Change], root: Vector) -> list[Change]:
+        """Patterns of the changes taken at their full size."""
+        renewed = False
+        for change in changes:
+            assert change.direction is not None
+            full = change.amounts * float(np.max(np.abs(change.profile.values)))
+            renewed |= self.patterns.secant(change.direction, full)
+        if renewed:
+            self.moments = self.evidence.moments()
+            changes = self.refitted(changes, root)
+        return changes
+
+    def found(self) -> Found:
+        """Look for all changes."""
+        changes: list[Change] = []
+        first = self.moments.own()
+        while len(changes) < MOST:
+            least, usable = self.alarms(changes)
+            if not usable.any():
+                break
+            root = self._without(changes).scatter()
+            change = self.best(changes, root, usable)
+            if change is None or change.gain < GATE * change.spread:
+                break
+            if change.gain < SHARE**2 * max((c.gain for c in changes), default=0.0):
+                break
+            change = replace(change, p=min(least * self.tests, 1.0))
+            changes = self.refitted([*changes, change], root)
+            changes = self.sharpened(changes, root)
+            changes = self.weighed(changes, self._without(changes).scatter())
+        columns, amounts = self._columns(changes)
+        root = self._without(changes).scatter()
+        fitted = self._without(changes).own()[0][:, : self.patterns.declared]
+        left = self.evidence.left(columns, amounts, fitted)
+        unexplained = self._unexplained(left)
+        changes = [self._judged(change, unexplained) for change in changes]
+        changes += unexplained
+        changes.sort(key=lambda c: (c.profile.first, -c.gain))
+        plain = self.evidence.left([], np.zeros((0, len(self.days))), first[0][:, : self.patterns.declared])
+        return Found(
+            changes, self.tests, self.limit, root, first, plain, self._correlated(changes)
+        )
+
+    def _unexplained(self, left: Vector) -> list[Change]:
+        """Channels of which other than before is left."""
+        found = []
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs = np.log(left)
+        for place, channel in enumerate(self.evidence.series.problem.channels):
+            series = np.where(np.isfinite(logs[:, place]), logs[:, place], np.nan)
+            result = regress(series, np.ones_like(series), self.known, self.matrix)
+            best = int(np.argmin(result.p))
+            shape = self.shapes[best]
+            whole = float(result.slope[best] * np.max(np.abs(shape.values)))
+            if not result.p[best] < self.limit or abs(math.expm1(whole)) < MATERIAL**2:
+                continue
+            gains = 0.5 * (result.slope / result.deviation) ** 2
+            near = [
+                s.first for k, s in enumerate(self.shapes)
+                if s.kind == shape.kind and gains[k] > gains[best] - DATES
+            ]  # fmt: skip
+            found.append(
+                Change(
+                    None, shape, result.slope[best : best + 1], result.deviation[best : best + 1],
+                    float(gains[best]), min(near), max(near), channel=channel.name,
+                    p=min(float(result.p[best]) * self.tests, 1.0),
+                )
+            )  # fmt: skip
+        return found
+
+    def _judged(self, change: Change, unexplained: Sequence[Change]) -> Change:
+        """Whether the name explains what changed: no more than a little of it is left."""
+        assert change.direction is not None
+        together = [c for c in unexplained if c.low <= change.high and change.low <= c.high]
+        if not together:
+            return change
+        names = [c.name for c in self.evidence.series.problem.channels]
+        full = change.amounts * float(np.max(np.abs(change.profile.values)))
+        explained = np.zeros(len(names))
+        for values in self.patterns.values.values():
+            pattern = values[:, list(change.direction.columns)] @ full
+            explained = np.maximum(
+                explained, np.mean(pattern.reshape(-1, len(names)) ** 2, axis=0)
+            )
+        missing = sum(
+            math.expm1(float(c.amounts[0] * np.max(np.abs(c.profile.values)))) for c in together
+        )
+        return replace(change, fits=bool(missing < LEFT * float(explained.sum())))
+
+    def _correlated(self, changes: Sequence[Change]) -> dict[str, float]:
+        """Declared parameters whose successive logs are more alike than chance makes them."""
+        named = [c for c in changes if c.direction is not None]
+        values = self._without(named).own()[0]
+        known = np.column_stack([self.known, *(c.profile.values for c in named)])
+        basis = np.linalg.qr(known)[0]
+        found = {}
+        for direction in self.patterns.directions[: self.patterns.declared]:
+            series = values[:, direction.columns[0]]
+            rest = series - basis @ (basis.T @ series)
+            correlation = float(rest[1:] @ rest[:-1]) / max(float(rest @ rest), 1e-300)
+            # 1 / sqrt(n) is its deviation, and over ten parameters 3 of them are rare
+            if correlation > 3.0 / math.sqrt(rest.size):
+                found[direction.name] = correlation
+        return found
+
+
+def column_sizes(patterns: Patterns) -> dict[str, float]:
+    """Direction -> largest norm of its patterns."""
+    return {
+        d.name: max(float(np.linalg.norm(v[:, d.columns[0]])) for v in patterns.values.values())
+        for d in patterns.directions
+    }

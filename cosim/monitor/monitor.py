@@ -1,0 +1,149 @@
+"""The whole chain: baseline, patterns, changes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..calibrate.checks.examine import check_data
+from ..calibrate.checks.finding import lines, passed
+from ..calibrate.fit import Effort, fit
+from ..calibrate.parts import PURPOSE
+from ..calibrate.simulator import Simulator
+from ..diagnose.candidates import candidates
+from ..errors import InputError, UnknownNameError, listing
+from .changes import Detector
+from .evidence import Evidence
+from .patterns import Patterns, patterns, representatives, sorted_out
+from .result import Monitored
+from .series import LEAST, Series, read_series
+
+RATE = 1e-3
+"""Probability of any alarm on a series in which nothing changes: one false alarm in a thousand
+series."""
+BASELINE = 10
+"""Logs from which parameters and control limits are taken: their spread is then known to a
+quarter."""
+
+
+def monitor(
+    series: Series | Path | str,
+    say: Callable[[str], None] = lambda text: None,
+    *,
+    baseline: int = BASELINE,
+    rate: float = RATE,
+    workers: int | None = None,
+    without: Iterable[str] = (),
+    known: Patterns | None = None,
+) -> Monitored:
+    """Say what has changed over a series of logs of one machine, since when, and what it is.
+
+    Not modelled: logs that depend on each other, as by the season; what changes slowly without a
+    log before it.
+
+    Args:
+        series: the logs, or their folder.
+        say: told what is done.
+        baseline: number of first logs that parameters and control limits are taken from.
+        rate: probability of any alarm on a series in which nothing changes.
+        workers: threads, one per core if not given.
+        without: effects that are left out of the catalogue.
+        known: patterns of the same machine and excitations, which are not simulated again.
+
+    Raises:
+        CosimError: a file is wrong, the data cannot be used, or the system cannot be simulated.
+    """
+    begun = time.perf_counter()
+    if not isinstance(series, Series):
+        series = read_series(series)
+    count = len(series.logs)
+    if not 0.0 < rate < 1.0:
+        raise InputError(f"the rate of false alarms is {rate:g}, not between 0 and 1")
+    if not 2 <= baseline <= count - LEAST // 2:
+        baseline_ = min(BASELINE, count - LEAST // 2)
+        if baseline != BASELINE:
+            raise InputError(
+                f"a baseline of {baseline} of {count} logs: take 2 to {count - LEAST // 2}"
+            )
+        baseline = baseline_
+    warnings = _usable(series)
+    if known is None:
+        with threadpool_limits(1, user_api="blas"):  # its threads wait at the cost of simulations
+            known = baseline_patterns(
+                series, say, baseline=baseline, workers=workers, without=without
+            )
+    say("looking for changes")
+    detector = Detector(Evidence(series, known), rate)
+    found = detector.found()
+    for name, correlation in found.alone.items():
+        warnings.append(
+            f"{name} of successive logs is correlated by {correlation:.2f}: logs are not "
+            "independent (a season, a warming), so false alarms come oftener than stated"
+        )
+    return Monitored(
+        series, known, found, baseline, rate, warnings, time.perf_counter() - begun
+    )  # fmt: skip
+
+
+def _usable(series: Series) -> list[str]:
+    """Warnings about the data.
+
+    Raises:
+        InputError: they cannot be used.
+    """
+    findings = passed(check_data(series.problem), series.problem.source.allow)
+    wrong = [f for f in findings if f.severity == "error"]
+    if wrong:
+        raise InputError(f"{series.name}: the data cannot be used: " + "; ".join(map(str, wrong)))
+    return lines(f for f in findings if f.severity == "warning")
+
+
+def baseline_patterns(
+    series: Series,
+    say: Callable[[str], None] = lambda text: None,
+    *,
+    baseline: int = BASELINE,
+    workers: int | None = None,
+    without: Iterable[str] = (),
+) -> Patterns:
+    """Fit the first logs, and simulate what parameters and effects do around them.
+
+    Raises:
+        CosimError: the system cannot be simulated, or no effect of that name fits it.
+    """
+    problem = series.problem
+    keys = sorted_out(problem)
+    calm = [name for log in series.logs[:baseline] for name in log.runs]
+    chosen, fitted = representatives(problem, keys, calm)
+    say(f"{len(series.logs)} logs with {len(chosen.runs)} excitations; fitting the first {baseline}")
+    as_fitted = [replace(run, purpose=PURPOSE) for run in chosen.runs]
+    simulator = Simulator(chosen.changed(runs=as_fitted), workers=workers)
+    far = fit(
+        simulator.of(simulator.problem.changed(step=problem.search.step)), purpose=fitted,
+        effort=Effort("far", "draft"),
+    )  # fmt: skip
+    estimate = fit(simulator, far.theta, fitted, effort=Effort("there", "draft"))
+    theta = estimate.theta.copy()
+    for place, p in enumerate(chosen.parameters):
+        if p.run:  # values of single runs are fitted log by log
+            theta[place] = p.nominal
+    offered = candidates(chosen)
+    names = sorted({c.effect for c in offered})
+    left_out = set(without)
+    for name in sorted(left_out - set(names)):
+        raise UnknownNameError(
+            f"{problem.file.path}: no effect {name!r} of the catalogue fits this system; "
+            f"{listing(names, name)}"
+        )
+    try:
+        return patterns(
+            simulator, np.clip(theta, chosen.lower, chosen.upper), keys,
+            [c for c in offered if c.effect not in left_out], say,
+        )  # fmt: skip
+    finally:
+        simulator.close()

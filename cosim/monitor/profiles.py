@@ -1,0 +1,133 @@
+"""How something may change over a series of logs, and whether a series of numbers does.
+
+    step      other from a log on
+    creep     grows with time from the log before on
+    outlier   other in one log only
+
+A number per log, independent and normal about a constant with an unknown spread, is regressed on
+the constant and one profile. The slope over its deviation is Student's t if nothing has changed,
+whatever the spread is. Over all profiles and all numbers, the chance that one of them exceeds a
+threshold is at most the sum of their chances (Bonferroni), so the stated rate is shared evenly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+Vector = NDArray[np.float64]
+Kind = Literal["step", "creep", "outlier"]
+ASIDE = 2
+"""Logs on either side of a step at least: a single one is an outlier."""
+GROUP = 4
+"""Logs of one excitation that have a mean of their own; where there are fewer, all share one."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One way to change.
+
+    Attributes:
+        kind: see above.
+        first: index of the first log that differs.
+        values: by log; 1 for a step and an outlier, days for a creep.
+    """
+
+    kind: Kind
+    first: int
+    values: Vector
+
+
+def profiles(days: Vector) -> list[Profile]:
+    """All ways for logs at these times [d]."""
+    count = days.size
+    found = []
+    for first in range(ASIDE, count - ASIDE + 1):
+        found.append(Profile("step", first, (np.arange(count) >= first).astype(np.float64)))
+    for first in range(ASIDE, count - ASIDE + 1):
+        found.append(Profile("creep", first, np.maximum(days - days[first - 1], 0.0)))
+    for first in range(count):
+        found.append(Profile("outlier", first, (np.arange(count) == first).astype(np.float64)))
+    return found
+
+
+def constants(groups: Sequence[object]) -> Vector:
+    """Columns of the constants: one per excitation that came often, one for all others."""
+    known = list(groups)
+    often = [key for key in dict.fromkeys(known) if known.count(key) >= GROUP]
+    columns = [[float(key == one) for key in known] for one in often]
+    others = [float(key not in often) for key in known]
+    if any(others):
+        columns.append(others)
+    return np.array(columns).T
+
+
+@dataclass(frozen=True)
+class Regression:
+    """One series of numbers against profiles.
+
+    Attributes:
+        slope, deviation: by profile.
+        p: two-sided, by profile; 1 where the profile cannot be told from what is known.
+        freedom: degrees of freedom.
+    """
+
+    slope: Vector
+    deviation: Vector
+    p: Vector
+    freedom: int
+
+
+def regress(values: Vector, weight: Vector, known: Vector, shapes: Vector) -> Regression:
+    """Regress a series on what is known and one profile at a time.
+
+    Args:
+        values: one per log; NaN for none.
+        weight: inverse variances, up to a factor.
+        known: (logs, columns) of what is fitted anyway.
+        shapes: (profiles, logs).
+    """
+    good = np.isfinite(values)
+    root = np.sqrt(weight[good])
+    before = known[good] * root[:, None]
+    left, sizes, _ = np.linalg.svd(before, full_matrices=False)
+    basis = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
+    freedom = int(good.sum()) - basis.shape[1] - 1
+    nothing = np.zeros(len(shapes))
+    if freedom < 1:
+        return Regression(nothing, nothing + np.inf, nothing + 1.0, 0)
+
+    def apart(of: Vector) -> Vector:
+        return np.asarray(of - (of @ basis) @ basis.T)
+
+    y = apart(values[good] * root)
+    x = shapes[:, good] * root
+    rest = apart(x)
+    square = np.sum(rest**2, axis=1)
+    seen = square > 1e-9 * np.maximum(np.sum(x**2, axis=1), 1e-300)
+    safe = np.where(seen, square, 1.0)
+    slope = np.where(seen, rest @ y / safe, 0.0)
+    spread = np.maximum(float(y @ y) - slope**2 * safe, 0.0) / freedom
+    deviation = np.sqrt(np.maximum(spread, 1e-300) / safe)
+    p = np.where(seen, 2.0 * student.sf(np.abs(slope) / deviation, freedom), 1.0)
+    return Regression(slope, np.where(seen, deviation, np.inf), p, freedom)
+
+
+def weights(values: Vector, deviations: Vector) -> Vector:
+    """Inverse variances of a series whose numbers have deviations of their own, and scatter.
+
+    The scatter comes from differences of successive numbers: a step is in one of them.
+    """
+    good = np.isfinite(values) & np.isfinite(deviations)
+    if good.sum() < 3:
+        return np.ones_like(values)
+    steps = np.diff(values[good])
+    own = float(np.mean(deviations[good] ** 2))
+    scatter = max(0.5 * float(np.mean(steps**2)) - own, 0.0)
+    total = np.where(good, deviations, 1.0) ** 2 + scatter
+    return np.asarray(1.0 / np.maximum(total, 1e-300))

@@ -1,0 +1,259 @@
+"""What monitoring found, as a typed object, as JSON, and in a notebook."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from .changes import Change, Found
+from .patterns import Direction, Patterns
+from .series import Series
+
+Vector = NDArray[np.float64]
+VERDICTS = {
+    "nothing_changed": "Nothing has changed",
+    "changed": "Something has changed",
+    "unexplained": "Something has changed, and no name fits",
+}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One quantity by log.
+
+    Attributes:
+        name, unit, text: of it.
+        values, deviations: by log; NaN where it was not seen.
+        centre: mean of the first logs.
+        low, high: control limits.
+        outside: indices of logs beyond them.
+    """
+
+    name: str
+    unit: str
+    text: str
+    values: Vector
+    deviations: Vector
+    centre: float
+    low: float
+    high: float
+    outside: tuple[int, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "unit": self.unit, "values": _numbers(self.values),
+            "deviations": _numbers(self.deviations), "centre": _number(self.centre),
+            "limits": [_number(self.low), _number(self.high)], "outside": list(self.outside),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Monitored:
+    """What a series of logs says.
+
+    Attributes:
+        series: the logs.
+        patterns: what everything would do.
+        found: changes and what they rest on.
+        baseline: number of first logs that limits are taken from.
+        rate: stated probability of any alarm if nothing changes.
+        warnings: about data and assumptions.
+        wall: time that it took [s].
+    """
+
+    series: Series
+    patterns: Patterns
+    found: Found
+    baseline: int
+    rate: float
+    warnings: list[str]
+    wall: float
+
+    @property
+    def changes(self) -> list[Change]:
+        """By date."""
+        return self.found.changes
+
+    @property
+    def verdict(self) -> str:
+        """One of `VERDICTS`."""
+        if not self.changes:
+            return "nothing_changed"
+        if any(c.direction is None or not c.fits for c in self.changes):
+            return "unexplained"
+        return "changed"
+
+    def dated(self, index: int) -> str:
+        """Date of a log, with its time if it has one."""
+        when = self.series.logs[index].date
+        plain = all(log.date.hour == log.date.minute == 0 for log in self.series.logs)
+        return f"{when:%Y-%m-%d}" if plain else f"{when:%Y-%m-%dT%H:%M}"
+
+    # -- charts ------------------------------------------------------------------------------------
+
+    def charts(self) -> list[Chart]:
+        """Declared parameters, effects that changed, and what is left of each channel."""
+        return [*self.parameter_charts(), *self.effect_charts(), *self.channel_charts()]
+
+    def parameter_charts(self) -> list[Chart]:
+        """Of declared parameters."""
+        theta = self.patterns.theta
+        return [
+            self._chart(d, float(theta[self.patterns.problem.index(d.name)]))
+            for d in self.patterns.directions[: self.patterns.declared]
+        ]
+
+    def effect_charts(self) -> list[Chart]:
+        """Of effects that were named, against the first logs."""
+        named = {
+            c.direction.name: c.direction
+            for c in self.changes if c.direction is not None and not c.direction.declared
+        }  # fmt: skip
+        return [self._chart(d, 0.0) for d in named.values()]
+
+    def _chart(self, direction: Direction, origin: float) -> Chart:
+        values, deviations = self.found.own
+        column = direction.columns[0]
+        return self._limited(
+            direction.name, direction.unit, direction.text,
+            origin + direction.scale * values[:, column], direction.scale * deviations[:, column],
+        )  # fmt: skip
+
+    def channel_charts(self) -> list[Chart]:
+        """RMS of what is left over the noise, by channel."""
+        return [
+            self._limited(
+                f"left of {channel.name}", "1",
+                "what the model with each log's own parameters leaves, over the noise",
+                np.sqrt(self.found.left[:, place]), np.zeros(len(self.series.logs)),
+            )
+            for place, channel in enumerate(self.series.problem.channels)
+        ]  # fmt: skip
+
+    def _limited(
+        self, name: str, unit: str, text: str, values: Vector, deviations: Vector
+    ) -> Chart:
+        """With limits that all points of all charts together exceed at the stated rate."""
+        first = values[: self.baseline]
+        first = first[np.isfinite(first)]
+        if first.size < 2:
+            return Chart(name, unit, text, values, deviations, math.nan, math.nan, math.nan, ())
+        centre, spread = float(first.mean()), float(first.std(ddof=1))
+        charts = self.patterns.declared + len(self.series.problem.channels)
+        points = max(charts * (len(self.series.logs) - self.baseline), 1)
+        factor = float(student.isf(0.5 * self.rate / points, first.size - 1))
+        half = factor * spread * math.sqrt(1.0 + 1.0 / first.size)
+        low, high = centre - half, centre + half
+        outside = tuple(
+            int(k) for k in np.flatnonzero((values < low) | (values > high)) if k >= self.baseline
+        )
+        return Chart(name, unit, text, values, deviations, centre, low, high, outside)
+
+    # -- as a table --------------------------------------------------------------------------------
+
+    def entry(self, change: Change) -> dict[str, Any]:
+        """A change for JSON."""
+        first, direction = change.profile.first, change.direction
+        shared = {
+            "kind": change.profile.kind,
+            "first_log": self.series.logs[first].name,
+            "since": self.dated(first),
+            "last_before": self.dated(first - 1) if first else None,
+            "between": [self.dated(max(change.low - 1, 0)), self.dated(change.high)],
+            "p": change.p,
+            "gain_nats": change.gain,
+        }  # fmt: skip
+        if direction is None:
+            most = float(np.max(np.abs(change.profile.values)))
+            return {
+                "what": "unexplained", "place": change.channel, "quantity": "rms of what is left",
+                "unit": "1", "factor": math.exp(0.5 * change.amounts[0] * most),
+                "text": "what is left of the channel is other than before", "named": False,
+                "cannot_tell_from": [], **shared,
+            }  # fmt: skip
+        size = float(np.linalg.norm(change.amounts)) if change.amounts.size > 1 else float(
+            change.amounts[0]
+        )  # fmt: skip
+        spread = float(np.max(change.deviations))
+        whole = float(np.max(np.abs(change.profile.values)))
+        amount = direction.scale * size * whole
+        half = 1.96 * direction.scale * spread * whole
+        found: dict[str, Any] = {
+            "what": direction.name, "place": direction.place, "quantity": direction.quantity,
+            "unit": direction.unit, "text": direction.text, "declared": direction.declared,
+            "named": change.fits, "change": amount, "ci95": [amount - half, amount + half],
+            "per_day": direction.scale * size if change.profile.kind == "creep" else None,
+            "cannot_tell_from": list(change.rivals), "same": list(direction.same), **shared,
+        }  # fmt: skip
+        if direction.declared:
+            chart = next(c for c in self.parameter_charts() if c.name == direction.name)
+            found["before"] = chart.centre
+        return found
+
+    def sentence(self, change: Change) -> str:
+        """A change in words."""
+        entry = self.entry(change)
+        unit = "" if entry["unit"] in ("", "1", "-") else f" {entry['unit']}"
+        when = f"since {entry['since']}"
+        if entry["last_before"]:
+            when += f" (95 %: between {entry['between'][0]} and {entry['between'][1]})"
+        if change.profile.kind == "outlier":
+            when = f"in the log of {entry['since']} only"
+        if change.direction is None:
+            return f"unexplained: {entry['factor']:.2f} times as much is left of {change.channel} {when}"
+        low, high = entry["ci95"]
+        size = f"{entry['change']:+.4g}{unit} [{low:+.4g}, {high:+.4g}]"
+        name = entry["what"] if entry["declared"] else f"{entry['what']} ({entry['quantity']})"
+        verb = {"step": "jumps by", "creep": "creeps by", "outlier": "differs by"}
+        text = f"{name} {verb[change.profile.kind]} {size} {when}"
+        if change.profile.kind == "creep":
+            text += f", {30.0 * entry['per_day']:+.3g}{unit} in 30 days"
+        if not change.fits:
+            text = f"unexplained {when}; nearest: {text}, which leaves too much"
+        if change.rivals:
+            text += f"; cannot be told from {', '.join(change.rivals[:4])}"
+            if len(change.rivals) > 4:
+                text += f" and {len(change.rivals) - 4} more"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        problem = self.series.problem
+        return {
+            "dataset": self.series.name,
+            "system": problem.file.name,
+            "verdict": self.verdict,
+            "changes": [self.entry(change) for change in self.changes],
+            "dated_by": self.series.dated,
+            "logs": [
+                {"name": log.name, "date": self.dated(k), "runs": list(log.runs)}
+                for k, log in enumerate(self.series.logs)
+            ],
+            "excitations": len(self.patterns.problem.runs),
+            "baseline": self.baseline,
+            "false_alarm_rate": self.rate,
+            "tests": self.found.tests,
+            "parameters": {c.name: c.to_dict() for c in self.parameter_charts()},
+            "effects": {c.name: c.to_dict() for c in self.effect_charts()},
+            "channels": {
+                channel.name: chart.to_dict()
+                for channel, chart in zip(problem.channels, self.channel_charts(), strict=True)
+            },
+            "warnings": list(self.warnings),
+            "evaluations": self.patterns.evaluations,
+            "wall_s": self.wall,
+        }  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _numbers(values: Vector) -> list[float | None]:
+    return [_number(value) for value in values.tolist()]
