@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..diagnose.linear import MATERIAL
 from ..diagnose.models import GATE
 from .evidence import Evidence, Moments
-from .patterns import Direction, Patterns
+from .patterns import Direction
 from .profiles import Profile, constants, profiles, regress, weights
 
 Vector = NDArray[np.float64]
@@ -171,11 +171,17 @@ class Detector:
     def best(
         self, changes: Sequence[Change], root: Vector, usable: NDArray[np.bool_] | None = None
     ) -> Change | None:
-        """The change that explains most of what the others leave."""
+        """The change that explains most of what the others leave.
+
+        Args:
+            changes: the others.
+            root: of the scatter between logs.
+            usable: profiles, all if not given; it is then a further change, and not a small one.
+        """
         moments = self._without(changes)
         gains, z, weight = self.gains(moments, root)
         taken = {(c.direction.name, c.profile.kind) for c in changes if c.direction}
-        best: tuple[float, int, int] | None = None
+        best: list[tuple[float, int, int]] = []
         for index, gain in gains.items():
             direction = self.patterns.directions[index]
             allowed = np.array(
@@ -184,19 +190,34 @@ class Detector:
             )  # fmt: skip
             if usable is not None:
                 allowed &= usable
-            if not allowed.any():
-                continue
-            place = int(np.argmax(np.where(allowed, gain, -np.inf)))
-            if best is None or gain[place] > best[0]:
-                best = float(gain[place]), index, place
-        if best is None:
+            if allowed.any():
+                place = int(np.argmax(np.where(allowed, gain, -np.inf)))
+                best.append((float(gain[place]), index, place))
+        if not best:
             return None
-        gain_, index, place = best
-        return self._change(gains, z, weight, index, place, gain_)
+        best.sort(reverse=True)
+        if usable is not None:
+            least = SHARE**2 * max((self._explained(c).sum() for c in changes), default=0.0)
+            while best and self._explained(
+                self._change(gains, z, weight, *best[0])
+            ).sum() < least:
+                best.pop(0)
+            if not best:
+                return None
+        first = self._change(gains, z, weight, *best[0])
+        names = {name: k for k, name in enumerate(d.name for d in self.patterns.directions)}
+        alike = {best[0][1], *(names[name] for name in first.rivals)}
+        simplest = min(
+            (entry for entry in best if entry[1] in alike),
+            key=lambda entry: (self.patterns.directions[entry[1]].complexity, -entry[0]),
+        )
+        if simplest[1] == best[0][1]:
+            return first
+        return self._change(gains, z, weight, *simplest)
 
     def _change(
-        self, gains: dict[int, Vector], z: Vector, weight: Vector, index: int, place: int,
-        gain: float,
+        self, gains: dict[int, Vector], z: Vector, weight: Vector, gain: float, index: int,
+        place: int,
     ) -> Change:  # fmt: skip
         """A direction and a profile as a change, with intervals and rivals."""
         direction, shape = self.patterns.directions[index], self.shapes[place]
@@ -219,7 +240,7 @@ class Detector:
         ]  # fmt: skip
         rivals = []
         for other, values in gains.items():
-            if other == index:
+            if other == index or self.patterns.directions[other].contains(direction):
                 continue
             k = int(np.argmax(values))
             if float(values[k]) > gain - GATE * spread or self._alike(
@@ -322,8 +343,6 @@ class Detector:
             change = self.best(changes, root, usable)
             if change is None or change.gain < GATE * change.spread:
                 break
-            if change.gain < SHARE**2 * max((c.gain for c in changes), default=0.0):
-                break
             change = replace(change, p=min(least * self.tests, 1.0))
             changes = self.refitted([*changes, change], root)
             changes = self.sharpened(changes, root)
@@ -332,7 +351,7 @@ class Detector:
         root = self._without(changes).scatter()
         fitted = self._without(changes).own()[0][:, : self.patterns.declared]
         left = self.evidence.left(columns, amounts, fitted)
-        unexplained = self._unexplained(left)
+        unexplained = self._unexplained(left, changes)
         changes = [self._judged(change, unexplained) for change in changes]
         changes += unexplained
         changes.sort(key=lambda c: (c.profile.first, -c.gain))
@@ -341,9 +360,21 @@ class Detector:
             changes, self.tests, self.limit, root, first, plain, self._correlated(changes)
         )
 
-    def _unexplained(self, left: Vector) -> list[Change]:
-        """Channels of which other than before is left."""
+    def _explained(self, change: Change) -> Vector:
+        """Mean square over the noise that a change adds to each channel at its largest."""
+        assert change.direction is not None
+        count = self.evidence.channels
+        full = change.amounts * float(np.max(np.abs(change.profile.values)))
+        found = np.zeros(count)
+        for values in self.patterns.values.values():
+            pattern = values[:, list(change.direction.columns)] @ full
+            found = np.maximum(found, np.mean(pattern.reshape(-1, count) ** 2, axis=0))
+        return found
+
+    def _unexplained(self, left: Vector, changes: Sequence[Change]) -> list[Change]:
+        """Channels of which other than before is left, by more than patterns are wrong by."""
         found = []
+        explained = sum((self._explained(c) for c in changes), np.zeros(self.evidence.channels))
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.log(left)
         for place, channel in enumerate(self.evidence.series.problem.channels):
@@ -352,7 +383,8 @@ class Detector:
             best = int(np.argmin(result.p))
             shape = self.shapes[best]
             whole = float(result.slope[best] * np.max(np.abs(shape.values)))
-            if not result.p[best] < self.limit or abs(math.expm1(whole)) < MATERIAL**2:
+            least = max(MATERIAL**2, SHARE**2 * float(explained[place]))
+            if not result.p[best] < self.limit or abs(math.expm1(whole)) < least:
                 continue
             gains = 0.5 * (result.slope / result.deviation) ** 2
             near = [
@@ -374,18 +406,10 @@ class Detector:
         together = [c for c in unexplained if c.low <= change.high and change.low <= c.high]
         if not together:
             return change
-        names = [c.name for c in self.evidence.series.problem.channels]
-        full = change.amounts * float(np.max(np.abs(change.profile.values)))
-        explained = np.zeros(len(names))
-        for values in self.patterns.values.values():
-            pattern = values[:, list(change.direction.columns)] @ full
-            explained = np.maximum(
-                explained, np.mean(pattern.reshape(-1, len(names)) ** 2, axis=0)
-            )
         missing = sum(
             math.expm1(float(c.amounts[0] * np.max(np.abs(c.profile.values)))) for c in together
         )
-        return replace(change, fits=bool(missing < LEFT * float(explained.sum())))
+        return replace(change, fits=bool(missing < LEFT * float(self._explained(change).sum())))
 
     def _correlated(self, changes: Sequence[Change]) -> dict[str, float]:
         """Declared parameters whose successive logs are more alike than chance makes them."""
@@ -402,11 +426,3 @@ class Detector:
             if correlation > 3.0 / math.sqrt(rest.size):
                 found[direction.name] = correlation
         return found
-
-
-def column_sizes(patterns: Patterns) -> dict[str, float]:
-    """Direction -> largest norm of its patterns."""
-    return {
-        d.name: max(float(np.linalg.norm(v[:, d.columns[0]])) for v in patterns.values.values())
-        for d in patterns.directions
-    }

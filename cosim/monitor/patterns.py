@@ -2,7 +2,9 @@
 
 Logs with the same inputs, sample times and start values have the same derivatives, so each
 excitation is simulated once, around the parameters of the first logs. Effects are taken at a
-strength that shows, but little: a channel of a run by about the noise.
+strength that shows, but little: a channel of a run by about the noise. What a sensor may be off by
+after it was replaced (zero, scale, latency) needs no simulation; it is there for each channel, and
+once more for all channels that are read at one instance.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +29,18 @@ from ..errors import CosimError
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
-VISIBLE, TRIALS = 2.0, 3
+Kind = Literal["parameter", "channel", "effect"]
+VISIBLE, TRIALS = 2.0, 6
 """Largest RMS over the noise, in a channel of a run, that a trial of an effect may have before a
 weaker one is tried; and trials at most."""
+NOTHING = 1e-6
+"""The same below which an effect changes nothing: integration rounds to less."""
+SENSORS = {
+    "offset": "The reading has another zero.",
+    "scale": "The reading has another scale.",
+    "count scale": "The reading counts another share of the way since the run's start.",
+    "latency": "The reading is late; negative: earlier than before.",
+}
 SAME = 1e-6
 """Patterns whose cosine differs from 1 by less are one: that of two simulations of the same."""
 
@@ -39,34 +50,47 @@ class Direction:
     """Something that may change.
 
     Attributes:
-        name: parameter, or `effect at place`.
+        name: parameter, `offset of channel`, or `effect at place`.
+        kind: which of these.
         quantity: name of the parameter or of the effect's strength.
         unit: of it.
         scale: typical change of it.
         text: one line about it.
         columns: of the patterns; two for an effect with an unknown phase.
-        probe: the effect in its system, None for a declared parameter.
+        place: instance and port; "" of a parameter.
+        probe: the effect in its system, None for others.
+        read: indices of the channels that it concerns, of a channel's.
         same: what does the same.
     """
 
     name: str
+    kind: Kind
     quantity: str
     unit: str
     scale: float
     text: str
     columns: tuple[int, ...]
+    place: str = ""
     probe: Probe | None = None
+    read: tuple[int, ...] = ()
     same: tuple[str, ...] = ()
 
     @property
     def declared(self) -> bool:
         """Whether it is a parameter of the declared system."""
-        return self.probe is None
+        return self.kind == "parameter"
 
     @property
-    def place(self) -> str:
-        """Of an effect, "" of a parameter."""
-        return "" if self.probe is None else self.probe.candidate.place
+    def complexity(self) -> tuple[int, int, int]:
+        """Smaller for what is simpler: what is declared, then fewer values that may differ."""
+        others = 0 if self.probe is None else len(self.probe.others)
+        return len(self.columns), int(self.kind != "parameter"), others
+
+    def contains(self, other: Direction) -> bool:
+        """Whether its law becomes that of another direction for some values of its parameters."""
+        if self.probe is None or other.probe is None or self.place != other.place:
+            return False
+        return other.probe.candidate.effect in self.probe.candidate.contains
 
 
 @dataclass
@@ -112,7 +136,14 @@ class Patterns:
         if size == 0.0:
             return False
         try:
-            if direction.probe is None:
+            if direction.kind == "channel":
+                size = float(amplitude[0])
+                changed = {
+                    run.name: self.model[run.name]
+                    + self._read(run, direction.quantity, direction.read, size * direction.scale)
+                    for run in self.problem.runs
+                }
+            elif direction.probe is None:
                 theta = self.theta.copy()
                 place = self.problem.index(direction.name)
                 theta[place] = np.clip(
@@ -136,6 +167,59 @@ class Patterns:
         for name, values in changed.items():
             self.values[name][:, column] = (values - self.model[name]).ravel() / size
         return True
+
+    def _read(
+        self, run: MeasuredRun, quantity: str, channels: Sequence[int], amount: float
+    ) -> Vector:
+        """What a sensor's error adds to model values over sigma."""
+        model = self.model[run.name]
+        change = np.zeros_like(model)
+        for place in channels:
+            channel = self.problem.channels[place]
+            if quantity == "offset":
+                change[:, place] = amount / channel.sigma
+            elif quantity == "scale":
+                change[:, place] = amount * (model[:, place] - channel.offset / channel.sigma)
+            elif quantity == "count scale":
+                change[:, place] = amount * (model[:, place] - model[0, place])
+            else:
+                late = np.interp(run.times - amount, run.times, model[:, place])
+                change[:, place] = late - model[:, place]
+        return change
+
+    def sensors(self) -> list[tuple[Direction, dict[str, Vector]]]:
+        """What sensors may be off by, and what that does; columns are not given yet."""
+        channels = self.problem.channels
+        at: dict[str, list[int]] = {}
+        for place, channel in enumerate(channels):
+            at.setdefault(channel.signal.partition(".")[0], []).append(place)
+        size = float(np.median(np.diff(self.problem.runs[0].times)))
+        asked = [
+            (what, f"{what} of {channels[k].name}", channels[k].signal, (k,))
+            for k in range(len(channels)) for what in SENSORS
+        ]
+        asked += [
+            (what, f"{what} of all channels at {instance}", instance, tuple(places))
+            for instance, places in at.items() if len(places) > 1
+            for what in SENSORS if what != "offset"
+        ]  # fmt: skip
+        found = []
+        for what, name, place, read in asked:
+            channel = channels[read[0]]
+            unit, scale = {
+                "offset": (channel.unit, channel.sigma), "latency": ("s", size)
+            }.get(what, ("1", 1e-3))  # fmt: skip
+            text = SENSORS[what]
+            rows = {r.name: self._read(r, what, read, scale) for r in self.problem.runs}
+            plain = {r.name: self._read(r, "scale", read, scale) for r in self.problem.runs}
+            if what == "count scale" and all(
+                np.max(np.abs(rows[n] - plain[n])) <= NOTHING for n in rows
+            ):
+                continue  # runs that begin at 0
+            if max(float(np.max(np.abs(v))) for v in rows.values()) > NOTHING:
+                entry = Direction(name, "channel", what, unit, scale, text, (), place, read=read)
+                found.append((entry, rows))
+        return found
 
     def _values(self, simulator: Simulator, theta: Vector) -> dict[str, Vector]:
         """Model values over sigma."""
@@ -253,10 +337,15 @@ def patterns(
     for i in common:
         p = whole.parameters[i]
         found.directions.append(
-            Direction(p.name, p.name, p.unit, float(whole.scale[i]), p.text, (len(found.directions),))
+            Direction(p.name, "parameter", p.name, p.unit, float(whole.scale[i]), p.text,
+                      (len(found.directions),))
         )  # fmt: skip
     found.declared = len(common)
     names = list(found.model)
+    for direction, change in found.sensors():
+        found.directions.append(replace(direction, columns=(len(columns[names[0]]),)))
+        for name in names:
+            columns[name].append(change[name].ravel())
     _effects(found, columns, names, candidates, say)
     found.values = {name: np.column_stack(columns[name]) for name in names}
     return found
@@ -276,42 +365,54 @@ def _effects(
         whole = np.concatenate(parts)
         return np.asarray(whole / max(float(np.linalg.norm(whole)), 1e-300))
 
-    for place in range(found.declared):
-        known.append((flat([columns[n][place] for n in names]), place))
+    for place, direction in enumerate(found.directions):
+        known.append((flat([columns[n][direction.columns[0]] for n in names]), place))
     groups = batches(candidates, found.problem)
-    count = 0
-    for batch in groups:
+    for count, batch in enumerate(groups, 1):
         probes = batch.probes(found.problem)
         for probe in probes:
-            parts = _measured(found, probe)
-            if parts is None:
+            measured = _measured(found, probe)
+            if measured is None:
                 continue
-            rows, strength = parts
-            unit_ = flat([rows[n][0] for n in names])
-            twin = next(
-                (k for v, k in known if abs(float(v @ unit_)) > 1.0 - SAME), None
-            ) if len(next(iter(rows.values()))) == 1 else None  # fmt: skip
-            if twin is not None:
-                other = found.directions[twin]
-                same = (*other.same, probe.candidate.label)
-                found.directions[twin] = replace(other, same=same)
-                continue
-            first = len(columns[names[0]])
-            width = len(rows[names[0]])
+            rows, strength = measured
+            first, width = len(columns[names[0]]), len(rows[names[0]])
+            candidate = probe.candidate
+            entry = Direction(
+                candidate.label, "effect", probe.strength.name.removeprefix(candidate.prefix),
+                probe.strength.unit, strength, candidate.text, tuple(range(first, first + width)),
+                candidate.place, probe,
+            )  # fmt: skip
+            if width == 1:
+                shape = flat([rows[n][0] for n in names])
+                twin = next((k for v, k in known if abs(float(v @ shape)) > 1.0 - SAME), None)
+                if twin is not None:
+                    _joined(found, columns, twin, entry, rows)
+                    continue
+                known.append((shape, len(found.directions)))
             for name in names:
                 columns[name] += rows[name]
-            quantity = probe.strength.name.removeprefix(probe.candidate.prefix)
-            known.append((unit_, len(found.directions)))
-            found.directions.append(
-                Direction(
-                    probe.candidate.label, quantity, probe.strength.unit, strength,
-                    probe.candidate.text, tuple(range(first, first + width)), probe,
-                )
-            )  # fmt: skip
+            found.directions.append(entry)
         for problem in {id(p.problem): p.problem for p in probes}.values():
             found.simulator.of(problem).close()
-        count += 1
         say(f"effects of the catalogue: {count} of {len(groups)} groups simulated")
+
+
+def _joined(
+    found: Patterns,
+    columns: dict[str, list[Vector]],
+    twin: int,
+    entry: Direction,
+    rows: Mapping[str, Sequence[Vector]],
+) -> None:
+    """Keep the simpler one of two that do the same."""
+    other = found.directions[twin]
+    if entry.complexity < other.complexity:
+        for name, values in rows.items():
+            columns[name][other.columns[0]] = values[0]
+        same = (*other.same, other.name)
+        found.directions[twin] = replace(entry, columns=other.columns, same=same)
+    else:
+        found.directions[twin] = replace(other, same=(*other.same, entry.name))
 
 
 def _measured(
@@ -337,7 +438,7 @@ def _measured(
         size = max(
             float(np.sqrt(np.max(np.mean(v**2, axis=0)))) for part in changes for v in part.values()
         )
-        if size == 0.0:
+        if size < NOTHING:
             value = float(min(10.0 * value, probe.strength.maximum))  # a limit that does not bind
             continue
         rows = {name: [part[name].ravel() for part in changes] for name in changes[0]}

@@ -186,7 +186,7 @@ class Monitored:
         half = 1.96 * direction.scale * spread * whole
         found: dict[str, Any] = {
             "what": direction.name, "place": direction.place, "quantity": direction.quantity,
-            "unit": direction.unit, "text": direction.text, "declared": direction.declared,
+            "unit": direction.unit, "text": direction.text, "source": direction.kind,
             "named": change.fits, "change": amount, "ci95": [amount - half, amount + half],
             "per_day": direction.scale * size if change.profile.kind == "creep" else None,
             "cannot_tell_from": list(change.rivals), "same": list(direction.same), **shared,
@@ -209,7 +209,9 @@ class Monitored:
             return f"unexplained: {entry['factor']:.2f} times as much is left of {change.channel} {when}"
         low, high = entry["ci95"]
         size = f"{entry['change']:+.4g}{unit} [{low:+.4g}, {high:+.4g}]"
-        name = entry["what"] if entry["declared"] else f"{entry['what']} ({entry['quantity']})"
+        name = entry["what"]
+        if change.direction.kind == "effect":
+            name += f" ({entry['quantity']})"
         verb = {"step": "jumps by", "creep": "creeps by", "outlier": "differs by"}
         text = f"{name} {verb[change.profile.kind]} {size} {when}"
         if change.profile.kind == "creep":
