@@ -14,7 +14,7 @@ MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
     "errors", "reading", "arguments", "files", "display", "spec", "data", "fmu", "drawing",
     "system", "master", "installation", "scenario", "ssp", "view", "running", "robots", "control",
-    "study", "calibrate", "diagnose", "intake", "live", "report", "cli", "__main__",
+    "study", "calibrate", "diagnose", "intake", "live", "monitor", "report", "cli", "__main__",
 )  # fmt: skip
 """Of `cosim`, from the bottom up: each may import those before it."""
 FORBIDDEN = {"sources", "cosim_library", "casadi", "pythonfmu", "ziglang", "scenarios", "tests"}

@@ -34,6 +34,7 @@ from .export import draw_command, export_command
 from .fmus import fmus_app
 from .guard import applies, guarded
 from .linearize import linearize_command
+from .monitor import monitor_command
 from .new import new_app
 from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
@@ -61,6 +62,7 @@ app.add_typer(new_app, name="new")
 app.command("scenarios")(scenarios_command)
 app.command("calibrate")(calibrate_command)
 app.command("diagnose")(diagnose_command)
+app.command("monitor")(monitor_command)
 app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)

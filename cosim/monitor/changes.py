@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from ..diagnose.linear import MATERIAL
 from ..diagnose.models import GATE
@@ -31,6 +32,9 @@ PASSES = 4
 """Times that names and dates of all changes are weighed anew at most."""
 DATES = 1.92
 """Fall of the log likelihood at the ends of a 95 % interval [nats]."""
+CURVED = 0.25
+"""Of a bend over its whole size, what a creep misses in the middle, where its pattern is taken at
+the end: a parabola's distance from its chord."""
 LEFT = 0.1
 """Share of the energy that a name explains which may begin to be missing at the same date; beyond,
 the name does not fit."""
@@ -53,6 +57,8 @@ class Change:
         p: chance under no change, corrected for all that was asked.
         fits: whether the name explains what changed.
         spread: variance over that of the model of scatter.
+        size, half: of the change at its largest, in scales, and half its 95 % interval, from
+            numbers per log whose scatter needs no model; None where calibration absorbs it.
     """
 
     direction: Direction | None
@@ -67,6 +73,13 @@ class Change:
     p: float = 0.0
     fits: bool = True
     spread: float = 1.0
+    size: float | None = None
+    half: float = 0.0
+
+    @property
+    def full(self) -> float:
+        """Largest value of its profile."""
+        return float(np.max(np.abs(self.profile.values)))
 
 
 @dataclass
@@ -248,9 +261,14 @@ class Detector:
             ):
                 rivals.append((float(values[k]), self.patterns.directions[other].name))
         rivals.sort(reverse=True)
+        named = {d.name: d for d in self.patterns.directions}
+        names = [
+            name for _, name in rivals
+            if not any(named[name].contains(named[other]) for _, other in rivals)
+        ]  # fmt: skip
         return Change(
             direction, shape, amounts, np.sqrt(np.diag(inverse) * spread), gain,
-            min(near), max(near), tuple(name for _, name in rivals), spread=spread,
+            min(near), max(near), tuple(names), spread=spread,
         )  # fmt: skip
 
     def _alike(
@@ -324,7 +342,7 @@ class Detector:
         renewed = False
         for change in changes:
             assert change.direction is not None
-            full = change.amounts * float(np.max(np.abs(change.profile.values)))
+            full = change.amounts * change.full
             renewed |= self.patterns.secant(change.direction, full)
         if renewed:
             self.moments = self.evidence.moments()
@@ -352,7 +370,9 @@ class Detector:
         fitted = self._without(changes).own()[0][:, : self.patterns.declared]
         left = self.evidence.left(columns, amounts, fitted)
         unexplained = self._unexplained(left, changes)
-        changes = [self._judged(change, unexplained) for change in changes]
+        changes = [
+            self._judged(self._sized(change, changes), unexplained) for change in changes
+        ]  # fmt: skip
         changes += unexplained
         changes.sort(key=lambda c: (c.profile.first, -c.gain))
         plain = self.evidence.left([], np.zeros((0, len(self.days))), first[0][:, : self.patterns.declared])
@@ -364,7 +384,7 @@ class Detector:
         """Mean square over the noise that a change adds to each channel at its largest."""
         assert change.direction is not None
         count = self.evidence.channels
-        full = change.amounts * float(np.max(np.abs(change.profile.values)))
+        full = change.amounts * change.full
         found = np.zeros(count)
         for values in self.patterns.values.values():
             pattern = values[:, list(change.direction.columns)] @ full
@@ -400,6 +420,27 @@ class Detector:
             )  # fmt: skip
         return found
 
+    def _sized(self, change: Change, changes: Sequence[Change]) -> Change:
+        """With its size from numbers per log, the other changes taken off."""
+        assert change.direction is not None
+        if len(change.direction.columns) > 1:
+            return change
+        column = change.direction.columns[0]
+        others = [c for c in changes if c is not change]
+        values, deviations = (v[:, column] for v in self._without(others).own())
+        if np.isfinite(values).sum() < 4:
+            return change
+        known = np.column_stack([self.known, *(c.profile.values for c in others)])
+        shape = change.profile.values[None, :]
+        result = regress(values, weights(values, deviations), known, shape)
+        if result.freedom < 1:
+            return change
+        size = float(result.slope[0]) * change.full
+        half = float(student.ppf(0.975, result.freedom) * result.deviation[0]) * change.full
+        if change.profile.kind == "creep":
+            half += CURVED * self.patterns.bent.get(column, 0.0) * abs(size)
+        return replace(change, size=size, half=half)
+
     def _judged(self, change: Change, unexplained: Sequence[Change]) -> Change:
         """Whether the name explains what changed: no more than a little of it is left."""
         assert change.direction is not None
@@ -407,7 +448,7 @@ class Detector:
         if not together:
             return change
         missing = sum(
-            math.expm1(float(c.amounts[0] * np.max(np.abs(c.profile.values)))) for c in together
+            math.expm1(float(c.amounts[0] * c.full)) for c in together
         )
         return replace(change, fits=bool(missing < LEFT * float(self._explained(change).sum())))
 

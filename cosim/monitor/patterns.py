@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -107,6 +107,8 @@ class Patterns:
         own: by excitation, the same of parameters that concern one run only.
         keys: run of the series -> excitation.
         evaluations: simulated runs.
+        bent: by column, how far its pattern at the full size of a change is from that of a small
+            one, over its size.
     """
 
     problem: Problem
@@ -119,6 +121,7 @@ class Patterns:
     keys: dict[str, str]
     simulator: Simulator
     evaluations: int = 0
+    bent: dict[int, float] = field(default_factory=dict)
 
     @property
     def width(self) -> int:
@@ -164,8 +167,13 @@ class Patterns:
         except CosimError:
             return False  # first orders will do
         column = direction.columns[0]
+        moved, whole = 0.0, 0.0
         for name, values in changed.items():
-            self.values[name][:, column] = (values - self.model[name]).ravel() / size
+            secant = (values - self.model[name]).ravel() / size
+            moved += float(np.sum((secant - self.values[name][:, column]) ** 2))
+            whole += float(np.sum(secant**2))
+            self.values[name][:, column] = secant
+        self.bent.setdefault(column, float(np.sqrt(moved / max(whole, 1e-300))))
         return True
 
     def _read(

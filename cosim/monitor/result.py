@@ -170,25 +170,23 @@ class Monitored:
             "gain_nats": change.gain,
         }  # fmt: skip
         if direction is None:
-            most = float(np.max(np.abs(change.profile.values)))
             return {
                 "what": "unexplained", "place": change.channel, "quantity": "rms of what is left",
-                "unit": "1", "factor": math.exp(0.5 * change.amounts[0] * most),
+                "unit": "1", "factor": math.exp(0.5 * change.amounts[0] * change.full),
                 "text": "what is left of the channel is other than before", "named": False,
                 "cannot_tell_from": [], **shared,
             }  # fmt: skip
-        size = float(np.linalg.norm(change.amounts)) if change.amounts.size > 1 else float(
-            change.amounts[0]
-        )  # fmt: skip
-        spread = float(np.max(change.deviations))
-        whole = float(np.max(np.abs(change.profile.values)))
-        amount = direction.scale * size * whole
-        half = 1.96 * direction.scale * spread * whole
+        if change.size is not None:
+            size, half = direction.scale * change.size, direction.scale * change.half
+        else:  # a phase that is not known, or what calibration absorbs
+            norm = float(np.linalg.norm(change.amounts))
+            size = direction.scale * change.full * math.copysign(norm, change.amounts[0])
+            half = 1.96 * direction.scale * change.full * float(np.max(change.deviations))
         found: dict[str, Any] = {
             "what": direction.name, "place": direction.place, "quantity": direction.quantity,
             "unit": direction.unit, "text": direction.text, "source": direction.kind,
-            "named": change.fits, "change": amount, "ci95": [amount - half, amount + half],
-            "per_day": direction.scale * size if change.profile.kind == "creep" else None,
+            "named": change.fits, "change": size, "ci95": [size - half, size + half],
+            "per_day": size / change.full if change.profile.kind == "creep" else None,
             "cannot_tell_from": list(change.rivals), "same": list(direction.same), **shared,
         }  # fmt: skip
         if direction.declared:
