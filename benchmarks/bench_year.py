@@ -112,7 +112,7 @@ def measured(
 
 
 def write_years(
-    folder: Path, years: Sequence[Year], seed: int, seconds: float = 2.0
+    folder: Path, years: Sequence[Year], seed: int, seconds: float = 2.0, noise: int = 0
 ) -> list[tuple[Path, list[datetime.date]]]:
     """One data set per year, all of the same bench and check-up; folders and dates.
 
@@ -121,10 +121,11 @@ def write_years(
         years: what happens in each.
         seed: of the bench, its check-up, temperatures and noise.
         seconds: duration of each run.
+        noise: other temperatures and noise for the same bench.
     """
     plain = draw(np.random.default_rng([seed, 0]))
     runs = drives(seed, seconds, RUNS)
-    random = np.random.default_rng([seed, 1])
+    random = np.random.default_rng([seed, 1, noise])
     when = [dates(year.logs, random) for year in years]
     states = [
         benches(year, days, plain, random) for year, days in zip(years, when, strict=True)

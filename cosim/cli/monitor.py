@@ -100,9 +100,7 @@ def _print(result: Monitored, page: Path) -> None:
         soft_wrap=True, markup=False, highlight=False,
     )  # fmt: skip
     for change in result.changes:
-        console.print(
-            f"  {result.sentence(change)}", soft_wrap=True, markup=False, highlight=False
-        )
+        console.print(f"  {result.sentence(change)}", soft_wrap=True, markup=False, highlight=False)
     table = Table()
     for head in ("quantity", "unit", "first logs", "limits", "last log", "beyond limits"):
         table.add_column(head, no_wrap=True)

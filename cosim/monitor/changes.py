@@ -174,9 +174,12 @@ class Detector:
             u = projected[:, columns]
             block = weight[:, columns][:, :, columns]
             h = np.einsum("an,nij->aij", self.centred**2, block)
-            h = h + 1e-12 * np.eye(len(columns)) * np.maximum(
-                np.trace(h, axis1=1, axis2=2), 1e-300
-            )[:, None, None]
+            h = (
+                h
+                + 1e-12
+                * np.eye(len(columns))
+                * np.maximum(np.trace(h, axis1=1, axis2=2), 1e-300)[:, None, None]
+            )
             solved = np.linalg.solve(h, u[:, :, None])[:, :, 0]
             found[index] = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
         return found, z, weight
@@ -211,9 +214,7 @@ class Detector:
         best.sort(reverse=True)
         if usable is not None:
             least = SHARE**2 * max((self._explained(c).sum() for c in changes), default=0.0)
-            while best and self._explained(
-                self._change(gains, z, weight, *best[0])
-            ).sum() < least:
+            while best and self._explained(self._change(gains, z, weight, *best[0])).sum() < least:
                 best.pop(0)
             if not best:
                 return None
@@ -302,9 +303,7 @@ class Detector:
         z, weight = self.moments.weighted(root)
         columns = [c for change in changes for c in change.direction.columns]  # type: ignore[union-attr]
         shapes = self._centred(
-            np.array(
-                [change.profile.values for change in changes for _ in change.amounts]
-            )
+            np.array([change.profile.values for change in changes for _ in change.amounts])
         )
         normal = np.einsum(
             "kn,ln,nkl->kl", shapes, shapes, weight[:, columns][:, :, columns], optimize=True
@@ -375,10 +374,10 @@ class Detector:
         ]  # fmt: skip
         changes += unexplained
         changes.sort(key=lambda c: (c.profile.first, -c.gain))
-        plain = self.evidence.left([], np.zeros((0, len(self.days))), first[0][:, : self.patterns.declared])
-        return Found(
-            changes, self.tests, self.limit, root, first, plain, self._correlated(changes)
+        plain = self.evidence.left(
+            [], np.zeros((0, len(self.days))), first[0][:, : self.patterns.declared]
         )
+        return Found(changes, self.tests, self.limit, root, first, plain, self._correlated(changes))
 
     def _explained(self, change: Change) -> Vector:
         """Mean square over the noise that a change adds to each channel at its largest."""
@@ -447,9 +446,7 @@ class Detector:
         together = [c for c in unexplained if c.low <= change.high and change.low <= c.high]
         if not together:
             return change
-        missing = sum(
-            math.expm1(float(c.amounts[0] * c.full)) for c in together
-        )
+        missing = sum(math.expm1(float(c.amounts[0] * c.full)) for c in together)
         return replace(change, fits=bool(missing < LEFT * float(self._explained(change).sum())))
 
     def _correlated(self, changes: Sequence[Change]) -> dict[str, float]:

@@ -176,9 +176,7 @@ class Evidence:
                 square = rest.reshape(-1, self.channels) ** 2
                 total += square.sum(axis=0)
                 count += (
-                    len(square)
-                    if good is None
-                    else good.reshape(-1, self.channels).sum(axis=0)
+                    len(square) if good is None else good.reshape(-1, self.channels).sum(axis=0)
                 )
             known = count > 0
             found[place, known] = total[known] / count[known]

@@ -120,7 +120,9 @@ def baseline_patterns(
     keys = sorted_out(problem)
     calm = [name for log in series.logs[:baseline] for name in log.runs]
     chosen, fitted = representatives(problem, keys, calm)
-    say(f"{len(series.logs)} logs with {len(chosen.runs)} excitations; fitting the first {baseline}")
+    say(
+        f"{len(series.logs)} logs with {len(chosen.runs)} excitations; fitting the first {baseline}"
+    )
     as_fitted = [replace(run, purpose=PURPOSE) for run in chosen.runs]
     simulator = Simulator(chosen.changed(runs=as_fitted), workers=workers)
     far = fit(

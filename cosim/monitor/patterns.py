@@ -199,12 +199,13 @@ class Patterns:
         """What sensors may be off by, and what that does; columns are not given yet."""
         channels = self.problem.channels
         at: dict[str, list[int]] = {}
-        for place, channel in enumerate(channels):
-            at.setdefault(channel.signal.partition(".")[0], []).append(place)
+        for number, one in enumerate(channels):
+            at.setdefault(one.signal.partition(".")[0], []).append(number)
         size = float(np.median(np.diff(self.problem.runs[0].times)))
-        asked = [
+        asked: list[tuple[str, str, str, tuple[int, ...]]] = [
             (what, f"{what} of {channels[k].name}", channels[k].signal, (k,))
-            for k in range(len(channels)) for what in SENSORS
+            for k in range(len(channels))
+            for what in SENSORS
         ]
         asked += [
             (what, f"{what} of all channels at {instance}", instance, tuple(places))
@@ -276,9 +277,7 @@ def excitation(problem: Problem, run: MeasuredRun) -> str:
 def sorted_out(problem: Problem) -> dict[str, str]:
     """Run -> the first run with the same excitation."""
     first: dict[str, str] = {}
-    return {
-        run.name: first.setdefault(excitation(problem, run), run.name) for run in problem.runs
-    }
+    return {run.name: first.setdefault(excitation(problem, run), run.name) for run in problem.runs}
 
 
 def representatives(

@@ -204,7 +204,8 @@ class Monitored:
         if change.profile.kind == "outlier":
             when = f"in the log of {entry['since']} only"
         if change.direction is None:
-            return f"unexplained: {entry['factor']:.2f} times as much is left of {change.channel} {when}"
+            more = f"{entry['factor']:.2f} times as much is left of {change.channel}"
+            return f"unexplained: {more} {when}"
         low, high = entry["ci95"]
         size = f"{entry['change']:+.4g}{unit} [{low:+.4g}, {high:+.4g}]"
         name = entry["what"]
@@ -221,6 +222,30 @@ class Monitored:
             if len(change.rivals) > 4:
                 text += f" and {len(change.rivals) - 4} more"
         return text
+
+    def _repr_html_(self) -> str:
+        from ..display.control_chart import control_chart
+        from ..display.html import tag
+        from ..display.notebook import view
+
+        dates = [log.date for log in self.series.logs]
+        changes = [(c.profile.first, self.sentence(c)) for c in self.changes]
+        named = {c.direction.name for c in self.changes if c.direction is not None}
+        shown = [c for c in self.charts() if c.name in named or c.outside][:4]
+        return view(
+            VERDICTS[self.verdict],
+            f"{len(dates)} logs of {self.series.name} from {self.dated(0)} to "
+            f"{self.dated(len(dates) - 1)}",
+            tag("ul", *(tag("li", text) for _, text in changes)) if changes else "",
+            *(
+                control_chart(
+                    c.name, dates, c.values, c.deviations, (c.centre, c.low, c.high),
+                    baseline=self.baseline, changes=changes, outside=c.outside,
+                )
+                for c in shown
+            ),
+            *(tag("p", f"mind: {text}") for text in self.warnings),
+        )  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
         """What `--json` prints."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, datetime, timedelta, timezone
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -192,7 +192,9 @@ def _same(first: Problem, other: Problem, place: Path, another: Path) -> None:
 
 def _dated(parts: Sequence[_Part]) -> tuple[tuple[DatedLog, ...], str]:
     """The logs in order of their dates, and where these come from."""
-    runs = [(part, run.name, *part.entries[run.name]) for part in parts for run in part.problem.runs]
+    runs = [
+        (part, run.name, *part.entries[run.name]) for part in parts for run in part.problem.runs
+    ]
     given = [name for _, name, value, _ in runs if value is not None]
     whole = len(parts) > 1
     if given and len(given) < len(runs):
@@ -215,7 +217,7 @@ def _dated(parts: Sequence[_Part]) -> tuple[tuple[DatedLog, ...], str]:
         if len(found) < len(runs):
             dated = SOURCES[2]
             found = {
-                name: datetime.fromtimestamp(file.stat().st_mtime, timezone.utc).replace(
+                name: datetime.fromtimestamp(file.stat().st_mtime, UTC).replace(
                     tzinfo=None, microsecond=0
                 )
                 for _, name, _, file in runs
@@ -244,14 +246,10 @@ def read_date(value: Any, where: str) -> datetime:
                 f"{where}: date {value!r} is no ISO date; write 2025-03-14 or 2025-03-14T09:30"
             ) from None
     if isinstance(value, datetime):
-        if value.tzinfo is not None:
-            value = value.astimezone(timezone.utc).replace(tzinfo=None)
-        return value
+        return value if value.tzinfo is None else value.astimezone(UTC).replace(tzinfo=None)
     if isinstance(value, date):
         return datetime(value.year, value.month, value.day)
-    raise ScenarioError(
-        f"{where}: date {value!r} is no date; write 2025-03-14 or 2025-03-14T09:30"
-    )
+    raise ScenarioError(f"{where}: date {value!r} is no date; write 2025-03-14 or 2025-03-14T09:30")
 
 
 def date_in(name: str) -> datetime | None:
