@@ -65,7 +65,7 @@ def benches(
 ) -> list[Bench]:
     """The bench as it is in each log."""
     found = []
-    last = year.creeps - 2
+    last = min(year.creeps, year.logs) - 2
     whole = (when[-1] - when[last]).days
     for number, day in enumerate(when):
         warmer = WARMER * random.standard_normal()
@@ -111,8 +111,13 @@ def measured(
     }
 
 
+def machine(seed: int, seconds: float = 2.0) -> tuple[Bench, list[Drive]]:
+    """The bench of a seed, and its check-up."""
+    return draw(np.random.default_rng([seed, 0])), drives(seed, seconds, RUNS)
+
+
 def write_years(
-    folder: Path, years: Sequence[Year], seed: int, seconds: float = 2.0, noise: int = 0
+    folder: Path, years: Sequence[Year], seed: int, seconds: float = 2.0
 ) -> list[tuple[Path, list[datetime.date]]]:
     """One data set per year, all of the same bench and check-up; folders and dates.
 
@@ -121,11 +126,9 @@ def write_years(
         years: what happens in each.
         seed: of the bench, its check-up, temperatures and noise.
         seconds: duration of each run.
-        noise: other temperatures and noise for the same bench.
     """
-    plain = draw(np.random.default_rng([seed, 0]))
-    runs = drives(seed, seconds, RUNS)
-    random = np.random.default_rng([seed, 1, noise])
+    plain, runs = machine(seed, seconds)
+    random = np.random.default_rng([seed, 1])
     when = [dates(year.logs, random) for year in years]
     states = [
         benches(year, days, plain, random) for year, days in zip(years, when, strict=True)

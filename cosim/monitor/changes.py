@@ -25,9 +25,9 @@ from .profiles import Profile, constants, profiles, regress, weights
 Vector = NDArray[np.float64]
 MOST = 6
 """Changes that are looked for; with more, the machine is another one."""
-SHARE = 0.05
-"""A further change that is smaller than this share of the largest one is not named: patterns are of
-first order, and of a large change about as much is left."""
+SHARE = 0.1
+"""A further change that is smaller than this share of the largest one is not told from what that
+one leaves: patterns are of first order, and laws have their usual shapes."""
 PASSES = 4
 """Times that names and dates of all changes are weighed anew at most."""
 DATES = 1.92
@@ -91,7 +91,7 @@ class Found:
         tests: how many were made.
         limit: probability below which one alarms.
         root: of the scatter of declared parameters between logs.
-        own: values and deviations of each column by log, changes not taken off.
+        own: values and deviations of each column by log, all changes but its own taken off.
         left: mean square over the noise by log and channel, declared parameters fitted per log.
         alone: declared parameters whose successive logs are alike: name -> correlation.
     """
@@ -351,7 +351,7 @@ class Detector:
     def found(self) -> Found:
         """Look for all changes."""
         changes: list[Change] = []
-        first = self.moments.own()
+        plain = self.moments.own()[0][:, : self.patterns.declared]
         while len(changes) < MOST:
             least, usable = self.alarms(changes)
             if not usable.any():
@@ -374,10 +374,23 @@ class Detector:
         ]  # fmt: skip
         changes += unexplained
         changes.sort(key=lambda c: (c.profile.first, -c.gain))
-        plain = self.evidence.left(
-            [], np.zeros((0, len(self.days))), first[0][:, : self.patterns.declared]
+        named = [c for c in changes if c.direction is not None]
+        before = left
+        if named:
+            before = self.evidence.left([], np.zeros((0, self.days.size)), plain)
+        return Found(
+            changes, self.tests, self.limit, root, self._own(named), before, self._correlated(named)
         )
-        return Found(changes, self.tests, self.limit, root, first, plain, self._correlated(changes))
+
+    def _own(self, changes: Sequence[Change]) -> tuple[Vector, Vector]:
+        """Values and deviations of each column by log, all changes but its own taken off."""
+        values, deviations = self._without(changes).own()
+        for change in changes:
+            assert change.direction is not None
+            others = [c for c in changes if c.direction is not change.direction]
+            columns = list(change.direction.columns)
+            values[:, columns] = self._without(others).own()[0][:, columns]
+        return values, deviations
 
     def _explained(self, change: Change) -> Vector:
         """Mean square over the noise that a change adds to each channel at its largest."""
@@ -451,9 +464,8 @@ class Detector:
 
     def _correlated(self, changes: Sequence[Change]) -> dict[str, float]:
         """Declared parameters whose successive logs are more alike than chance makes them."""
-        named = [c for c in changes if c.direction is not None]
-        values = self._without(named).own()[0]
-        known = np.column_stack([self.known, *(c.profile.values for c in named)])
+        values = self._without(changes).own()[0]
+        known = np.column_stack([self.known, *(c.profile.values for c in changes)])
         basis = np.linalg.qr(known)[0]
         found = {}
         for direction in self.patterns.directions[: self.patterns.declared]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -61,17 +62,14 @@ def monitor(
     begun = time.perf_counter()
     if not isinstance(series, Series):
         series = read_series(series)
+    series, warnings = _usable(series)
     count = len(series.logs)
     if not 0.0 < rate < 1.0:
         raise InputError(f"the rate of false alarms is {rate:g}, not between 0 and 1")
-    if not 2 <= baseline <= count - LEAST // 2:
-        baseline_ = min(BASELINE, count - LEAST // 2)
-        if baseline != BASELINE:
-            raise InputError(
-                f"a baseline of {baseline} of {count} logs: take 2 to {count - LEAST // 2}"
-            )
-        baseline = baseline_
-    warnings = _usable(series)
+    most = count - LEAST // 2
+    if not 2 <= baseline <= max(most, BASELINE):
+        raise InputError(f"a baseline of {baseline} of {count} logs: take 2 to {most}")
+    baseline = min(baseline, most)
     if known is None:
         with threadpool_limits(1, user_api="blas"):  # its threads wait at the cost of simulations
             known = baseline_patterns(
@@ -90,17 +88,41 @@ def monitor(
     )  # fmt: skip
 
 
-def _usable(series: Series) -> list[str]:
-    """Warnings about the data.
+def _usable(series: Series) -> tuple[Series, list[str]]:
+    """The series without logs that cannot be used, and warnings.
 
     Raises:
-        InputError: they cannot be used.
+        InputError: too few are left.
     """
-    findings = passed(check_data(series.problem), series.problem.source.allow)
-    wrong = [f for f in findings if f.severity == "error"]
-    if wrong:
-        raise InputError(f"{series.name}: the data cannot be used: " + "; ".join(map(str, wrong)))
-    return lines(f for f in findings if f.severity == "warning")
+    problem, warnings = series.problem, [str(f) for f in series.problem.source.findings
+                                         if f.severity == "warning"]  # fmt: skip
+    plain = problem.changed(
+        runs=[replace(run, purpose=PURPOSE) for run in problem.runs],
+        source=replace(problem.source, findings=()),
+    )
+    kept, known = [], dict[bytes, str]()
+    for log in series.logs:  # one by one: what is alike in all logs of a machine is no finding
+        findings = passed(check_data(plain.only(log.runs)), problem.source.allow)
+        wrong = lines(f for f in findings if f.severity == "error")
+        content = b"".join(problem.run(name).data.tobytes() for name in log.runs)
+        other = known.setdefault(hashlib.sha256(content).digest(), log.name)
+        if other != log.name:
+            wrong.append(f"it is a copy of log {other}")
+        if wrong:
+            warnings.append(f"log {log.name} is not used: {'; '.join(wrong)}")
+        else:
+            kept.append(log)
+            warnings += lines(f for f in findings if f.severity == "warning")
+    if len(kept) < LEAST:
+        raise InputError(
+            f"{series.name}: {len(kept)} of {len(series.logs)} logs can be used, and it takes "
+            f"{LEAST}: {'; '.join(warnings)}"
+        )
+    if len(kept) == len(series.logs):
+        return series, warnings
+    return replace(
+        series, logs=tuple(kept), problem=problem.only(n for log in kept for n in log.runs)
+    ), warnings  # fmt: skip
 
 
 def baseline_patterns(

@@ -150,11 +150,12 @@ def _told(result: Monitored, chart: Chart) -> bool:
 def _guide(result: Monitored) -> Html:
     return tag(
         "p",
-        "One point per log: its own estimate, all declared parameters fitted together. Hollow: the "
+        "One point per log: its own estimate, all declared parameters fitted together, and other "
+        "changes that were found taken off. Hollow: the "
         f"first {result.baseline} logs, from whose scatter the limits (green) come. Orange points "
         "are beyond them, orange lines are the changes found. What is left of a channel is the "
-        "RMS of measured less modelled, over the noise. One change moves many charts: what it is, "
-        "the table above says.",
+        "RMS of measured less modelled, over the noise, with nothing taken off: the model of the "
+        "first logs with each log's own parameters.",
         class_="note",
     )
 
