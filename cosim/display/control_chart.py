@@ -16,6 +16,8 @@ from .html import Html, number
 Vector = NDArray[np.float64]
 WIDTH, HEIGHT = 460.0, 210.0
 LEFT, RIGHT, TOP, BOTTOM = 58.0, 10.0, 26.0, 24.0
+LABEL = 22.0
+"""Half a date's label [px]."""
 MONTHS = (1, 2, 3, 6, 12, 24, 60)
 """Between ticks of the dates."""
 DATES = 6
@@ -66,15 +68,16 @@ def control_chart(
         f'<text x="{LEFT:g}" y="14" font-weight="600" fill="var(--ink,#1f2933)">'
         f"{escape(title)}</text>"
     ]
-    for value in ticks(low, high):
+    for value in ticks(low, high, 5):
         parts.append(
             f'<path d="M{LEFT:g} {py(value):.1f}H{WIDTH - RIGHT:g}" stroke="{line}"/>'
             f'<text x="{LEFT - 5:g}" y="{py(value) + 4:.1f}" text-anchor="end" fill="{soft}">'
             f"{number(value)}</text>"
         )
     for day, label in _dates(dates[0], span):
+        at = min(px(day), WIDTH - LABEL)  # a label at the edge stays inside
         parts.append(
-            f'<text x="{px(day):.1f}" y="{HEIGHT - 7:g}" text-anchor="middle" fill="{soft}">'
+            f'<text x="{at:.1f}" y="{HEIGHT - 7:g}" text-anchor="middle" fill="{soft}">'
             f"{label}</text>"
         )
     centre, lower, upper = limits

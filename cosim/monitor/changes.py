@@ -150,17 +150,16 @@ class Detector:
     def _without(self, changes: Sequence[Change]) -> Moments:
         return self.moments.without(*self._columns(changes))
 
-    def alarms(self, changes: Sequence[Change]) -> tuple[float, NDArray[np.bool_]]:
-        """Smallest probability over all tests, and which profiles alarm."""
+    def alarm(self, changes: Sequence[Change]) -> float:
+        """Smallest probability over all tests."""
         values, deviations = self._without(changes).own()
         known = np.column_stack([self.known, *(c.profile.values for c in changes)])
-        least, seen = 1.0, np.zeros(len(self.shapes), dtype=bool)
+        least = 1.0
         for column in self.watched:
             series, own = values[:, column], deviations[:, column]
             p = regress(series, weights(series, own), known, self.matrix).p
             least = min(least, float(p.min()))
-            seen |= p < self.limit
-        return least, seen
+        return least
 
     # -- names and dates ---------------------------------------------------------------------------
 
@@ -185,14 +184,15 @@ class Detector:
         return found, z, weight
 
     def best(
-        self, changes: Sequence[Change], root: Vector, usable: NDArray[np.bool_] | None = None
+        self, changes: Sequence[Change], root: Vector, *, further: bool = False, plain: bool = False
     ) -> Change | None:
         """The change that explains most of what the others leave.
 
         Args:
             changes: the others.
             root: of the scatter between logs.
-            usable: profiles, all if not given; it is then a further change, and not a small one.
+            further: it is one more, and no small one.
+            plain: only what has one column: two fit the sum of two changes too well.
         """
         moments = self._without(changes)
         gains, z, weight = self.gains(moments, root)
@@ -204,15 +204,13 @@ class Detector:
                 [(direction.name, shape.kind) not in taken or shape.kind == "outlier"
                  for shape in self.shapes]
             )  # fmt: skip
-            if usable is not None:
-                allowed &= usable
-            if allowed.any():
+            if allowed.any() and not (plain and len(direction.columns) > 1):
                 place = int(np.argmax(np.where(allowed, gain, -np.inf)))
                 best.append((float(gain[place]), index, place))
         if not best:
             return None
         best.sort(reverse=True)
-        if usable is not None:
+        if further:
             least = SHARE**2 * max((self._explained(c).sum() for c in changes), default=0.0)
             while best and self._explained(self._change(gains, z, weight, *best[0])).sum() < least:
                 best.pop(0)
@@ -320,13 +318,15 @@ class Detector:
             place += size
         return found
 
-    def weighed(self, changes: list[Change], root: Vector) -> list[Change]:
+    def weighed(
+        self, changes: list[Change], root: Vector, *, plain: bool = False
+    ) -> list[Change]:  # fmt: skip
         """All names and dates weighed anew, each with the others taken off."""
         for _ in range(PASSES):
             before = [(c.direction, c.profile) for c in changes]
             for place in range(len(changes)):
                 others = [c for k, c in enumerate(changes) if k != place]
-                again = self.best(others, root)
+                again = self.best(others, root, plain=plain)
                 if again is None:
                     continue
                 again = replace(again, p=changes[place].p)
@@ -351,19 +351,21 @@ class Detector:
     def found(self) -> Found:
         """Look for all changes."""
         changes: list[Change] = []
-        plain = self.moments.own()[0][:, : self.patterns.declared]
-        while len(changes) < MOST:
-            least, usable = self.alarms(changes)
-            if not usable.any():
-                break
-            root = self._without(changes).scatter()
-            change = self.best(changes, root, usable)
-            if change is None or change.gain < GATE * change.spread:
-                break
-            change = replace(change, p=min(least * self.tests, 1.0))
-            changes = self.refitted([*changes, change], root)
-            changes = self.sharpened(changes, root)
-            changes = self.weighed(changes, self._without(changes).scatter())
+        first = self.moments.own()[0][:, : self.patterns.declared]
+        for plain in (True, False):
+            while len(changes) < MOST and (least := self.alarm(changes)) < self.limit:
+                root = self._without(changes).scatter()
+                change = self.best(changes, root, further=True, plain=plain)
+                if change is None or change.gain < GATE * change.spread:
+                    break
+                change = replace(change, p=min(least * self.tests, 1.0))
+                changes = self.refitted([*changes, change], root)
+                changes = self.sharpened(changes, root)
+                changes = self.weighed(changes, self._without(changes).scatter(), plain=plain)
+            if changes:
+                changes = self.weighed(changes, self._without(changes).scatter())
+                changes = self.sharpened(changes, self._without(changes).scatter())
+                changes = self._needed(changes)
         columns, amounts = self._columns(changes)
         root = self._without(changes).scatter()
         fitted = self._without(changes).own()[0][:, : self.patterns.declared]
@@ -377,10 +379,20 @@ class Detector:
         named = [c for c in changes if c.direction is not None]
         before = left
         if named:
-            before = self.evidence.left([], np.zeros((0, self.days.size)), plain)
+            before = self.evidence.left([], np.zeros((0, self.days.size)), first)
         return Found(
             changes, self.tests, self.limit, root, self._own(named), before, self._correlated(named)
         )
+
+    def _needed(self, changes: list[Change]) -> list[Change]:
+        """Those that are not small beside the largest one, once all names are right."""
+        sizes = [float(self._explained(change).sum()) for change in changes]
+        least = SHARE**2 * max(sizes)
+        kept = [
+            change for change, size in zip(changes, sizes, strict=True)
+            if size >= least and change.gain > GATE * change.spread
+        ]  # fmt: skip
+        return self.refitted(kept, self._without(kept).scatter())
 
     def _own(self, changes: Sequence[Change]) -> tuple[Vector, Vector]:
         """Values and deviations of each column by log, all changes but its own taken off."""
@@ -451,6 +463,8 @@ class Detector:
         half = float(student.ppf(0.975, result.freedom) * result.deviation[0]) * change.full
         if change.profile.kind == "creep":
             half += CURVED * self.patterns.bent.get(column, 0.0) * abs(size)
+        if change.direction.kind == "effect":  # a diagnosis fits the shape of its law, too
+            half += SHARE * abs(size)
         return replace(change, size=size, half=half)
 
     def _judged(self, change: Change, unexplained: Sequence[Change]) -> Change:

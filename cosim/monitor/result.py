@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ..display.html import unit as shown_unit
 from .changes import Change, Found
 from .patterns import Direction, Patterns
 from .series import Series
@@ -197,7 +198,7 @@ class Monitored:
     def sentence(self, change: Change) -> str:
         """A change in words."""
         entry = self.entry(change)
-        unit = "" if entry["unit"] in ("", "1", "-") else f" {entry['unit']}"
+        unit = f" {shown_unit(entry['unit'])}".rstrip()
         when = f"since {entry['since']}"
         if entry["last_before"]:
             when += f" (95 %: between {entry['between'][0]} and {entry['between'][1]})"

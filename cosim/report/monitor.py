@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..display.control_chart import control_chart
 from ..display.document import document, links, section
-from ..display.html import Cell, Html, command, join, number, table, tag, unit
+from ..display.html import Cell, Html, command, explained, join, number, table, tag, unit
 from ..files import write_text
 from ..monitor import Monitored
 from ..monitor.changes import Change
@@ -122,7 +122,7 @@ def _changes(result: Monitored) -> Html:
             low, high = entry["ci95"]
             size, interval = f"{entry['change']:+.4g}", f"{low:+.4g} to {high:+.4g}"
         rows.append(
-            [named, KINDS[entry["kind"]], Cell(entry["since"]),
+            [explained(named, entry["text"]), KINDS[entry["kind"]], Cell(entry["since"]),
              Cell(" to ".join(entry["between"]) if entry["kind"] != "outlier" else "–"),
              Cell(size), Cell(interval), unit(entry["unit"]),
              Cell(", ".join([*entry["cannot_tell_from"], *entry.get("same", [])]) or "–", None,
