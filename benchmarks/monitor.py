@@ -91,8 +91,9 @@ def judged(found: Monitored, year: Year) -> dict[str, Any]:
             row[f"{part} first log off by"] = names.index(one["first_log"]) - first
             low, high = one["between"]
             row[f"{part} date within"] = bool(low <= dates[first] <= high)
-            row[f"{part} size over truth"] = one["change"] / size
-            row[f"{part} size within"] = bool(one["ci95"][0] <= size <= one["ci95"][1])
+            if one["what"] == NAMES[truth][0]:  # at another place it has another size
+                row[f"{part} size over truth"] = one["change"] / size
+                row[f"{part} size within"] = bool(one["ci95"][0] <= size <= one["ci95"][1])
     row["others"] = len(table["changes"]) - used
     row["right"] = bool(
         used == sum(bool(t[0]) for t in wanted.values()) and not row["others"]
@@ -159,7 +160,10 @@ def quiet(seed: int, count: int, out: Path) -> list[dict[str, Any]]:
 
 def replace_columns(known: Any) -> Any:
     """The patterns with columns of their own, which a finding changes."""
-    return replace(known, values={name: v.copy() for name, v in known.values.items()}, bent={})
+    return replace(
+        known, values={name: v.copy() for name, v in known.values.items()}, bent={},
+        directions=list(known.directions),
+    )  # fmt: skip
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
@@ -170,12 +174,14 @@ def summary(rows: list[dict[str, Any]]) -> str:
         named = [row for row in rows if row.get(f"{part} named")]
         exact = sum(row[f"{part} first log off by"] == 0 for row in named)
         dates = sum(row[f"{part} date within"] for row in named)
-        ratios = [row[f"{part} size over truth"] for row in named]
-        covered = sum(row[f"{part} size within"] for row in named)
+        ratios = [
+            row[f"{part} size over truth"] for row in named if f"{part} size over truth" in row
+        ]
+        covered = sum(row.get(f"{part} size within", False) for row in named)
         spread = f"{min(ratios):.3f} to {max(ratios):.3f}" if ratios else "-"
         parts.append(
             f"{part}: named {len(named)}, first log exact {exact}, date within its interval "
-            f"{dates}, size over truth {spread}, within its interval {covered}"
+            f"{dates}, size over truth {spread}, within its interval {covered} of {len(ratios)}"
         )
     wall = float(np.median([row["wall_s"] for row in rows]))
     return f"{right} of {len(rows)} years right; {'; '.join(parts)}; {wall:.0f} s a year"

@@ -28,6 +28,9 @@ MOST = 6
 SHARE = 0.1
 """A further change that is smaller than this share of the largest one is not told from what that
 one leaves: patterns are of first order, and laws have their usual shapes."""
+FINALISTS = 4
+"""Likeliest names, and likeliest declared parameters, whose patterns are taken at their full size
+before one of them is chosen."""
 PASSES = 4
 """Times that names and dates of all changes are weighed anew at most."""
 DATES = 1.92
@@ -227,6 +230,28 @@ class Detector:
             return first
         return self._change(gains, z, weight, *simplest)
 
+    def full(self, changes: Sequence[Change], root: Vector) -> None:
+        """Take the patterns of the likeliest next changes at their full sizes.
+
+        A large change of a parameter does more than many small ones, which would count for another
+        name.
+        """
+        gains, z, weight = self.gains(self._without(changes), root)
+        known = {change.direction.name for change in changes if change.direction}
+        order = sorted(
+            (
+                (float(gain.max()), index, int(gain.argmax()))
+                for index, gain in gains.items()
+                if self.patterns.directions[index].name not in known
+            ),
+            reverse=True,
+        )
+        declared = [entry for entry in order if self.patterns.directions[entry[1]].declared]
+        for entry in dict.fromkeys([*order[:FINALISTS], *declared[:FINALISTS]]):
+            change = self._change(gains, z, weight, *entry)
+            self.patterns.secant(entry[1], change.amounts * change.full)
+        self.moments = self.evidence.moments()
+
     def _change(
         self, gains: dict[int, Vector], z: Vector, weight: Vector, gain: float, index: int,
         place: int,
@@ -338,15 +363,15 @@ class Detector:
 
     def sharpened(self, changes: list[Change], root: Vector) -> list[Change]:
         """Patterns of the changes taken at their full size."""
-        renewed = False
+        places = {d.name: k for k, d in enumerate(self.patterns.directions)}
+        found = []
         for change in changes:
             assert change.direction is not None
-            full = change.amounts * change.full
-            renewed |= self.patterns.secant(change.direction, full)
-        if renewed:
-            self.moments = self.evidence.moments()
-            changes = self.refitted(changes, root)
-        return changes
+            place = places[change.direction.name]
+            self.patterns.secant(place, change.amounts * change.full)
+            found.append(replace(change, direction=self.patterns.directions[place]))
+        self.moments = self.evidence.moments()
+        return self.refitted(found, root)
 
     def found(self) -> Found:
         """Look for all changes."""
@@ -355,6 +380,7 @@ class Detector:
         for plain in (True, False):
             while len(changes) < MOST and (least := self.alarm(changes)) < self.limit:
                 root = self._without(changes).scatter()
+                self.full(changes, root)
                 change = self.best(changes, root, further=True, plain=plain)
                 if change is None or change.gain < GATE * change.spread:
                     break
@@ -399,9 +425,9 @@ class Detector:
         values, deviations = self._without(changes).own()
         for change in changes:
             assert change.direction is not None
-            others = [c for c in changes if c.direction is not change.direction]
-            columns = list(change.direction.columns)
-            values[:, columns] = self._without(others).own()[0][:, columns]
+            if len(change.direction.columns) == 1:
+                added = change.amounts[0] * change.profile.values
+                values[:, change.direction.value] += added
         return values, deviations
 
     def _explained(self, change: Change) -> Vector:
@@ -449,11 +475,12 @@ class Detector:
         assert change.direction is not None
         if len(change.direction.columns) > 1:
             return change
-        column = change.direction.columns[0]
+        column = change.direction.value
         others = [c for c in changes if c is not change]
-        values, deviations = (v[:, column] for v in self._without(others).own())
+        values, deviations = (v[:, column] for v in self._without(changes).own())
         if np.isfinite(values).sum() < 4:
             return change
+        values = values + change.amounts[0] * change.profile.values
         known = np.column_stack([self.known, *(c.profile.values for c in others)])
         shape = change.profile.values[None, :]
         result = regress(values, weights(values, deviations), known, shape)
@@ -462,7 +489,7 @@ class Detector:
         size = float(result.slope[0]) * change.full
         half = float(student.ppf(0.975, result.freedom) * result.deviation[0]) * change.full
         if change.profile.kind == "creep":
-            half += CURVED * self.patterns.bent.get(column, 0.0) * abs(size)
+            half += CURVED * self.patterns.bent.get(change.direction.columns[0], 0.0) * abs(size)
         if change.direction.kind == "effect":  # a diagnosis fits the shape of its law, too
             half += SHARE * abs(size)
         return replace(change, size=size, half=half)
@@ -483,7 +510,7 @@ class Detector:
         basis = np.linalg.qr(known)[0]
         found = {}
         for direction in self.patterns.directions[: self.patterns.declared]:
-            series = values[:, direction.columns[0]]
+            series = values[:, direction.value]
             rest = series - basis @ (basis.T @ series)
             correlation = float(rest[1:] @ rest[:-1]) / max(float(rest @ rest), 1e-300)
             # 1 / sqrt(n) is its deviation, and over ten parameters 3 of them are rare

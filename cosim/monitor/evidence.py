@@ -17,9 +17,13 @@ from numpy.typing import NDArray
 from ..calibrate.normal import BOUNDS
 from ..diagnose.linear import ABSORBED
 from .patterns import Patterns
+from .profiles import MEDIAN
 from .series import Series
 
 Vector = NDArray[np.float64]
+
+CUT = 3.0
+"""Deviations beyond which differences of successive logs are cut: one in 400 by chance."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +76,15 @@ class Moments:
     def scatter(self) -> Vector:
         """Square root of the covariance of declared parameters between logs.
 
-        From differences of successive logs: a step is in one of them, and a creep in none.
+        From differences of successive logs, few of which a jump is in, and a creep in none; those
+        that stand out are cut.
         """
         p = self.declared
         inverse = np.linalg.inv(self.matrix[:, :p, :p] + BOUNDS * np.eye(p))
         fitted = np.einsum("nij,nj->ni", inverse, self.g[:, :p])
         steps = np.diff(fitted, axis=0)
+        most = CUT * MEDIAN * np.median(np.abs(steps), axis=0)
+        steps = np.clip(steps, -most, most)
         whole = 0.5 * steps.T @ steps / max(len(steps), 1)
         values, vectors = np.linalg.eigh(whole - inverse.mean(axis=0))
         return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
@@ -126,7 +133,8 @@ class Evidence:
 
     def moments(self) -> Moments:
         """Sums of all logs."""
-        width = self.patterns.width
+        patterns = self.patterns
+        width = patterns.width
         count = len(self.series.logs)
         g, matrix = np.zeros((count, width)), np.zeros((count, width, width))
         whole: dict[str, tuple[Vector, Vector]] = {}
@@ -136,7 +144,7 @@ class Evidence:
                 if good is None and key in whole:
                     columns, square = whole[key]
                 else:
-                    columns = self.patterns.values[key]
+                    columns = patterns.values[key]
                     basis = self._basis[key]
                     if good is not None:
                         columns, basis = columns[good], np.linalg.qr(basis[good])[0]

@@ -61,6 +61,8 @@ class Direction:
         probe: the effect in its system, None for others.
         read: indices of the channels that it concerns, of a channel's.
         same: what does the same.
+        own: column of its value by log, where a change of it has another one: of a declared
+            parameter, whose small changes from log to log are none.
     """
 
     name: str
@@ -74,6 +76,12 @@ class Direction:
     probe: Probe | None = None
     read: tuple[int, ...] = ()
     same: tuple[str, ...] = ()
+    own: int | None = None
+
+    @property
+    def value(self) -> int:
+        """Column of its value by log."""
+        return self.columns[0] if self.own is None else self.own
 
     @property
     def declared(self) -> bool:
@@ -126,15 +134,16 @@ class Patterns:
     @property
     def width(self) -> int:
         """Number of columns."""
-        return sum(len(d.columns) for d in self.directions)
+        return int(next(iter(self.values.values())).shape[1])
 
-    def secant(self, direction: Direction, amplitude: Vector) -> bool:
+    def secant(self, index: int, amplitude: Vector) -> bool:
         """Replace patterns by what the change of this size does; False if it cannot be run.
 
         Args:
-            direction: which.
+            index: of the direction.
             amplitude: one per column, in scales.
         """
+        direction = self.directions[index]
         size = float(np.linalg.norm(amplitude))
         if size == 0.0:
             return False
@@ -167,10 +176,17 @@ class Patterns:
         except CosimError:
             return False  # first orders will do
         column = direction.columns[0]
+        before = {name: values[:, column].copy() for name, values in self.values.items()}
+        if direction.declared and direction.own is None:
+            new = self.width
+            for name, values in self.values.items():
+                self.values[name] = np.column_stack([values, np.zeros(len(values))])
+            self.directions[index] = replace(direction, columns=(new,), own=column)
+            column = new
         moved, whole = 0.0, 0.0
         for name, values in changed.items():
             secant = (values - self.model[name]).ravel() / size
-            moved += float(np.sum((secant - self.values[name][:, column]) ** 2))
+            moved += float(np.sum((secant - before[name]) ** 2))
             whole += float(np.sum(secant**2))
             self.values[name][:, column] = secant
         self.bent.setdefault(column, float(np.sqrt(moved / max(whole, 1e-300))))

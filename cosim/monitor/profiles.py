@@ -24,6 +24,8 @@ Vector = NDArray[np.float64]
 Kind = Literal["step", "creep", "outlier"]
 ASIDE = 2
 """Logs on either side of a step at least: a single one is an outlier."""
+MEDIAN = 1.4826
+"""Deviation of normal numbers over the median of their sizes."""
 GROUP = 4
 """Logs of one excitation that have a mean of their own; where there are fewer, all share one."""
 
@@ -121,13 +123,13 @@ def regress(values: Vector, weight: Vector, known: Vector, shapes: Vector) -> Re
 def weights(values: Vector, deviations: Vector) -> Vector:
     """Inverse variances of a series whose numbers have deviations of their own, and scatter.
 
-    The scatter comes from differences of successive numbers: a step is in one of them.
+    The scatter comes from the median difference of successive numbers: a jump is in one of them.
     """
     good = np.isfinite(values) & np.isfinite(deviations)
     if good.sum() < 3:
         return np.ones_like(values)
     steps = np.diff(values[good])
     own = float(np.mean(deviations[good] ** 2))
-    scatter = max(0.5 * float(np.mean(steps**2)) - own, 0.0)
+    scatter = max(0.5 * float(MEDIAN * np.median(np.abs(steps))) ** 2 - own, 0.0)
     total = np.where(good, deviations, 1.0) ** 2 + scatter
     return np.asarray(1.0 / np.maximum(total, 1e-300))

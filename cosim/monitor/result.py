@@ -120,7 +120,7 @@ class Monitored:
 
     def _chart(self, direction: Direction, origin: float) -> Chart:
         values, deviations = self.found.own
-        column = direction.columns[0]
+        column = direction.value
         return self._limited(
             direction.name, direction.unit, direction.text,
             origin + direction.scale * values[:, column], direction.scale * deviations[:, column],

@@ -128,7 +128,8 @@ def test_dates_come_from_names_and_from_times_of_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "found"),
     [
-        ("2025-03-14", datetime(2025, 3, 14)), ("run_20250314T0930.csv", datetime(2025, 3, 14, 9, 30)),
+        ("2025-03-14", datetime(2025, 3, 14)),
+        ("run_20250314T0930.csv", datetime(2025, 3, 14, 9, 30)),
         ("2025-13-14", None), ("bench12", None), ("120250314", None),
     ],
 )  # fmt: skip
@@ -152,7 +153,7 @@ def test_wrong_dates_are_refused_with_the_way_out(tmp_path: Path) -> None:
             read_series(folder)
     few = text[: text.index('[[run]]\nname = "R03"')]
     (folder / "dataset.toml").write_text(few)
-    with pytest.raises(ScenarioError, match="has 3 logs of different dates .* it takes 6"):
+    with pytest.raises(ScenarioError, match=r"has 3 logs of different dates .* it takes 6"):
         read_series(folder)
 
 
@@ -174,7 +175,9 @@ def test_a_folder_of_data_sets_is_a_series(changed: tuple[Path, Monitored], tmp_
     ]  # fmt: skip
 
 
-def test_logs_that_cannot_be_used_are_left_out(changed: tuple[Path, Monitored], tmp_path: Path) -> None:
+def test_logs_that_cannot_be_used_are_left_out(
+    changed: tuple[Path, Monitored], tmp_path: Path
+) -> None:
     folder = shutil.copytree(changed[0], tmp_path / "disc")
     shutil.copyfile(folder / "log04.csv", folder / "log05.csv")
     found = plain(folder)
