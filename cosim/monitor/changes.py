@@ -472,10 +472,11 @@ class Detector:
 
     def _sized(self, change: Change, changes: Sequence[Change]) -> Change:
         """With its size from numbers per log, the other changes taken off."""
-        assert change.direction is not None
-        if len(change.direction.columns) > 1:
+        direction = change.direction
+        assert direction is not None
+        if len(direction.columns) > 1:
             return change
-        column = change.direction.value
+        column = direction.value
         others = [c for c in changes if c is not change]
         values, deviations = (v[:, column] for v in self._without(changes).own())
         if np.isfinite(values).sum() < 4:
@@ -489,8 +490,14 @@ class Detector:
         size = float(result.slope[0]) * change.full
         half = float(student.ppf(0.975, result.freedom) * result.deviation[0]) * change.full
         if change.profile.kind == "creep":
-            half += CURVED * self.patterns.bent.get(change.direction.columns[0], 0.0) * abs(size)
-        if change.direction.kind == "effect":  # a diagnosis fits the shape of its law, too
+            bend = CURVED * self.patterns.bent.get(direction.columns[0], 0.0)
+            half += bend * abs(size)
+            aside = math.ceil(bend * (self.days.size - change.profile.first))
+            change = replace(
+                change, low=max(change.low - aside, 1),
+                high=min(change.high + aside, self.days.size - 1),
+            )  # fmt: skip
+        if direction.kind == "effect":  # a diagnosis fits the shape of its law, too
             half += SHARE * abs(size)
         return replace(change, size=size, half=half)
 

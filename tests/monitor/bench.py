@@ -58,7 +58,7 @@ def write(
     text = disc.MAPPING.replace("step = 0.005", "step = 0.0005")
     for log in range(LOGS):
         # oil is warmer or colder; rounded, so that logs of equal warmth share a simulation
-        warm = round(float(np.clip(random.standard_normal(), -2.0, 2.0)), 0) * 3e-4
+        warm = round(float(np.clip(random.standard_normal(), -2.0, 2.0)), 0) * 1e-4
         time, tau, w, theta = clean(viscous(log) + warm, dry(log))
         w = w + disc.SIGMA["w"] * random.standard_normal(w.size)
         theta = theta + zero(log) + disc.SIGMA["theta"] * random.standard_normal(w.size)
