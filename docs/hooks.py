@@ -32,6 +32,8 @@ PYTHON = {
                     "cosim.calibrate.simulator.Simulator", "cosim.calibrate.fit.fit",
                     "cosim.calibrate.estimate.Estimate"],
     "Diagnosis": ["cosim.diagnose.diagnose", "cosim.diagnose.Diagnosis"],
+    "Monitoring": ["cosim.monitor.monitor.monitor", "cosim.monitor.result.Monitored",
+                   "cosim.monitor.series.read_series"],
     "Errors": ["cosim.errors"],
 }  # fmt: skip
 """Objects of the reference, by section."""

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 from ..errors import FmuCallError
 
-COMMANDS = {"calibrate", "diagnose", "linearize", "study"}
+COMMANDS = {"calibrate", "diagnose", "linearize", "monitor", "study"}
 """Those whose FMUs run in this process; `run` guards each run, so that it keeps the recording."""
 GRACE = 5
 """Time that a command has to put its things away when it is told to end [s]."""

@@ -27,6 +27,9 @@ from .series import LEAST, Series, read_series
 RATE = 1e-3
 """Probability of any alarm on a series in which nothing changes: one false alarm in a thousand
 series."""
+FAR = 2.0
+"""What the model may leave of a channel in the first logs, over its noise; noise that is guessed is
+up to half as much again."""
 BASELINE = 10
 """Logs from which parameters and control limits are taken: their spread is then known to a
 quarter."""
@@ -78,6 +81,13 @@ def monitor(
     say("looking for changes")
     detector = Detector(Evidence(series, known), rate)
     found = detector.found()
+    calm = np.sqrt(np.nanmean(found.left[:baseline], axis=0))
+    for channel, size in zip(series.problem.channels, calm.tolist(), strict=True):
+        if size > FAR:
+            warnings.append(
+                f"the model leaves {size:.2g} times the noise of {channel.name} in the first logs "
+                "already, so names are less sure: run cosim diagnose on them first"
+            )
     for name, correlation in found.alone.items():
         warnings.append(
             f"{name} of successive logs is correlated by {correlation:.2f}: logs are not "

@@ -216,7 +216,7 @@ def test_page_json_and_notebook_say_the_same(changed: tuple[Path, Monitored]) ->
 
 def test_from_the_shell(
     changed: tuple[Path, Monitored], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     effects = {c.effect for c in candidates(read_problem(changed[0]))}
     left = [word for name in sorted(effects) for word in ("--without", name)]
@@ -228,7 +228,7 @@ def test_from_the_shell(
             code = 0
         except SystemExit as end:
             code = int(end.code or 0)
-        done = capsys.readouterr()
+        done = capfd.readouterr()
         return code, done.out, done.err
 
     code, out, _ = call(changed[0], *left, "--out", tmp_path / "out", "--json")
