@@ -119,6 +119,8 @@ def component_json(variant: Variant) -> bytes:
         content["left_out"] = [
             {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
         ]
+    if model.component.relay:
+        content["relay"] = True
     looks = model_scene(model, {entry.name for entry in variant.entries})
     if looks:
         content["scene"] = looks

@@ -1,0 +1,21 @@
+"""Number, or a value in a unit that has no adapter of its own.
+
+    y = u
+
+Not modelled: anything, unless an effect is added.
+
+Source: definition.
+"""
+
+from __future__ import annotations
+
+from ..component import Fidelity
+from ..model import Model
+from . import pass_on
+
+FIDELITY = Fidelity(level=8)
+
+
+def equations(m: Model) -> None:
+    """Collect the equations."""
+    pass_on(m, "1", "number")
