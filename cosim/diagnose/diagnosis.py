@@ -22,6 +22,7 @@ from .carriers import leave_fmus
 from .exchange import reconsidered
 from .experiment import propose
 from .facts import Table
+from .foreign import attached
 from .further import judged
 from .grey_box import Site, site, unnamed
 from .linear import SampleStack
@@ -66,7 +67,9 @@ def diagnose(
             law can enter there.
         UnknownNameError: there is no such place.
     """
-    begun, asked = time.perf_counter(), site(problem, law_at) if law_at else None
+    begun = time.perf_counter()
+    problem, adapters = attached(problem)
+    asked = site(problem, law_at) if law_at else None
     simulator = Simulator(problem, workers=workers)
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
