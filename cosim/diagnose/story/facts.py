@@ -53,6 +53,12 @@ class Facts:
             found = found[key]
         return found
 
+    def in_words(self, place: str) -> str:
+        """A place in words; of an adapter at an FMU without sources, where that is."""
+        instance = place.partition(".")[0]
+        adapter = self.table.get("adapters", {}).get(instance)
+        return str(adapter["where"]) if adapter else f"at {place_in_words(place)}"
+
     # -- printed ----------------------------------------------------------------------------------
 
     def _shown(self, printed: str, kind: str, path: Sequence[str | int], class_: str = "") -> Html:
