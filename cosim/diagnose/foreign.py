@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
@@ -32,15 +32,10 @@ from ..system.toml import DeclaredConnection
 COMPONENT = "adapter"
 EFFORTS = {"torque": ("N.m", "rad/s", "w"), "force": ("N", "m/s", "v")}
 """Fidelities with a motion: their unit, that of the motion, and the input for it."""
-SENSED = {"torque": "torque_signal", "force": "force_signal"}
-"""Fidelities for efforts without a motion."""
-SIGNALS = {
-    "speed": "rad/s", "angle": "rad", "velocity": "m/s", "position": "m", "current": "A",
-    "voltage": "V",
-}  # fmt: skip
-"""Fidelities for signals, and their units."""
-OTHER = "number"
-"""The fidelity for all other units; it passes numbers on as they are."""
+SIGNAL = "signal"
+"""The fidelity for all others; it passes numbers on as they are."""
+UNIT = "any"
+"""What the fidelity calls the unit of its signal."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +48,7 @@ class Adapter:
         foreign: the instance without sources beside it.
         at: full name of the variable whose value passes.
         role: `output` or `input` of the foreign instance, or `sensor`.
+        unit: of the value, as far as it is declared on either side.
     """
 
     name: str
@@ -60,6 +56,7 @@ class Adapter:
     foreign: str
     at: str
     role: str
+    unit: str = ""
 
     @property
     def where(self) -> str:
@@ -93,6 +90,28 @@ def attached(problem: Problem) -> tuple[Problem, tuple[Adapter, ...]]:
     if problem.provider is None or not foreigners(system):
         return problem, ()
     return _Attaching(problem, system).done()
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptedProblem(Problem):
+    """A problem with adapters, whose effects have the unit of what passes.
+
+    Attributes:
+        units: instance of an adapter -> unit.
+    """
+
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def with_effects(self, changes: Mapping[str, str]) -> Problem:
+        """See `Problem.with_effects`."""
+        found = super().with_effects(changes)
+        return found.changed(
+            parameters=[
+                replace(p, unit=self.units.get(p.targets[0][0].partition(".")[0], ""))
+                if p.unit == UNIT and p.role == "effect" else p
+                for p in found.parameters
+            ]
+        )  # fmt: skip
 
 
 class _Attaching:
@@ -134,7 +153,9 @@ class _Attaching:
         runs = [self._run(run, inputs, moved) for run in self.problem.runs]
         further = [partial(_further, read) for read in self.problem.further]
         changed = self.problem.changed(model=model, channels=channels, runs=runs, further=further)
-        return changed, tuple(self.adapters.values())
+        units = {a.name: a.unit for a in self.adapters.values()}
+        own = {f.name: getattr(changed, f.name) for f in fields(Problem)}
+        return AdaptedProblem(**own, units=units), tuple(self.adapters.values())
 
     # -- instances ---------------------------------------------------------------------------------
 
@@ -149,9 +170,11 @@ class _Attaching:
             name, number = f"{stem}_{number}", number + 1
         return name
 
-    def _new(self, at: str, fidelity: str, foreign: str, role: str) -> str:
+    def _new(self, at: str, fidelity: str, foreign: str, role: str, unit: Unit | None) -> str:
         name = self._name(at, "_sensor" if role == "sensor" else "")
-        self.adapters[name] = Adapter(name, fidelity, foreign, at, role)
+        symbol = unit.symbol if unit is not None else ""
+        symbol = EFFORTS[fidelity][0] if fidelity in EFFORTS else symbol
+        self.adapters[name] = Adapter(name, fidelity, foreign, at, role, symbol)
         beside = at.partition(".")[0]
         table = self.before if role == "input" else self.after
         table.setdefault(beside, []).append(name)
@@ -187,11 +210,10 @@ class _Attaching:
             unit = out.unit or (into.unit if plain else None)
             fidelity, gain, offset = _passing(unit)
             motion = self._motion(wire, given, fidelity) if fidelity in EFFORTS else None
-            if fidelity in EFFORTS and motion is None:
-                fidelity = SENSED[fidelity]
-            name = self._new(
-                at, fidelity, giver if given else taker, "output" if given else "input"
-            )
+            if motion is None:
+                fidelity, gain, offset = SIGNAL, 1.0, 0.0
+            beside = (giver, "output") if given else (taker, "input")
+            name = self._new(at, fidelity, *beside, unit)
             self.wires.append(_wired(wire.source, f"{name}.u", gain, offset))
             if motion is not None:
                 self.wires.append(_wired(motion[0], f"{name}.{EFFORTS[fidelity][2]}", motion[1]))
@@ -243,16 +265,13 @@ class _Attaching:
         found: dict[str, str] = {}
         for run in self.problem.runs:
             for full, signal in run.inputs.items():
-                instance = full.partition(".")[0]
-                variable = self.system.declaration(full)
+                instance, variable = full.partition(".")[0], self.system.declaration(full)
                 if instance not in self.foreign or full in found or not _continuous(variable):
                     continue
-                unit = variable.unit or (parse(signal.unit) if signal.unit else None)
-                fidelity, gain, offset = _passing(unit)
-                fidelity = SENSED.get(fidelity, fidelity)
-                if (gain, offset) != (1.0, 0.0) or (fidelity == OTHER and signal.unit):
+                own = parse(signal.unit) if signal.unit else None
+                if own and variable.unit and conversion(own, variable.unit) != (1.0, 0.0):
                     continue
-                name = self._new(full, fidelity, instance, "input")
+                name = self._new(full, SIGNAL, instance, "input", variable.unit or own)
                 self.wires.append(_wired(f"{name}.y", full))
                 found[full] = f"{name}.u"
         return found
@@ -260,24 +279,19 @@ class _Attaching:
     def _channel(self, channel: Channel) -> Channel:
         """The channel, read behind the adapter of an output, and through one for its sensor."""
         at = channel.signal
-        instance = at.partition(".")[0]
+        instance, variable = at.partition(".")[0], self.system.declaration(at)
         near = {c.source for c in self.system.connections if self._beside(c)}
         if instance not in self.foreign and at not in near:
             return channel
-        variable = self.system.declaration(at)
         if variable.causality != "output" or not _continuous(variable):
             return channel
-        source, gain, offset = at, 1.0, 0.0
-        if at in self.passed:
-            name, gain, offset = self.passed[at]
-            source = f"{name}.y"
-            fidelity = self.adapters[name].fidelity
-        else:
-            fidelity, gain, offset = _passing(variable.unit)
-        own = self._sensor(at, instance, SENSED.get(fidelity, fidelity))
-        first = (1.0, 0.0) if at in self.passed else (gain, offset)
-        if own not in {w.target.partition(".")[0] for w in self.wires}:
-            self.wires.append(_wired(source, f"{own}.u", *first))
+        behind, gain, offset = self.passed.get(at, ("", 1.0, 0.0))
+        own = next((a.name for a in self.adapters.values() if (a.at, a.role) == (at, "sensor")), "")
+        if not own:
+            beside = instance if instance in self.foreign else ""
+            unit = parse(self.adapters[behind].unit) if behind else variable.unit
+            own = self._new(at, SIGNAL, beside, "sensor", unit)
+            self.wires.append(_wired(f"{behind}.y" if behind else at, f"{own}.u"))
         slope = channel.gain / gain
         return replace(
             channel, signal=f"{own}.y", gain=slope, offset=channel.offset - slope * offset
@@ -285,13 +299,6 @@ class _Attaching:
 
     def _beside(self, wire: Connection) -> bool:
         return wire.target.partition(".")[0] in self.foreign
-
-    def _sensor(self, at: str, instance: str, fidelity: str) -> str:
-        """Name of the adapter for the sensor of a variable."""
-        known = [a.name for a in self.adapters.values() if a.at == at and a.role == "sensor"]
-        if known:
-            return known[0]
-        return self._new(at, fidelity, instance if instance in self.foreign else "", "sensor")
 
     def _run(
         self, run: MeasuredRun, inputs: Mapping[str, str], moved: dict[int, Any]
@@ -315,12 +322,11 @@ def _continuous(variable: Variable) -> bool:
 
 def _passing(unit: Unit | None) -> tuple[str, float, float]:
     """The fidelity for values of a unit, and what makes them values in the adapter's."""
-    if unit is not None and unit.exponents != parse("1").exponents:
-        for fidelity, symbol in {**{k: v[0] for k, v in EFFORTS.items()}, **SIGNALS}.items():
-            own = parse(symbol)
-            if own.exponents == unit.exponents:
-                return fidelity, *conversion(unit, own)
-    return OTHER, 1.0, 0.0
+    for fidelity, (symbol, _, _) in EFFORTS.items():
+        own = parse(symbol)
+        if unit is not None and own.exponents == unit.exponents:
+            return fidelity, *conversion(unit, own)
+    return SIGNAL, 1.0, 0.0
 
 
 def _wired(source: str, target: str, gain: float = 1.0, offset: float = 0.0) -> DeclaredConnection:

@@ -30,18 +30,20 @@ class Hidden:
     Attributes:
         fan_viscous, fan_coulomb: drag inside the fan, against the speed [N.m.s/rad], dry [N.m].
         motor_coulomb: dry friction of the motor's shaft [N.m].
-        winding: share by which the motor's resistance rises per ampere, as of bad brushes [1/A].
+        brush_drop: voltage that is lost at the motor's brushes [V].
         torque_gain: error of the torque sensor [1].
         torque_delay: by which the torque sensor is late [s], whole intervals of the log.
-        fan_swirl: torque per speed to the power 1.5, a law of no catalogue [N.m.s1.5/rad1.5].
+        fan_stall: torque that the fan lacks around 120 rad/s, where its flow leaves the blades: a
+            law of no catalogue [N.m].
     """
 
     fan_viscous: float = 0.0
     fan_coulomb: float = 0.0
     motor_coulomb: float = 0.0
+    brush_drop: float = 0.0
     torque_gain: float = 0.0
     torque_delay: float = 0.0
-    fan_swirl: float = 0.0
+    fan_stall: float = 0.0
 
 
 def voltage(seed: int, duration: float) -> Vector:
@@ -71,12 +73,14 @@ def bench(seed: int, hidden: Hidden = Hidden(), duration: float = 6.0) -> Vector
     def fan(w: float) -> float:
         drag = FAN * abs(w) * w + hidden.fan_viscous * w
         drag += hidden.fan_coulomb * np.tanh(w / 0.05)
-        return float(-drag - hidden.fan_swirl * np.sign(w) * abs(w) ** 1.5)
+        drag -= hidden.fan_stall * np.sign(w) * np.exp(-(((abs(w) - 120.0) / 20.0) ** 2))
+        return float(-drag)
 
     def rates(state: Vector, u: float) -> Vector:
         i, w = state
         tau = K_T * i - hidden.motor_coulomb * np.tanh(w / 0.05)
-        return np.array([(u - R_A * i - K_T * w) / L_A, (tau + fan(w)) / J])
+        rest = u - hidden.brush_drop * np.tanh(i / 0.1) - R_A * i - K_T * w
+        return np.array([rest / L_A, (tau + fan(w)) / J])
 
     state = np.zeros(2)
     for k, u in enumerate(volts.tolist()):

@@ -47,6 +47,7 @@ def _powers(**exponents: int) -> Exponents:
 _ZERO = _powers()
 _SYMBOLS: dict[str, tuple[Exponents, float, float]] = {
     "1": (_ZERO, 1.0, 0.0),
+    "any": (_ZERO, 1.0, 0.0),  # of what an adapter passes on, whatever it is
     "%": (_ZERO, 0.01, 0.0),
     **{name: (_powers(**{name: 1}), 1.0, 0.0) for name in BASE},
     "N": (_powers(kg=1, m=1, s=-2), 1.0, 0.0),

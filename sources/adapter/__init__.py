@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..component import Component
 from ..model import Model
 from ..quantity import Quantity
 
-U, Y = "u", "y"
+SX = Any
+UNIT = "any"
+"""Of a signal whose unit is that of the value."""
 COMPONENT = Component(
     "adapter",
     "A value on its way from one FMU to another, passed on as it is.",
@@ -24,30 +28,26 @@ SIGN = Quantity(
 )
 
 
-def pass_on(m: Model, unit: str, what: str) -> None:
-    """Hand a value on, with what effects on the signal add to it."""
-    value = m.input(Quantity(U, unit, f"{what} as it is given", start=1.0))
-    signal = m.balance("value", "signal", unit=unit, value=value)
-    m.output(Quantity(Y, unit, f"{what} as it is taken"), value + signal.effort)
+def pass_on(m: Model, unit: str, value: SX) -> SX:
+    """The value with what effects on the signal add to it."""
+    return value + m.balance("value", "signal", unit=unit, value=value).effort
 
 
-def push(m: Model, unit: str, what: str, kind: str, shaft: tuple[Quantity, Quantity]) -> None:
+def push(
+    m: Model, effort: Quantity, taken: Quantity, kind: str, motion: tuple[Quantity, Quantity]
+) -> None:
     """Hand an effort on, with what effects on the motion beside it and on the signal add to it.
 
     Args:
         m: the model.
-        unit, what: of the effort.
+        effort, taken: as it is given, an input, and as it is taken, an output.
         kind: of the balance.
-        shaft: speed, an input, and the place that its integral is.
+        motion: speed, an input, and the place that its integral is.
     """
-    effort = m.input(Quantity(U, unit, f"{what} as it is given", start=1.0))
-    speed, sign = m.input(shaft[0]), m.parameter(SIGN)
-    place = m.state(shaft[1])
+    value, speed, sign = m.input(effort), m.input(motion[0]), m.parameter(SIGN)
+    place = m.state(motion[1])
     m.derivative(place, speed)
     name = "angle" if kind == "rotation" else "position"
-    signals = {"velocity": speed, name: place, "load": sign * effort}
+    signals = {"velocity": speed, name: place, "load": sign * value}
     inside = m.balance("inside", kind, **signals)
-    signal = m.balance("value", "signal", unit=unit, value=effort)
-    m.output(
-        Quantity(Y, unit, f"{what} as it is taken"), effort + sign * inside.effort + signal.effort
-    )
+    m.output(taken, pass_on(m, effort.unit, value) + sign * inside.effort)

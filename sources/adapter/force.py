@@ -17,11 +17,13 @@ from ..model import Model
 from ..quantity import Quantity
 from . import push
 
-FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-2))
+FIDELITY = Fidelity(level=2, solver=Solver("rk4", 1e-2))
+GIVEN = Quantity("u", "N", "force as it is given", start=1.0)
+TAKEN = Quantity("y", "N", "force as it is taken")
 V = Quantity("v", "m/s", "speed of the slide")
 POSITION = Quantity("position", "m", "state: position of the slide since the start")
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    push(m, "N", "force", "translation", (V, POSITION))
+    push(m, GIVEN, TAKEN, "translation", (V, POSITION))

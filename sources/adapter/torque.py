@@ -17,11 +17,13 @@ from ..model import Model
 from ..quantity import Quantity
 from . import push
 
-FIDELITY = Fidelity(level=0, solver=Solver("rk4", 1e-2))
+FIDELITY = Fidelity(level=1, solver=Solver("rk4", 1e-2))
+GIVEN = Quantity("u", "N.m", "torque as it is given", start=1.0)
+TAKEN = Quantity("y", "N.m", "torque as it is taken")
 W = Quantity("w", "rad/s", "speed of the shaft")
 ANGLE = Quantity("angle", "rad", "state: angle of the shaft since the start")
 
 
 def equations(m: Model) -> None:
     """Collect the equations."""
-    push(m, "N.m", "torque", "rotation", (W, ANGLE))
+    push(m, GIVEN, TAKEN, "rotation", (W, ANGLE))
