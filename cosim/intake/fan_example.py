@@ -6,7 +6,9 @@ have beyond the models is said by `Hidden`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import copysign, exp, tanh
 from pathlib import Path
 
 import numpy as np
@@ -71,26 +73,25 @@ def bench(seed: int, hidden: Hidden = Hidden(), duration: float = 6.0) -> Vector
     rows[:, 0], rows[:, 1] = PERIOD * np.arange(count), volts
 
     def fan(w: float) -> float:
-        drag = FAN * abs(w) * w + hidden.fan_viscous * w
-        drag += hidden.fan_coulomb * np.tanh(w / 0.05)
-        drag -= hidden.fan_stall * np.sign(w) * np.exp(-(((abs(w) - 120.0) / 20.0) ** 2))
-        return float(-drag)
+        drag = FAN * abs(w) * w + hidden.fan_viscous * w + hidden.fan_coulomb * tanh(w / 0.05)
+        stall = exp(-(((abs(w) - 120.0) / 20.0) ** 2)) if hidden.fan_stall else 0.0
+        return copysign(hidden.fan_stall * stall, w) - drag
 
-    def rates(state: Vector, u: float) -> Vector:
-        i, w = state
-        tau = K_T * i - hidden.motor_coulomb * np.tanh(w / 0.05)
-        rest = u - hidden.brush_drop * np.tanh(i / 0.1) - R_A * i - K_T * w
-        return np.array([rest / L_A, (tau + fan(w)) / J])
+    def rates(i: float, w: float, u: float) -> tuple[float, float]:
+        rest = u - hidden.brush_drop * tanh(i / 0.1) - R_A * i - K_T * w
+        tau = K_T * i - hidden.motor_coulomb * tanh(w / 0.05)
+        return rest / L_A, (tau + fan(w)) / J
 
-    state = np.zeros(2)
+    i = w = 0.0
     for k, u in enumerate(volts.tolist()):
-        rows[k, 2:] = state[1], state[0], fan(state[1])
+        rows[k, 2:] = w, i, fan(w)
         for _ in range(FINE):
-            a = rates(state, u)
-            b = rates(state + 0.5 * h * a, u)
-            c = rates(state + 0.5 * h * b, u)
-            d = rates(state + h * c, u)
-            state = state + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+            a, b = rates(i, w, u)
+            c, d = rates(i + 0.5 * h * a, w + 0.5 * h * b, u)
+            e, f = rates(i + 0.5 * h * c, w + 0.5 * h * d, u)
+            g, m = rates(i + h * e, w + h * f, u)
+            i += h / 6.0 * (a + 2.0 * c + 2.0 * e + g)
+            w += h / 6.0 * (b + 2.0 * d + 2.0 * f + m)
     late = round(hidden.torque_delay / PERIOD)
     rows[:, 4] = (1.0 + hidden.torque_gain) * rows[np.maximum(np.arange(count) - late, 0), 4]
     rows[:, 2:] += np.random.default_rng(seed).normal(0.0, NOISE, (count, 3))
@@ -189,26 +190,36 @@ min = 0.5
 max = 2.5
 targets = "motor.R_a"
 """
-RUNS = ("identification",) * 3 + ("validation",) * 2
-"""Purposes of the runs."""
+PURPOSES = ("identification",) * 3 + ("validation",) * 2
+"""Of the runs."""
 
 
-def write(folder: Path, hidden: Hidden = Hidden(fan_viscous=1e-4), *, seed: int = 0) -> None:
+def write(
+    folder: Path,
+    hidden: Hidden = Hidden(fan_viscous=1e-4),
+    *,
+    seed: int = 0,
+    duration: float = 6.0,
+    purposes: Sequence[str] = PURPOSES,
+) -> None:
     """Write the example: `fan.py`, `bench.toml`, `dataset.toml` and the logs.
 
     Args:
         folder: where.
         hidden: what the logs have and the models have not.
         seed: of the first run.
+        duration: of each run [s].
+        purposes: of the runs.
     """
     make_folder(folder)
     write_text(folder / "fan.py", FAN_SOURCE)
     write_text(folder / "bench.toml", SYSTEM)
     table = DATASET
-    for number, purpose in enumerate(RUNS):
+    for number, purpose in enumerate(purposes):
         name = f"run_{number + 1}"
         lines = ["t,voltage,speed,current,torque"]
-        lines += [",".join(f"{v:.7g}" for v in row) for row in bench(seed + number, hidden)]
+        rows = bench(seed + number, hidden, duration)
+        lines += [",".join(f"{v:.7g}" for v in row) for row in rows]
         write_text(folder / f"{name}.csv", "\n".join(lines) + "\n")
         table += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{purpose}"\n'
     write_text(folder / "dataset.toml", table)
