@@ -47,9 +47,13 @@ def _of_laws(verdict: Verdict, known: Mapping[str, Adapter]) -> list[str]:
         if len(ways) > 1:
             names = " or ".join(f"inside {name}" for name in sorted(ways - {""}))
             outside = " or outside" if "" in ways else ""
+            shown = dict.fromkeys(
+                known[i].at if (i := place.partition(".")[0]) in known else place
+                for place in (law.place, *apart)
+            )
             found.append(
                 f"Whether {law.effect} lies {names}{outside}, these runs do not tell "
-                f"({law.place} or {', '.join(apart)}): measure what passes between."
+                f"({' or '.join(shown)}): measure what passes between."
             )
         elif inside:
             at = adapter.at if adapter else law.place
