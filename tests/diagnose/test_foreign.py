@@ -129,14 +129,57 @@ def test_friction_in_an_fmu_that_gives_motion_brakes_it(tmp_path: Path) -> None:
     assert 0.0 < braked < 0.9 * free
 
 
-def _problem(folder: Path, signal: str) -> Problem:
+UNITS = (
+    '<UnitDefinitions><Unit name="N.mm"><BaseUnit kg="1" m="2" s="-2" factor="0.001"/></Unit>'
+    '<Unit name="rpm"><BaseUnit rad="1" s="-1" factor="0.10471975511965977"/></Unit>'
+    "</UnitDefinitions>"
+)
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+def test_units_of_an_fmu_without_sources_are_converted_once(tmp_path: Path, algorithm: str) -> None:
+    variables = [
+        V("torque", "Float64", "input", "0", inner='unit="N.mm"'),
+        V("omega", "Float64", "output", inner='unit="rpm"'),
+    ]
+    step = "v->r[1][0] += h * v->r[0][0] * 1e-3 / 3e-4 * 30 / 3.141592653589793;"
+    tiny(tmp_path, variables, step=step, name="flywheel", definitions=UNITS)
+    (tmp_path / "bench.toml").write_text(
+        'connections = ["motor.tau -> load.torque", "load.omega -> motor.w"]\n'
+        '[instances]\nmotor = "bare_motor/winding"\nload = "flywheel.fmu"\n'
+    )
+    problem = _problem(tmp_path, "load.omega").changed(algorithm=algorithm)
+    changed, adapters = attached(problem)
+    assert [a.unit for a in adapters] == ["N.m", "rpm", "rpm"]
+    plain, through = (simulator(p).simulate(p.nominal, "run") for p in (problem, changed))
+    assert plain[-1, 0] > 500.0, "it is given in rpm"
+    # 1000 steps of some rounding errors each
+    np.testing.assert_allclose(through, plain, rtol=1e-12)
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+def test_a_log_drives_an_fmu_without_sources_through_its_adapter(
+    tmp_path: Path, algorithm: str
+) -> None:
+    variables = [V("cmd", "Float64", "input", "0"), V("y", "Float64", "output")]
+    tiny(tmp_path, variables, step="v->r[1][0] += h * v->r[0][0];", name="valve")
+    (tmp_path / "bench.toml").write_text('[instances]\nvalve = "valve.fmu"\n')
+    problem = _problem(tmp_path, "valve.y", "valve.cmd").changed(algorithm=algorithm)
+    changed, adapters = attached(problem)
+    assert [(a.at, a.role) for a in adapters] == [("valve.cmd", "input"), ("valve.y", "sensor")]
+    plain, through = (simulator(p).simulate(p.nominal, "run") for p in (problem, changed))
+    assert plain[-1, 0] == pytest.approx(6.0 * 0.99, rel=1e-9)  # rounding of 990 steps
+    np.testing.assert_array_equal(through, plain)
+
+
+def _problem(folder: Path, signal: str, driven: str = "motor.u_set") -> Problem:
     """A problem on a system file, whose log says nothing."""
     (folder / "run.csv").write_text(
         "t,u,w\n" + "".join(f"{0.01 * k:.2f},6.0,{k}\n" for k in range(100))
     )
     (folder / "dataset.toml").write_text(
         'system = "bench.toml"\nstep = 0.001\ntime = "t"\n'
-        '[inputs]\n"motor.u_set" = "u"\n'
+        f'[inputs]\n"{driven}" = "u"\n'
         f'[channels.w]\nsignal = "{signal}"\nsigma = 1.0\n'
         '[[run]]\nname = "run"\nfile = "run.csv"\npurpose = "identification"\n'
     )
