@@ -55,7 +55,7 @@ def leave_system(
         )
         return []
     path = out / NAME
-    write_text(path, _text(problem, names - set(variants), wires, variants, values))
+    write_text(path, _text(problem, adapters, names - set(variants), wires, variants, values))
     return [path]
 
 
@@ -95,13 +95,19 @@ def _said(system: System, wire: DeclaredConnection) -> bool:
 
 def _text(
     problem: Problem,
+    adapters: Sequence[Adapter],
     dropped: Collection[str],
     wires: Sequence[DeclaredConnection],
     variants: Mapping[str, object],
     values: Mapping[str, object],
 ) -> str:
     file = problem.file
-    lines = [f"description = {json.dumps(file.text, ensure_ascii=False)}", "connections = ["]
+    lines = [
+        f"# What was measured at {a.at} is {a.name}.y here: it is behind the adapter."
+        for a in adapters
+        if a.role == "output" and a.name in variants
+    ]
+    lines += [f"description = {json.dumps(file.text, ensure_ascii=False)}", "connections = ["]
     lines += [f'    "{w.source} -> {w.target}",' for w in wires]
     lines += ["]", "", "[instances]"]
     for name, reference in problem.instances.items():

@@ -172,6 +172,26 @@ def test_a_log_drives_an_fmu_without_sources_through_its_adapter(
     np.testing.assert_array_equal(through, plain)
 
 
+def test_vectors_take_an_adapter_for_each_element(tmp_path: Path) -> None:
+    def vector(name: str, causality: str) -> V:
+        return V(name, "Float64", causality, "0 0" if causality == "input" else None, (2,))
+
+    tiny(tmp_path, [V("u", "Float64", "input", "0"), vector("q", "output")], fmi=3, name="giver",
+         step="v->r[1][0] += h * v->r[0][0]; v->r[1][1] -= 2 * h * v->r[0][0];")  # fmt: skip
+    tiny(tmp_path, [vector("q", "input"), V("y", "Float64", "output")], fmi=3, name="taker",
+         step="v->r[1][0] += v->r[0][0] + 10 * v->r[0][1];")  # fmt: skip
+    (tmp_path / "bench.toml").write_text(
+        'connections = ["giver.q -> taker.q"]\n'
+        '[instances]\ngiver = "giver.fmu"\ntaker = "taker.fmu"\n'
+    )
+    problem = _problem(tmp_path, "taker.y", "giver.u")
+    changed, adapters = attached(problem)
+    assert [a.at for a in adapters if a.role == "output"] == ["giver.q[1]", "giver.q[2]"]
+    plain, through = (simulator(p).simulate(p.nominal, "run") for p in (problem, changed))
+    assert plain[-1, 0] < -100.0
+    np.testing.assert_array_equal(through, plain)
+
+
 def _problem(folder: Path, signal: str, driven: str = "motor.u_set") -> Problem:
     """A problem on a system file, whose log says nothing."""
     (folder / "run.csv").write_text(
