@@ -22,6 +22,7 @@ from cosim.diagnose.foreign_words import placed, said
 from cosim.errors import UnitError
 from cosim.intake.fan_example import FAN_SOURCE, NOISE, Hidden, bench, write
 from cosim.system.toml import read_system
+from sources.distribution import contents
 from tests.cosim_fmus import slave
 from tests.problems import simulator
 from tests.tiny_fmus import V, tiny
@@ -204,6 +205,12 @@ def _problem(folder: Path, signal: str, driven: str = "motor.u_set") -> Problem:
         '[[run]]\nname = "run"\nfile = "run.csv"\npurpose = "identification"\n'
     )
     return read_problem(folder)
+
+
+def test_a_wheel_carries_what_the_example_asks_for(clean: Problem) -> None:
+    asked = set(contents.of_diagnosis(attached(clean)[0]))
+    assert "adapter/torque+viscous@inside" in asked
+    assert asked <= set(contents.of_diagnosis(contents.beside_foreign(clean.provider)))
 
 
 # -- words -----------------------------------------------------------------------------------------
