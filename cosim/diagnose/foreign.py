@@ -28,6 +28,7 @@ from ..fmu.description import Variable
 from ..spec.units import Unit, conversion, parse
 from ..system.system import Connection, System
 from ..system.toml import DeclaredConnection
+from .candidates import Catalogue
 
 COMPONENT = "adapter"
 EFFORTS = {"torque": ("N.m", "rad/s", "w"), "force": ("N", "m/s", "v")}
@@ -81,13 +82,13 @@ def foreigners(system: System) -> list[str]:
 def attached(problem: Problem) -> tuple[Problem, tuple[Adapter, ...]]:
     """The problem with adapters at the connections of foreign instances, and these.
 
-    Without a provider of variants, or without such instances, it is the problem itself.
+    Without a catalogue of effects, or without such instances, it is the problem itself.
 
     Not treated: values that are no floating-point numbers, and inputs that a log drives in another
     unit than their FMU's; nothing is attached there.
     """
     system = problem.system()
-    if problem.provider is None or not foreigners(system):
+    if not isinstance(problem.provider, Catalogue) or not foreigners(system):
         return problem, ()
     return _Attaching(problem, system).done()
 

@@ -44,6 +44,7 @@ def _of_laws(verdict: Verdict, known: Mapping[str, Adapter]) -> list[str]:
         ways = {_side(place, known) for place in (law.place, *others)}
         adapter, inside = known.get(law.component), _side(law.place, known)
         apart = sorted({p for p in others if _side(p, known) != inside})
+        it = "It" if len(verdict.laws) == 1 else f"{law.effect} at {law.place}"
         if len(ways) > 1:
             names = " or ".join(f"inside {name}" for name in sorted(ways - {""}))
             outside = " or outside" if "" in ways else ""
@@ -57,27 +58,33 @@ def _of_laws(verdict: Verdict, known: Mapping[str, Adapter]) -> list[str]:
             )
         elif inside:
             at = adapter.at if adapter else law.place
-            found.append(f"It lies inside {inside}, whose FMU has no sources: it shows at {at}.")
+            found.append(f"{it} lies inside {inside}, whose FMU has no sources: it shows at {at}.")
         elif adapter is not None:
-            found.append(f"It acts {adapter.where}; nothing is missing inside the FMU.")
+            found.append(f"{it} acts {adapter.where}, and not inside the FMU.")
         else:
             names = " and ".join(sorted({a.foreign for a in known.values()} - {""}))
-            found.append(f"It does not lie inside {names}.")
+            found.append(f"{it} lies outside {names}: nothing inside does the same.")
     return list(dict.fromkeys(found))
 
 
 def _of_force(located: Sequence[Place], known: Mapping[str, Adapter]) -> str:
     """A sentence on the free force."""
     clear = [p for p in located if max(c.explained for c in p.curves) >= CLEAR]
-    if not clear or not _side(clear[0].label, known):
+    near = [p for p in clear if p.evidence > clear[0].evidence - GATE]
+    sides = {_side(p.label, known) for p in near}
+    inside = " or ".join(sorted(sides - {""}))
+    if not inside:
         return ""
-    best = clear[0]
-    near = [p for p in clear[1:] if p.evidence > best.evidence - GATE]
-    inside, at = _side(best.label, known), known[best.instance].at
-    if any(_side(p.label, known) != inside for p in near):
-        labels = ", ".join(p.label for p in near)
-        return f"It lies inside {inside}, at {at}, or does the same at {labels}."
-    return f"It lies most likely inside {inside}, whose FMU has no sources: it shows at {at}."
+    labels = dict.fromkeys(known[p.instance].at if p.instance in known else p.label for p in near)
+    if len(sides) > 1:
+        return (
+            f"Whether it lies inside {inside}{' or outside' if '' in sides else ''}, these runs do "
+            f"not tell ({' or '.join(labels)}): measure what passes between."
+        )
+    return (
+        f"It lies most likely inside {inside}, whose FMU has no sources: it shows at "
+        f"{' and '.join(labels)}."
+    )
 
 
 def _place(label: str) -> str:

@@ -231,9 +231,9 @@ def named(place: str, *others: str, kind: str = "effect_found", rivals: Any = ()
             named("fan_tau.inside"),
             "It lies inside fan, whose FMU has no sources: it shows at fan.tau.",
         ),
-        (named("rotor.flange_a"), "It does not lie inside fan."),
-        (named("fan_w.value"), "It acts on the way of fan.w into fan; nothing is missing inside"),
-        (named("fan_tau_sensor.value"), "It acts in what is measured of fan.tau; nothing is"),
+        (named("rotor.flange_a"), "It lies outside fan: nothing inside does the same."),
+        (named("fan_w.value"), "It acts on the way of fan.w into fan, and not inside the FMU."),
+        (named("fan_tau_sensor.value"), "It acts in what is measured of fan.tau, and not inside"),
         (
             named("rotor.flange_a", "fan_tau.inside"),
             "Whether viscous lies inside fan or outside, these runs do not tell (rotor.flange_a or "
@@ -268,10 +268,11 @@ def test_a_free_force_says_whether_it_lies_inside() -> None:
     )  # fmt: skip
     assert said(verdict, [fan, rotor], ADAPTERS).startswith("It lies most likely inside fan")
     near = place("rotor.flange_a", 899.0)
-    assert said(verdict, [fan, near], ADAPTERS) == (
-        "It lies inside fan, at fan.tau, or does the same at rotor.flange_a."
+    open_ = (
+        "Whether it lies inside fan or outside, these runs do not tell (fan.tau or rotor.flange_a"
     )
-    assert said(verdict, [rotor, fan], ADAPTERS) == ""
+    assert said(verdict, [fan, near], ADAPTERS).startswith(open_)
+    assert said(verdict, [place("rotor.flange_a", 2e3), fan], ADAPTERS) == ""
     assert said(verdict, [place("fan_tau.inside", 900.0, 0.3)], ADAPTERS) == ""
 
 
@@ -328,7 +329,7 @@ def test_an_adapter_takes_a_signal_of_any_unit_and_others_do_not(clean: Problem)
     ("hidden", "place", "words"),
     [
         (Hidden(fan_viscous=2e-4), "fan_tau.inside", "It lies inside fan"),
-        (Hidden(motor_coulomb=0.006), "rotor.flange_a", "It does not lie inside fan"),
+        (Hidden(motor_coulomb=0.006), "rotor.flange_a", "It lies outside fan"),
         (Hidden(), "", ""),
     ],
     ids=["in the fan", "in the motor", "nowhere"],
