@@ -25,7 +25,7 @@ from ..calibrate.model import Model
 from ..calibrate.parts import Channel, MeasuredRun
 from ..calibrate.problem import Problem
 from ..fmu.description import Variable
-from ..spec.units import Unit, conversion, parse
+from ..spec.units import ANY, Unit, conversion, parse
 from ..system.system import Connection, System
 from ..system.toml import DeclaredConnection
 from .candidates import Catalogue
@@ -35,8 +35,6 @@ EFFORTS = {"torque": ("N.m", "rad/s", "w"), "force": ("N", "m/s", "v")}
 """Fidelities with a motion: their unit, that of the motion, and the input for it."""
 SIGNAL = "signal"
 """The fidelity for all others; it passes numbers on as they are."""
-UNIT = "any"
-"""What the fidelity calls the unit of its signal."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ class AdaptedProblem(Problem):
         return found.changed(
             parameters=[
                 replace(p, unit=self.units.get(p.targets[0][0].partition(".")[0], ""))
-                if p.unit == UNIT and p.role == "effect" else p
+                if p.unit == ANY and p.role == "effect" else p
                 for p in found.parameters
             ]
         )  # fmt: skip

@@ -257,12 +257,7 @@ class System:
             )
         if not (math.isfinite(factor) and math.isfinite(offset)):
             raise ConnectError(f"{what}: factor {factor} and offset {offset} must be finite")
-        if (
-            convert
-            and out.unit is not None
-            and into.unit is not None
-            and not self._any(source[1], target[1])
-        ):
+        if convert and out.unit is not None and into.unit is not None:
             try:
                 gain, shift = conversion(out.unit, into.unit)
             except UnitError as error:
@@ -271,14 +266,6 @@ class System:
                 shift = 0.0
             factor, offset = factor * gain, factor * shift + offset
         return Connection(source[1], target[1], factor, offset)
-
-    def _any(self, source: str, target: str) -> bool:
-        """Whether one end is a relay's that passes on values of whatever unit."""
-        return any(
-            self.unit(name) == "any"
-            and bool(self.members[name.partition(".")[0]].description.extra.get("relay"))
-            for name in (source, target)
-        )
 
     # -- looking up ------------------------------------------------------------------------------
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from cosim.spec import units
+
 from ..component import Component
 from ..model import Model
 from ..quantity import Quantity
 
 SX = Any
-UNIT = "any"
+UNIT = units.ANY
 """Of a signal whose unit is that of the value."""
 COMPONENT = Component(
     "adapter",

@@ -167,7 +167,9 @@ def test_a_log_drives_an_fmu_without_sources_through_its_adapter(
     (tmp_path / "bench.toml").write_text('[instances]\nvalve = "valve.fmu"\n')
     problem = _problem(tmp_path, "valve.y", "valve.cmd").changed(algorithm=algorithm)
     changed, adapters = attached(problem)
-    assert [(a.at, a.role) for a in adapters] == [("valve.cmd", "input"), ("valve.y", "sensor")]
+    assert [(a.at, a.role, a.unit) for a in adapters] == [
+        ("valve.cmd", "input", "V"), ("valve.y", "sensor", ""),
+    ]  # fmt: skip
     plain, through = (simulator(p).simulate(p.nominal, "run") for p in (problem, changed))
     assert plain[-1, 0] == pytest.approx(6.0 * 0.99, rel=1e-9)  # rounding of 990 steps
     np.testing.assert_array_equal(through, plain)
@@ -200,6 +202,7 @@ def _problem(folder: Path, signal: str, driven: str = "motor.u_set") -> Problem:
     )
     (folder / "dataset.toml").write_text(
         'system = "bench.toml"\nstep = 0.001\ntime = "t"\n'
+        '[columns]\nu = { unit = "V" }\n'
         f'[inputs]\n"{driven}" = "u"\n'
         f'[channels.w]\nsignal = "{signal}"\nsigma = 1.0\n'
         '[[run]]\nname = "run"\nfile = "run.csv"\npurpose = "identification"\n'
