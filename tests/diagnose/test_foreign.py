@@ -168,7 +168,7 @@ def test_a_log_drives_an_fmu_without_sources_through_its_adapter(
     problem = _problem(tmp_path, "valve.y", "valve.cmd").changed(algorithm=algorithm)
     changed, adapters = attached(problem)
     assert [(a.at, a.role, a.unit) for a in adapters] == [
-        ("valve.cmd", "input", "V"), ("valve.y", "sensor", ""),
+        ("valve.cmd", "input", ""), ("valve.y", "sensor", ""),
     ]  # fmt: skip
     plain, through = (simulator(p).simulate(p.nominal, "run") for p in (problem, changed))
     assert plain[-1, 0] == pytest.approx(6.0 * 0.99, rel=1e-9)  # rounding of 990 steps
