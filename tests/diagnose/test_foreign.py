@@ -19,6 +19,7 @@ from cosim.diagnose.facts import Law, Value
 from cosim.diagnose.foreign import Adapter, attached
 from cosim.diagnose.foreign_file import leave_system
 from cosim.diagnose.foreign_words import placed, said
+from cosim.diagnose.story.facts import Facts
 from cosim.errors import UnitError
 from cosim.intake.fan_example import FAN_SOURCE, NOISE, Hidden, bench, write
 from cosim.system.toml import read_system
@@ -257,6 +258,17 @@ def test_a_verdict_says_whether_it_lies_inside(verdict: Verdict, text: str) -> N
     found = said(verdict, [], ADAPTERS)
     assert found.startswith(text) if text else found == ""
     assert said(verdict, [], ()) == "", "systems of our own have no inside"
+
+
+def test_the_headline_names_both_sides_where_the_runs_do_not_tell() -> None:
+    adapters = {a.name: {"where": a.where} for a in ADAPTERS}
+    effect = {"effect": "viscous", "place": "fan_tau.inside", "text": "Viscous friction."}
+    one = Facts({"adapters": adapters})
+    both = {**effect, "other_places": ["viscous at rotor.flange_a", "rotor.flange_a"]}
+    assert one.places_in_words(effect) == "inside fan, at fan.tau"
+    assert one.places_in_words(both) == "inside fan, at fan.tau or at the flange a of the rotor"
+    plain = Facts({})
+    assert plain.places_in_words({**both, "place": "load.flange"}) == "at the flange of the load"
 
 
 def test_a_free_force_says_whether_it_lies_inside() -> None:

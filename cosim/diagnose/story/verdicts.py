@@ -64,7 +64,7 @@ def told(facts: Facts) -> Story:
 
 def named(facts: Facts, effect: Mapping[str, Any]) -> Html:
     """An effect with its place, in words."""
-    return join(inside(effect["text"]), ", ", facts.in_words(effect["place"]))
+    return join(inside(effect["text"]), ", ", facts.places_in_words(effect))
 
 
 def label(effect: str, place: str) -> Html:
@@ -91,10 +91,10 @@ def _meant(effect: str, text: str) -> Html:
     return join(advice().get(effect, {}).get("means", f"{sentence(text)}."))
 
 
-def _check(facts: Facts, effect: str, place: str) -> Html:
-    found = advice().get(effect, {}).get("check")
+def _check(facts: Facts, effect: Mapping[str, Any]) -> Html:
+    found = advice().get(effect["effect"], {}).get("check")
     what = found or "Look at this place of the machine and repeat the run that shows it most."
-    where = facts.in_words(place).removeprefix("at ")
+    where = facts.places_in_words(effect).removeprefix("at ")
     return join(tag("b", "Check"), " (", where, "): ", what)
 
 
@@ -185,7 +185,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     meaning.append(_before_after(facts))
     meaning += [same_traces(effect) for effect in effects]
     meaning += [join(facts.table.get("inside", "")), _left(facts)]
-    steps = [_check(facts, effect["effect"], effect["place"]) for effect in effects]
+    steps = [_check(facts, effect) for effect in effects]
     steps.append(
         join(tag("b", "Repair"), " what should not be there, or keep it and ", tag("b", "tell the "
              "model"), ".")
@@ -224,7 +224,7 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  facts.number("proposed_experiment", "distance"), " σ apart after calibration.")
         )  # fmt: skip
         steps.append(_again("with these runs added to the data set"))
-    steps += [_check(facts, e["effect"], e["place"]) for e in causes]
+    steps += [_check(facts, e) for e in causes]
     steps += _add(facts)
     return headline, _some(meaning), steps
 
