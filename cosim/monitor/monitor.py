@@ -18,7 +18,7 @@ from ..calibrate.parts import PURPOSE
 from ..calibrate.simulator import Simulator
 from ..diagnose.candidates import candidates
 from ..errors import InputError, UnknownNameError, listing
-from .changes import Detector
+from .detector import Detector
 from .evidence import Evidence
 from .patterns import Patterns, patterns, representatives, sorted_out
 from .result import Monitored

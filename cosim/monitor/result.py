@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..display.html import unit as shown_unit
-from .changes import Change, Found
+from .change import Change, Found
 from .patterns import Direction, Patterns
 from .series import Series
 

@@ -9,7 +9,7 @@ from ..display.document import document, links, section
 from ..display.html import Cell, Html, command, explained, join, number, table, tag, unit
 from ..files import write_text
 from ..monitor import Monitored
-from ..monitor.changes import Change
+from ..monitor.change import Change
 from ..monitor.result import VERDICTS, Chart
 
 TONES = {
