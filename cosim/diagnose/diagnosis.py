@@ -19,7 +19,7 @@ from ..errors import CosimError, ScenarioError, UnbuiltError
 from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
-from .exchange import reconsidered
+from .exchange import reconsidered, simplified
 from .experiment import propose
 from .facts import Table
 from .further import judged
@@ -28,6 +28,7 @@ from .linear import SampleStack
 from .localise import localise
 from .models import Fitted, is_open
 from .power import power
+from .regrouped import regrouped
 from .result import PURPOSES, Diagnosis
 from .rounds import Round
 from .search import ROUNDS, Search
@@ -37,8 +38,8 @@ from .verdict import above, decide, proposal
 from .whiteness import WhitenessTest, whiteness_tests
 
 TURNS = 4
-"""Times that a set is proposed: it is fitted to the end, asked what a free force would still
-explain, and may give way to another one once."""
+"""Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
+free force would still explain, and may give way to another one once."""
 
 
 def diagnose(
@@ -150,6 +151,10 @@ def _searched(
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     _judged(result, search, current)
+    if result.verdict == "unexplained" and search.rounds:
+        other = regrouped(search, search.rounds[0], result.located)
+        if other is not None:
+            _judged(result, search, other)
     assert result.after is not None
     if not search.lacking(result.after):
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)
@@ -174,9 +179,14 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     current = search.examined(current, candidates_of(rounds))
     declared = search.memo.get(frozenset())
     assert declared is not None
+    simple: set[frozenset[str]] = set()
+    known = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
     for _ in range(TURNS):
         if current.effects:
             search.memo.keep(current)
+            if current.labels not in simple:
+                simplified(search, current, known)
+                simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)
         if place is None:
