@@ -180,12 +180,12 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     declared = search.memo.get(frozenset())
     assert declared is not None
     simple: set[frozenset[str]] = set()
-    known = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
+    offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
     for _ in range(TURNS):
         if current.effects:
             search.memo.keep(current)
             if current.labels not in simple:
-                simplified(search, current, known)
+                simplified(search, current, offered)
                 simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)

@@ -14,8 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import CosimError
+from .candidates import Candidate
+from .composed import composed, freed
 from .evidence import sets_of
-from .exchange import freed
 from .late import LateFitter
 from .localise import Place
 from .models import GATE, Fitted, compare
@@ -53,27 +55,65 @@ def regrouped(search: LateFitter, stage: Round, places: Sequence[Place]) -> Fitt
     search.say(f"{len(pool)} laws at {places[0].label} and elsewhere, in sets of up to {SIZE}")
     best, beam, met = base, [base], set[frozenset[str]]()
     for size in range(1, SIZE + 1):
-        trials = []
-        for items, amplitudes, start in _next(search, stage, beam, pool):
-            labels = start.labels | {item.candidate.label for item in items}
-            if len(labels) == len(start.labels) or labels in met:
-                continue
-            met.add(labels)
-            found = together(search, start, items, amplitudes, again=False)
-            if found is not None:
-                found.gate = compare(search.check_data, base.check, found.check, search.checking)
-                trials.append(found)
-        trials.sort(key=lambda f: -search.total(base, f))
-        beam = [freed(search, search.sharpened(f, base, draft=True), base) for f in trials[:WIDTH]]
-        beam.sort(key=lambda f: -search.total(base, f))
+        beam = _grown(search, stage, beam, pool, met)
+        better = beam[:1]
+        if size > 1 and beam and search.lacking(beam[0]):
+            less = [f for e in beam[0].effects if (f := _without(search, beam[0], e, base))]
+            beam += _grown(search, stage, less, pool, met)
+            beam.sort(key=lambda f: -search.total(base, f))
         if not beam or search.gains(best, beam[0])[0] < GATE:
             break
-        best = beam[0]
+        best, beam = beam[0], beam[:WIDTH]
         names = " + ".join(c.label for c in best.effects)
-        search.say(f"{len(trials)} sets of {size}; the best: {names}")
+        swapped = ", swapped" if better != beam[:1] else ""
+        search.say(f"sets of {size}: {names} is the best{swapped}")
         if not search.lacking(best):
             break
     return search.sharpened(best, base) if best.effects else None
+
+
+def _grown(
+    search: LateFitter,
+    stage: Round,
+    starts: Sequence[Fitted],
+    pool: Sequence[Signature],
+    met: set[frozenset[str]],
+) -> list[Fitted]:
+    """The best sets of one effect more than those given, thoroughly fitted.
+
+    Args:
+        search: fits and judges.
+        stage: the first round.
+        starts: models.
+        pool: effects.
+        met: sets that were fitted; gets the new ones.
+    """
+    base, trials = stage.base, []
+    for items, amplitudes, start in _next(search, stage, starts, pool):
+        labels = start.labels | {item.candidate.label for item in items}
+        if len(labels) == len(start.labels) or labels in met:
+            continue
+        met.add(labels)
+        found = together(search, start, items, amplitudes, again=False)
+        if found is not None:
+            found.gate = compare(search.check_data, base.check, found.check, search.checking)
+            trials.append(found)
+    trials.sort(key=lambda f: -search.total(base, f))
+    found = [freed(search, search.sharpened(f, base, draft=True), base) for f in trials[:WIDTH]]
+    return sorted(found, key=lambda f: -search.total(base, f))
+
+
+def _without(search: LateFitter, fitted: Fitted, effect: Candidate, base: Fitted) -> Fitted | None:
+    """A model quickly fitted without one of its effects; None if it cannot be simulated."""
+    rest = tuple(e for e in fitted.effects if e != effect)
+    try:
+        problem = composed(search.raw, fitted, rest)
+        theta = np.array([fitted.estimate.values[name] for name in problem.names])
+        found = search.fitted(search.simulator.of(problem), theta, fitted.estimate)
+    except CosimError as error:
+        search.say(f"without {effect.label}: {error}")
+        return None
+    return search.again(found, replace(fitted, effects=rest), base)
 
 
 def _share(place: Place) -> float:
@@ -96,17 +136,17 @@ def _pool(stage: Round, place: Place) -> list[Signature]:
 
 
 def _next(
-    search: LateFitter, stage: Round, beam: Sequence[Fitted], pool: Sequence[Signature]
+    search: LateFitter, stage: Round, starts: Sequence[Fitted], pool: Sequence[Signature]
 ) -> Iterator[tuple[tuple[Signature, ...], tuple[float, ...], Fitted]]:
     """Effects to be added to the models of a size, with amplitudes: each of a pool, and pairs."""
     unknown = np.zeros(search.fitting.size, dtype=np.float32)
-    for start in beam:
+    for start in starts:
         for item in pool:
             # what it changes is known of the first model only
             known = start is stage.base and item.change.size
             one = item if known else replace(item, change=unknown)
             yield (one,), (item.score.amplitude or START,), start
-    if len(beam[0].effects) != 1:
+    if not starts or len(starts[0].effects) != 1:
         return
     for pair in [p for p in sets_of(stage.signatures, stage.residual) if len(p.items) > 1][:PAIRS]:
         yield pair.items, pair.amplitudes, stage.base
