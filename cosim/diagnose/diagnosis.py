@@ -28,7 +28,6 @@ from .linear import SampleStack
 from .localise import localise
 from .models import Fitted, is_open
 from .power import power
-from .regrouped import regrouped
 from .result import PURPOSES, Diagnosis
 from .rounds import Round
 from .search import ROUNDS, Search
@@ -151,10 +150,6 @@ def _searched(
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     _judged(result, search, current)
-    if result.verdict == "unexplained" and search.rounds:
-        other = regrouped(search, search.rounds[0], result.located)
-        if other is not None:
-            _judged(result, search, other)
     assert result.after is not None
     if not search.lacking(result.after):
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
-from .composed import composed, freed
+from .composed import composed
 from .fitter import QUICKLY
 from .judge import ALIKE, Judge
 from .late import LateFitter
@@ -120,7 +120,7 @@ def simplified(search: LateFitter, fitted: Fitted, known: Sequence[Candidate]) -
                 less = composed(search.raw, fitted, rest)
                 for probe in single(less, [candidate]):
                     trial = exchanged(search, present, unscored(probe), None, less, share=0.0)
-                    trial = freed(search, search.approached(trial, present, fitted), fitted)
+                    trial = search.approached(trial, present, fitted)
                     gain = search.gains(present, trial)[0]
                     search.say(f"{candidate.label}, a special case: {gain:+.1f} nats on all runs")
             except CosimError as error:

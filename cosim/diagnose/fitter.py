@@ -23,7 +23,8 @@ from .candidates import Candidate, new_parameters
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
-from .secant import patience
+from .secant import FLOOR, patience
+from .signature import Signature
 from .verdict import wanted
 
 Vector = NDArray[np.float64]
@@ -32,6 +33,13 @@ ITERATIONS = 6
 """Steps of a quick fit at most."""
 QUICKLY = 3e-2
 """Share of the cost beyond the noise's below which a fall ends a quick fit."""
+USUAL = 2.1
+"""Usual values of a strength (see `SearchHints.tries`) by a larger factor away from what its first
+order asks for are no places to begin."""
+EXACT = 0.1
+"""Share of a trial's strength by which the residual may ask for another one, and it is the same."""
+DOUBLINGS = 6
+"""Times at most that a strength to begin with is doubled."""
 SHARP = 0.01
 """Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
 AGAIN, BRINGS = 3, 0.1
@@ -141,6 +149,83 @@ class Fitter(Judge):
         if root is not None:
             matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
+
+    def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
+        """Fit the declared parameters and the effect's strength together.
+
+        Args:
+            base: model without the effect.
+            item: the effect.
+            again: from nominal values, too, where the base and a quick fit are far off.
+        """
+        problem = item.candidate.added_to(base.problem)
+        _, others = new_parameters(base.problem, problem)
+        value = item.value * (item.score.amplitude or 1.0)
+        value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
+        span = abs(value) or item.strength.span
+        least = item.strength.minimum
+        if item.strength.unit == "s":
+            least = FLOOR * item.strength.span
+            value = max(value, least)
+        moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p
+                 for p in problem.parameters]  # fmt: skip
+        problem = problem.with_parameters(moved)
+        held = [p for p in others if p.name != item.probe.second]
+        if held:
+            problem = problem.hold({p.name: item.fixed.get(p.name, p.nominal) for p in held})
+        simulator = base.simulator.of(problem).limited(patience(base.simulator))
+        root = self.fitting.root(self.fit_data - base.fit)
+        absorber = self.absorber(base, self.fitting, root)
+        residual = root * (self.fit_data - base.fit - item.score.amplitude * item.change)
+        shift = absorber.change(np.asarray(residual, dtype=np.float64)) * base.problem.scale
+        own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
+        starts = []
+        near = [v for v in item.strength.hints.tries if 1.0 / USUAL < v / value < USUAL]
+        if abs(item.score.amplitude - 1.0) > EXACT:
+            near.append(item.value)  # what was simulated: a steep law goes too far from there
+        for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
+                              *((1.0, v) for v in near)):  # fmt: skip
+            theta = problem.nominal
+            count = base.estimate.theta.size
+            theta[:count] = base.estimate.theta + factor * shift
+            theta[problem.index(item.strength.name)] = begun
+            if item.probe.second:
+                theta[problem.index(item.probe.second)] = item.second
+            starts.append(np.clip(theta, problem.lower, problem.upper))
+        try:
+            costs = [self.cost(simulator, theta) for theta in starts]
+            start = starts[int(np.argmin(costs))]
+            if is_open(base.estimate):
+                start = self._doubled(simulator, start, min(costs), item.strength.name)
+            result = self.fitted(simulator, start, base.estimate)
+            if again and self.far(base) and self.far(result):
+                kept = self.effects(base)
+                kept |= {name: float(starts[0][problem.index(name)]) for name in own}
+                anew = self.anew(simulator, kept, base)
+                if anew is not None and anew.estimate.robust < result.estimate.robust:
+                    result = anew
+        except CosimError as error:
+            self.say(f"{item.candidate.label} could not be refitted: {error}")
+            return None
+        result.effects = (*base.effects, item.candidate)
+        result.signature = item
+        return result
+
+    def _doubled(self, simulator: Simulator, theta: Vector, cost: float, name: str) -> Vector:
+        """A place to begin with a larger strength, as long as that is better.
+
+        First orders ask for too little of what shifts oscillations, such as play.
+        """
+        problem = simulator.problem
+        place = problem.index(name)
+        for _ in range(DOUBLINGS):
+            trial = theta.copy()
+            trial[place] = np.clip(2.0 * theta[place], problem.lower[place], problem.upper[place])
+            now = self.cost(simulator, trial)
+            if not now < cost - GATE:
+                break
+            theta, cost = trial, now
+        return theta
 
     @staticmethod
     def effects(fitted: Fitted) -> dict[str, float]:

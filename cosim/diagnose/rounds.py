@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .candidates import Candidate
 from .models import Fitted
 from .probes import Probe
 from .signature import Signature, unscored
-
-Vector = NDArray[np.float64]
 
 
 @dataclass
@@ -23,7 +18,6 @@ class Round:
         base: model that the round began with.
         signatures: scored candidates, best first.
         corrected: p value by label, corrected for their number.
-        residual: that they were scored against, without what calibration absorbs.
         aside: labels of those that one run ruled out.
         fitted: refitted candidates, best first.
         winner: accepted one.
@@ -38,7 +32,6 @@ class Round:
     base: Fitted
     signatures: list[Signature]
     corrected: dict[str, float]
-    residual: Vector = field(default_factory=lambda: np.zeros(0))
     aside: tuple[str, ...] = ()
     fitted: list[Fitted] = field(default_factory=list)
     winner: Fitted | None = None

@@ -30,7 +30,6 @@ from .rounds import Round
 from .secant import Bench, model_values
 from .shortlist import promising, remaining
 from .signature import Signature, merge, worthy
-from .together import together
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -217,7 +216,7 @@ class Search(LateFitter):
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         named |= {label: named[s.candidate.label] for s in signatures for label in s.same}
         signatures.sort(key=lambda s: -s.score.gain)
-        return Round(base, signatures, named, bench.residual, aside, probes=probes)
+        return Round(base, signatures, named, aside, probes=probes)
 
     def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.
@@ -350,8 +349,7 @@ class Search(LateFitter):
 
     def tried(self, start: Fitted, current: Round, item: Signature, *, again: bool) -> None:
         """Refit a candidate from a model's parameters and note what that gains."""
-        base = current.base
-        fitted = together(self, start, (item,), (item.score.amplitude,), again=again)
+        base, fitted = current.base, self.refit(start, item, again=again)
         if fitted is None:
             return
         fitted.p_value = current.corrected[item.candidate.label]
