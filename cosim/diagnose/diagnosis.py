@@ -20,7 +20,7 @@ from .adding import made_of
 from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
-from .exchange import reconsidered
+from .exchange import reconsidered, simplified
 from .experiment import propose
 from .facts import Table
 from .foreign import Adapter, attached
@@ -41,8 +41,8 @@ from .verdict import above, decide, proposal
 from .whiteness import WhitenessTest, whiteness_tests
 
 TURNS = 4
-"""Times that a set is proposed: it is fitted to the end, asked what a free force would still
-explain, and may give way to another one once."""
+"""Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
+free force would still explain, and may give way to another one once."""
 
 
 def diagnose(
@@ -185,9 +185,14 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     current = search.examined(current, candidates_of(rounds))
     declared = search.memo.get(frozenset())
     assert declared is not None
+    simple: set[frozenset[str]] = set()
+    offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
     for _ in range(TURNS):
         if current.effects:
             search.memo.keep(current)
+            if current.labels not in simple:
+                simplified(search, current, offered)
+                simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)
         if place is None:

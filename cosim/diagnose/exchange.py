@@ -8,6 +8,7 @@ are: each rival takes the effect's place in the last model, is refitted, and sta
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
+from .composed import composed
 from .fitter import QUICKLY
 from .judge import ALIKE, Judge
 from .late import LateFitter
-from .models import GATE, Fitted, absent, compare, more_general
+from .models import GATE, Fitted, compare, more_general
+from .probes import single
 from .rounds import Round
-from .signature import Signature
+from .signature import Signature, unscored
 
 Vector = NDArray[np.float64]
 NEARLY = 0.8
@@ -93,6 +96,35 @@ def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fit
             fitted = search.sharpened(present, stage.base)
         stage.compared = frozenset(fitted.effects)
     return fitted
+
+
+def simplified(search: LateFitter, fitted: Fitted, known: Sequence[Candidate]) -> None:
+    """Fit a set with the special case of each of its laws instead, from where its own fit ended.
+
+    The memo gets the fits, and the verdict decides. A special case that had its turn before the
+    rest of the set was known has a fit that ended elsewhere, which tells laws apart that the data
+    do not.
+
+    Args:
+        search: fits and judges.
+        fitted: the set, thoroughly fitted.
+        known: all candidates.
+    """
+    for effect in fitted.effects:
+        rest = tuple(e for e in fitted.effects if e != effect)
+        present = replace(fitted, effects=(*rest, effect), signature=None)
+        for candidate in known:
+            if candidate.place != effect.place or candidate.effect not in effect.contains:
+                continue
+            try:
+                less = composed(search.raw, fitted, rest)
+                for probe in single(less, [candidate]):
+                    trial = exchanged(search, present, unscored(probe), None, less, share=0.0)
+                    trial = search.approached(trial, present, fitted)
+                    gain = search.gains(present, trial)[0]
+                    search.say(f"{candidate.label}, a special case: {gain:+.1f} nats on all runs")
+            except CosimError as error:
+                search.say(f"{candidate.label} instead: {error}")
 
 
 def _wider(first: Fitted, second: Fitted) -> bool:
@@ -310,13 +342,13 @@ def exchanged(
         fitted: the model.
         item: what comes instead.
         known: a fit of that, for the values to begin with.
-        less: the problem without the last effect; if not given, that effect is held absent.
+        less: the problem without the last effect, if it is at hand.
         share: see `Effort`.
 
     Raises:
         CosimError: it cannot be simulated.
     """
-    less = less or fitted.problem.hold(absent(fitted, fitted.effects[-1]))
+    less = less or composed(search.raw, fitted, fitted.effects[:-1])
     whole = item.candidate.added_to(less)
     strengths, others = new_parameters(less, whole)
     names = {p.name for p in (*strengths, *others)}

@@ -122,14 +122,14 @@ class Batch:
         """
         try:
             if self.change in (None, self.members[0][0].change):
-                return _single(base, self.candidates)
+                return single(base, self.candidates)
             assert self.change is not None
             problem = base.with_effects(self.change)
             problem.system()
         except UnbuiltError:
             raise
         except CosimError:
-            return _single(base, self.candidates)
+            return single(base, self.candidates)
         found = [p for c, _ in self.members for p in _of(c, base, problem)]
         if self.whole is not None and len(found) == len(self.members):
             first = found[0]
@@ -163,7 +163,12 @@ def _of(candidate: Candidate, base: Problem, problem: Problem) -> list[Probe]:
     return [Probe(candidate, problem, own[0], (own[0].name,), mixed, seconds, mine)]
 
 
-def _single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
+def single(base: Problem, candidates: Sequence[Candidate]) -> list[Probe]:
+    """Each candidate in a system that has no other one more; those that fit nothing are left out.
+
+    Raises:
+        UnbuiltError: an FMU is missing and cannot be built.
+    """
     found = []
     for candidate in candidates:
         try:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import permutations
 
 from .answer import Hint, Verdict, over, percent
 from .facts import Force, Gain, Law, Left, Model, Table
@@ -226,12 +227,15 @@ def _elsewhere(table: Table, first: int, second: int) -> bool:
 
 
 def _one_answer(first: Model, second: Model) -> bool:
-    """Whether two sets differ by one law, and one has the other's, or a special case of it."""
+    """Whether two sets differ by laws of which each is one of the other's, or a case of it."""
     mine, other = _differ(first, second)
-    if len(mine) != 1 or len(other) != 1:
-        return False
-    one, two = mine[0], other[0]
-    return one.effect in (two.effect, *two.contains) or two.effect in one.contains
+    return len(mine) == len(other) > 0 and any(
+        all(
+            one.effect in (two.effect, *two.contains) or two.effect in one.contains
+            for one, two in zip(mine, order, strict=True)
+        )
+        for order in permutations(other)
+    )
 
 
 def _special(table: Table, place: int, able: Sequence[int]) -> int | None:

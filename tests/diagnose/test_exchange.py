@@ -79,7 +79,7 @@ def test_it_is_where_a_later_effect_has_joined(stage: tuple[Search, Round]) -> N
     """Once for each set of effects."""
     search, found = stage
     wrong = fitted(found, WRONG)
-    later = replace(wrong.effects[-1], effect="another")
+    later = replace(wrong.effects[-1], effect="unbalance")  # absent: nothing of it is fitted
     both = replace(wrong, effects=(*wrong.effects, later))
     found.winner, found.open, found.compared = wrong, False, frozenset()
     try:

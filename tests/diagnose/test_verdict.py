@@ -343,6 +343,19 @@ def test_a_law_and_its_special_case_are_one_answer(more: float) -> None:
     assert [x.effect for x in apart.laws] == ["bristle"]
 
 
+@pytest.mark.parametrize("special", [True, False])
+def test_sets_of_special_cases_are_one_answer_law_by_law(special: bool) -> None:
+    """Whichever place a law has in its set; a set with another law is a rival."""
+    simple = model(law(), law("unbalance"))
+    other = ("unbalance",) if special else ()
+    general = model(
+        law("cogging", own=3, contains=other), law("bristle", own=4, contains=("coulomb",))
+    )
+    found = decide(table(FAR, simple, general, alike=((1, 2),)))
+    assert found.kind == ("effect_found" if special else "confounded")
+    assert not special or [x.effect for x in found.laws] == ["coulomb", "unbalance"]
+
+
 @pytest.mark.parametrize(("known", "named"), [(False, "coulomb"), (True, "bristle")])
 def test_a_law_of_which_only_its_special_case_shows_is_that(known: bool, named: str) -> None:
     """Though it does a little better: of what is open, something always fits noise."""
