@@ -309,7 +309,8 @@ class Joined(MappedLogs):
         source = known(unit, where) if unit else None
         for name, factor in _targets(entry, where):
             if name.startswith(CLOCK):
-                check_clock(name, self.columns, where)
+                inputs = [target for target, _, _ in self.drivers()]
+                check_clock(name, self.columns, inputs, where)
             wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"

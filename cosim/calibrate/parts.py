@@ -22,8 +22,8 @@ COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
 CLOCK = "clock:"
-"""Begins the name of a target that is no variable of the system: `clock:CHANNEL`, how late the
-clock of a channel is [s]."""
+"""Begins the name of a target that is no variable of the system: `clock:CHANNEL` or `clock:INPUT`,
+how late the clock of a channel, or of the column that drives an input, is [s]."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Parameter:
     Attributes:
         name, unit, text: for people.
         nominal, minimum, maximum: start value and bounds.
-        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`.
+        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`, `clock:INPUT`.
         role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
         run: name of the only run that it concerns, "" for all.
         prior: standard deviation around the nominal value that is known beforehand, None if nothing

@@ -19,7 +19,8 @@ from ..data.segments import relative_pose
 from ..errors import FmuCallError
 from ..master.master import Master
 from ..master.session import Session
-from .parts import COINCIDENT, MeasuredRun, Sampler, Vector
+from .clocks import unknown
+from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
 
@@ -102,12 +103,14 @@ class Simulator:
         """
         problem = self.problem
         run = problem.run(run) if isinstance(run, str) else run
-        ran = self._ran(problem.values(theta, run), run)
+        late = problem.lateness(theta, run)
+        later = {name: -late[name] for name in run.inputs if late.get(name)}
+        ran = self._ran(problem.values(theta, run), run, later)
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
         place = {name: column for column, name in enumerate(ran.names)}
-        sampler, late = Sampler(run.times, ran.times), problem.lateness(theta, run)
+        sampler = Sampler(run.times, ran.times)
         read = np.column_stack(
             [
                 c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
@@ -117,14 +120,16 @@ class Simulator:
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)
-        return read
+        return unknown(run, problem.channels, late, read) if late else read
 
-    def _ran(self, values: dict[str, float], run: MeasuredRun) -> Ran:
+    def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
-        if (known := self._pool.ran(key, values, limit)) is not None:
+        which = values | {CLOCK + name: value for name, value in later.items()}
+        if (known := self._pool.ran(key, which, limit)) is not None:
             return known
         with self._lock:
             session = self._pool.take(key) or self.session(run)
+        session.shift(later)
         try:
             times, rows = session.run(values, limit=limit)
         except FmuCallError:
@@ -134,7 +139,7 @@ class Simulator:
             raise
         ran = Ran(session.names, times, rows, session.work, run.inputs)
         self._pool.give(key, session, run.inputs)
-        if self._pool.remember(key, values, ran):
+        if self._pool.remember(key, which, ran):
             with self._lock:
                 self.evaluations += 1
         return ran

@@ -164,7 +164,7 @@ class Fitter(Judge):
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
         span = abs(value) or item.strength.span
         least = item.strength.minimum
-        if item.strength.unit == "s":
+        if item.strength.unit == "s" and least >= 0.0:
             least = FLOOR * item.strength.span
             value = max(value, least)
         moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p
