@@ -1,7 +1,7 @@
 """Simulates a problem: with prepared sessions that are shared, in threads, within limits on work.
 
 Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
-nothing was measured.
+nothing was measured (see `clocks.apart` for what a late clock moves out of a run).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..data.segments import relative_pose
 from ..errors import FmuCallError
 from ..master.master import Master
 from ..master.session import Session
-from .clocks import unknown
+from .clocks import apart, known
 from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
@@ -95,7 +95,7 @@ class Simulator:
         )
 
     def simulate(self, theta: Vector, run: MeasuredRun | str) -> Vector:
-        """What the channels would read: one row per sample.
+        """What the channels would read: one row per sample, NaN where clocks have moved it out.
 
         Raises:
             StepError: an FMU failed, or the run exceeded its limit.
@@ -120,7 +120,7 @@ class Simulator:
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)
-        return unknown(run, problem.channels, late, read) if late else read
+        return known(run, problem.channels, late, read) if late else read
 
     def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
@@ -161,7 +161,7 @@ class Simulator:
         runs = self.problem.chosen(purpose)
         models = self.spread(lambda run: self.simulate(theta, run), runs)
         return [
-            (run.name, (run.data - model) / self.problem.sigma)
+            (run.name, apart(run, model, self.problem.sigma))
             for run, model in zip(runs, models, strict=True)
         ]
 

@@ -207,9 +207,10 @@ class Shifted:
         """Values at these times."""
         wanted, table = times - self.later, self.signal
         if not isinstance(table, Table):
-            return table.at(wanted)
+            values: Vector = table.at(wanted)
+            return values
         if table.interpolation == "linear":
-            return np.interp(wanted, table.times, table.values)
+            return np.asarray(np.interp(wanted, table.times, table.values))
         knots = table.times
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * table.values[:-1])])
 
