@@ -395,7 +395,9 @@ class Joined(MappedLogs):
             log.values,
             lead,
             anchor,
-        )
+            {t: abs(self.conversion(t, c, e)[0]) * self.input_noise(c, e)
+             for t, c, e in self.drivers()},
+        )  # fmt: skip
 
     def _measured(self, log: Log, channel: Channel) -> Vector:
         column = self.columns[channel.name]

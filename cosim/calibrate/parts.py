@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from ..data.signals import Signal
 from ..errors import ValueRangeError
 from ..fmu.description import Variable
 from ..spec.hints import NO_HINTS, SearchHints
+
+if TYPE_CHECKING:
+    from .input_noise import InputNoise
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]
@@ -196,6 +199,9 @@ class MeasuredRun:
         values: entries of the run in its description.
         lead: the simulation begins this much before the first sample [s].
         anchor: sample in whose frame relative poses are given.
+        noisy: driven input -> standard deviation of the noise with which it was logged, in the
+            input's unit.
+        noise: what that adds to residuals, None if nothing (`input_noise.propagated`).
     """
 
     name: str
@@ -207,6 +213,12 @@ class MeasuredRun:
     values: Mapping[str, Any] = field(default_factory=dict)
     lead: float = 0.0
     anchor: int = 0
+    noisy: Mapping[str, float] = field(default_factory=dict)
+    noise: InputNoise | None = None
+
+    def white(self, rows: Vector) -> Vector:
+        """Residuals, or derivatives of model values, over their noise, made white."""
+        return rows if self.noise is None else self.noise.white(rows)
 
 
 class Sensitivity(NamedTuple):

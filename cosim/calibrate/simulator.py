@@ -1,7 +1,8 @@
 """Simulates a problem: with prepared sessions that are shared, in threads, within limits on work.
 
 Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
-nothing was measured (see `clocks.apart` for what a late clock moves out of a run).
+nothing was measured (see `clocks.apart` for what a late clock moves out of a run). Where noise of
+logged inputs adds to them, they are made white (`input_noise`), and derivatives with them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..data.segments import relative_pose
+from ..data.signals import Signal
 from ..errors import FmuCallError
 from ..master.master import Master
 from ..master.session import Session
@@ -109,6 +111,34 @@ class Simulator:
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
+        return self._read(run, ran, late)
+
+    def driven(
+        self, theta: Vector, run: MeasuredRun, inputs: Sequence[Mapping[str, Signal]]
+    ) -> list[Vector]:
+        """What the channels would read with some other inputs each time, those not named as logged.
+
+        Raises:
+            StepError, ValueRangeError: as of `simulate`.
+        """
+        problem, late = self.problem, self.problem.lateness(theta, run)
+        session = self.session(run)
+        found = []
+        try:
+            for given in inputs:
+                session.drive(given)
+                times, rows = session.run(problem.values(theta, run))
+                ran = Ran(session.names, times, rows, session.work, run.inputs)
+                found.append(self._read(run, ran, late))
+        finally:
+            session.close()
+        with self._lock:
+            self.evaluations += len(found)
+        return found
+
+    def _read(self, run: MeasuredRun, ran: Ran, late: Mapping[str, float]) -> Vector:
+        """What the channels read of a simulated run."""
+        problem = self.problem
         place = {name: column for column, name in enumerate(ran.names)}
         sampler = Sampler(run.times, ran.times)
         read = np.column_stack(
@@ -155,14 +185,25 @@ class Simulator:
             return list(threads.map(function, items))
 
     def residuals(
-        self, theta: Vector, purpose: str | Iterable[str] | None = "identification"
+        self,
+        theta: Vector,
+        purpose: str | Iterable[str] | None = "identification",
+        *,
+        plain: bool = False,
     ) -> list[tuple[str, Vector]]:
-        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all)."""
+        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all).
+
+        Args:
+            theta: values.
+            purpose: see there.
+            plain: with what noise of the inputs adds, else made white (`input_noise`).
+        """
         runs = self.problem.chosen(purpose)
         models = self.spread(lambda run: self.simulate(theta, run), runs)
+        rows = [apart(run, model, self.problem.sigma) for run, model in zip(runs, models)]  # noqa: B905
         return [
-            (run.name, apart(run, model, self.problem.sigma))
-            for run, model in zip(runs, models, strict=True)
+            (run.name, row if plain else run.white(row))
+            for run, row in zip(runs, rows, strict=True)
         ]
 
     def close(self) -> None:

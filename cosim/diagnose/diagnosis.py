@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.deferred import step_error
+from ..calibrate.input_noise import propagated
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
@@ -70,6 +71,9 @@ def diagnose(
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
+    with threadpool_limits(1, user_api="blas"):
+        simulator, counted = propagated(simulator)
+    findings += counted
     search = Search(simulator, say, None if asked is None else [], without=without)
     search.prepare()
     try:
@@ -255,7 +259,7 @@ def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     theta = fitted.estimate.theta
     errors = step_error(simulator, theta, step)
     for name, residual in simulator.residuals(theta, None):
-        result.residuals[which, name] = residual + errors[name] / problem.sigma
+        result.residuals[which, name] = residual + whole[name].white(errors[name] / problem.sigma)
     simulator.close()
 
 

@@ -131,7 +131,9 @@ class Fitter(Judge):
         real = simulator.limited({}).of(problem)
         errors = step_error(real, theta, self.raw.step)
         values = {
-            name: (data[name] - errors[name]) / problem.sigma - residual
+            name: data[name] / problem.sigma
+            - problem.run(name).white(errors[name] / problem.sigma)
+            - residual
             for name, residual in real.residuals(theta, None)
         }
         return values

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
-from ..data.signals import Shifted
+from ..data.signals import Shifted, Signal
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
 from ..fmu.exchange import Block
 from ..fmu.library import WORK
@@ -175,12 +175,23 @@ class Session:
         if wanted == self._later:
             return
         outline = self._execution.outline
-        signals = {
-            name: Shifted(signal, wanted[name], outline.step) if name in wanted else signal
-            for name, signal in outline.signals.items()
-        }
-        self._run.external[:] = self.master.tabulate(signals, outline.times)
+        self.drive(
+            {
+                name: Shifted(outline.signals[name], value, outline.step)
+                for name, value in wanted.items()
+            }
+        )
         self._later = wanted
+
+    def drive(self, signals: Mapping[str, Signal]) -> None:
+        """Drive some inputs by other signals from the next run on, the others by their own.
+
+        Args:
+            signals: driven input, as the run has it -> what drives it.
+        """
+        outline = self._execution.outline
+        self._run.external[:] = self.master.tabulate({**outline.signals, **signals}, outline.times)
+        self._later = {}
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):
