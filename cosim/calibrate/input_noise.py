@@ -33,13 +33,14 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 NODES = 25
 """Moments of a run at which an input is moved; responses to others are interpolated."""
-BLOCKS = 300
-"""Columns of an input: samples are taken together by so many that there are no more. Their mean is
-kept exactly, and so is all that the model integrates from it."""
+BLOCKS = 150
+"""Columns of an input: samples are taken together, lest there be more. Their mean is kept exactly,
+and so is what the model integrates from it once they are over; what it does meanwhile (a bridge
+between both ends, of a sixth of their variance) counts as more noise of these samples."""
 LARGE = 10.0
 """Times its noise by which an input is moved: far above rounding, and still a small speed."""
-LEAST = 0.02
-"""Variance over the noise's along a direction below which it is not counted: 1 % of sigma."""
+LEAST = 0.1
+"""Variance over the noise's along a direction below which it is not counted: 5 % of sigma."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +48,34 @@ class InputNoise:
     """Directions of the residuals of a run along which noise of its inputs adds to them.
 
     Attributes:
-        factors: (samples, channels, directions) over sigma, 0 where nothing was measured.
+        basis: (samples, channels, directions) of unit length, 0 where nothing was measured.
+        variances: along them, over the noise's.
+        weights: of the samples, (samples, channels): less than 1 where directions leave something.
     """
 
-    factors: NDArray[np.float32]
-    _known: dict[int, tuple[NDArray[np.float32], Vector]] = field(default_factory=dict, repr=False)
+    basis: NDArray[np.float32]
+    variances: Vector
+    weights: NDArray[np.float32]
+    _known: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]] = field(
+        default_factory=dict, repr=False
+    )
+
+    @classmethod
+    def of(cls, factors: Vector, weights: Vector) -> InputNoise | None:
+        """Of the columns of A; None if they matter nowhere.
+
+        Args:
+            factors: (samples, channels, columns).
+            weights: of the samples.
+        """
+        # in float32 squares of the largest direction would hide the smallest
+        matrix = factors.reshape(-1, factors.shape[2])
+        values, vectors = np.linalg.eigh(matrix.T @ matrix)
+        kept = values > LEAST
+        if not np.any(kept):
+            return None
+        basis = (matrix @ (vectors[:, kept] / np.sqrt(values[kept]))).astype(np.float32)
+        return cls(basis.reshape(*factors.shape[:2], -1), values[kept], weights.astype(np.float32))
 
     def white(self, rows: Vector) -> Vector:
         """C^(-1/2) times residuals or derivatives; gaps stay.
@@ -60,20 +84,34 @@ class InputNoise:
             rows: (samples, channels) or (samples, channels, columns); of fewer samples where a run
                 was cut.
         """
-        basis, part = self._basis(rows.shape[0])
-        flat = np.nan_to_num(rows).reshape(basis.shape[0], -1)
-        flat = flat - basis @ (part[:, None] * (basis.T @ flat))
-        return np.where(np.isnan(rows), np.nan, flat.reshape(rows.shape))
+        basis, part = self._begun(rows.shape[0])
+        weights = self.weights[: rows.shape[0]]
+        even = rows * (weights if rows.ndim == 2 else weights[:, :, None])
+        flat = np.nan_to_num(even).reshape(basis.shape[0], -1)
+        # squares must fit float32, whose rounding is 1e-7 of the largest value
+        size = float(np.max(np.abs(flat), initial=0.0)) or 1.0
+        single = (flat / size).astype(np.float32)
+        taken = basis @ (part[:, None] * (basis.T @ single))
+        return np.asarray(even - size * taken.reshape(rows.shape), dtype=np.float64)
 
-    def _basis(self, size: int) -> tuple[NDArray[np.float32], Vector]:
-        """Directions of unit length, and what is taken off along each."""
+    def _begun(self, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Directions of the first samples, and what is taken off along each."""
         if size not in self._known:
-            matrix = self.factors[:size].reshape(-1, self.factors.shape[2])
-            values, vectors = np.linalg.eigh((matrix.T @ matrix).astype(np.float64))
-            kept = values > LEAST
-            sizes = values[kept]
-            basis = (matrix @ (vectors[:, kept] / np.sqrt(sizes))).astype(np.float32)
-            self._known[size] = basis, 1.0 - 1.0 / np.sqrt(1.0 + sizes)
+            whole: InputNoise | None = self
+            if size < self.basis.shape[0]:
+                factors = self.basis[:size] * np.sqrt(self.variances)
+                whole = InputNoise.of(
+                    factors.astype(np.float64), self.weights[:size].astype(np.float64)
+                )
+            if whole is None:
+                self._known[size] = (
+                    np.zeros((size * self.basis.shape[1], 0), np.float32),
+                    np.zeros(0, np.float32),
+                )
+            else:
+                part = 1.0 - 1.0 / np.sqrt(1.0 + whole.variances)
+                flat = whole.basis.reshape(-1, part.size)
+                self._known[size] = flat, part.astype(np.float32)
         return self._known[size]
 
 
@@ -116,31 +154,30 @@ def _noise(
         return None, {}
     channels = [c.name for c in simulator.problem.channels]
     parts, sizes = [], {}
+    beyond = np.zeros(run.data.shape)
     for target, sigma in run.noisy.items():
         table = run.inputs[target]
         if not isinstance(table, Table) or not sigma > 0.0:
             continue
-        part = _columns(simulator, run, target, table, sigma)
+        part, bridges = _columns(simulator, run, target, table, sigma)
+        beyond += bridges
         spread = np.sqrt(np.sum(part**2, axis=2))
         place = np.unravel_index(int(np.argmax(spread)), spread.shape)
         sizes[target] = float(spread[place]), channels[int(place[1])]
         parts.append(part)
     if not parts:
         return None, sizes
-    whole = np.concatenate(parts, axis=2)
-    shape = whole.shape
-    matrix = whole.reshape(-1, shape[2])
-    values, vectors = np.linalg.eigh(matrix.T @ matrix)
-    kept = vectors[:, values > LEAST]
-    if not kept.shape[1]:
-        return None, sizes
-    return InputNoise((matrix @ kept).astype(np.float32).reshape(*shape[:2], -1)), sizes
+    weights = 1.0 / np.sqrt(1.0 + beyond)
+    return InputNoise.of(np.concatenate(parts, axis=2) * weights[:, :, None], weights), sizes
 
 
 def _columns(
     simulator: Simulator, run: MeasuredRun, target: str, table: Table, sigma: float
-) -> Vector:
-    """What noise of one input adds to residuals: (samples, channels, blocks of its samples)."""
+) -> tuple[Vector, Vector]:
+    """What noise of one input adds to residuals: (samples, channels, blocks of its samples).
+
+    And the variance over the noise's of what these blocks leave of each sample.
+    """
     problem = simulator.problem
     count = int(np.searchsorted(table.times, run.times[-1], "right"))
     width = max(1, -(-count // BLOCKS))
@@ -171,7 +208,12 @@ def _columns(
             responses[low], responses[high], begins[nodes[low]], begins[nodes[high]],
             begins[block], share,
         )  # fmt: skip
-    return found
+    bridges = np.zeros(run.data.shape)
+    ends = np.append(begins[1:], run.times.size)
+    for block, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        last = found[min(end, run.times.size - 1), :, block]
+        bridges[begin:end] += last**2 * (1.0 - 1.0 / width**2) / 6.0
+    return found, bridges
 
 
 Between = Callable[[Vector, Vector, int, int, int, float], Vector]
