@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from ..data.signals import Signal
 from ..errors import ValueRangeError
 from ..fmu.description import Variable
 from ..spec.hints import NO_HINTS, SearchHints
-
-if TYPE_CHECKING:
-    from .input_noise import InputNoise
+from .whitening import InputNoise
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]

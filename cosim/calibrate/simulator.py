@@ -1,8 +1,8 @@
 """Simulates a problem: with prepared sessions that are shared, in threads, within limits on work.
 
 Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
-nothing was measured (see `clocks.apart` for what a late clock moves out of a run). Where noise of
-logged inputs adds to them, they are made white (`input_noise`), and derivatives with them.
+nothing was measured (see `reach.apart` for what a late clock moves out of a run). Where noise of
+logged inputs adds to them, they are made white (`whitening`), and derivatives with them.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..data.signals import Signal
 from ..errors import FmuCallError
 from ..master.master import Master
 from ..master.session import Session
-from .clocks import apart, known
 from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
+from .reach import apart, known
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -196,7 +196,7 @@ class Simulator:
         Args:
             theta: values.
             purpose: see there.
-            plain: with what noise of the inputs adds, else made white (`input_noise`).
+            plain: with what noise of the inputs adds, else made white (`whitening`).
         """
         runs = self.problem.chosen(purpose)
         models = self.spread(lambda run: self.simulate(theta, run), runs)
