@@ -128,7 +128,12 @@ class MappedLogs:
         if "sigma" in entry:
             return float(entry["sigma"])
         if column not in self._carried:
-            self._carried[column] = noise([log[column] for log in self.logs.values()]) or 0.0
+            # what is held changes at its own times
+            columns = [
+                log.own[column][1] if column in log.own else log[column]
+                for log in self.logs.values()
+            ]
+            self._carried[column] = noise(columns) or 0.0
         stated, quantum = self.noise.get(column, 0.0), float(entry.get("quantum", 0.0))
         found, known = self._carried[column], math.hypot(stated, COUNTED * quantum)
         evident = found > LOUD**0.5 * known
