@@ -91,7 +91,7 @@ def clocked(parameters: Iterable[Parameter]) -> set[str]:
 
 
 def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
-    """How late clocks were found to be, by the name of the parameter."""
+    """How late declared clocks were found to be, by the name of the parameter."""
     return {
         p.name: {
             "value": float(estimate.theta[i]),
@@ -101,7 +101,7 @@ def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
             "at_bound": p.name in estimate.at_bound,
         }
         for i, p in enumerate(estimate.problem.parameters)
-        if clocked([p])
+        if clocked([p]) and p.role != "effect"
     }
 
 

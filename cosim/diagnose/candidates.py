@@ -15,6 +15,8 @@ from ..system.variants import component
 
 LOG, DELAY = "log", "delay"
 """Where columns of the log are late, and what that is called: as the effect in the system."""
+SHOWS = "Late sensor or clock of what was logged."
+FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -140,7 +142,7 @@ def delays(problem: Problem) -> list[Candidate]:
         f"{name}.outputs": Shift(channels=tuple(few)) for name, few in gives.items() if few[1:]
     } | {f"{name}.inputs": Shift(inputs=tuple(few)) for name, few in takes.items() if few[1:]}
     return [
-        Candidate(LOG, LOG, DELAY, place, "Columns of the log that are late.", shift=shift)
+        Candidate(LOG, LOG, DELAY, place, FOLLOWS if shift.inputs else SHOWS, shift=shift)
         for place, shift in (single | groups).items()
     ]
 
