@@ -20,15 +20,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
-from scipy.stats import t as student
 
 from ..errors import FmuCallError
 from ..files import atomic
+from ..study.sensitivity import significance_limit
 from .estimate import Estimate
 from .simulator import Simulator
 
 Vector = NDArray[np.float64]
-LEVEL = 0.05
 
 
 @dataclass(frozen=True)
@@ -44,14 +43,6 @@ class Correlation:
     index: Mapping[str, float]
     limit: float
     samples: int
-
-
-def significance_limit(samples: int, parameters: int, level: float = LEVEL) -> float:
-    """Correlation that independent samples exceed with this probability for any parameter."""
-    if samples < 3:
-        return 1.0
-    quantile = float(student.ppf(1.0 - level / max(parameters, 1) / 2.0, samples - 2))
-    return quantile / math.sqrt(samples - 2 + quantile**2)
 
 
 def correlation_index(

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 SHOWN = 40
 """Runs that are printed one by one; of more, each variant gets a row."""
 SHOWN_FAILURES = 5
+SHOWN_INDICES = 8
+"""Results whose indices are printed, as many as are drawn."""
 
 
 def study_command(
@@ -143,6 +145,11 @@ def _print(result: StudyResult) -> None:
             made = [escape(_text(row.get(name))) for name in table.varied]
             printed.add_row(*made, "FAILED")  # the errors follow on stderr
     console.print(printed)
+    for item in result.sensitivities[:SHOWN_INDICES]:
+        console.print(escape(item.sentence()), soft_wrap=True)
+    if len(result.sensitivities) > SHOWN_INDICES:
+        left = len(result.sensitivities) - SHOWN_INDICES
+        console.print(f"indices of {left} more results are in sensitivity.csv")
     for path in result.files:
         console.print(str(path), soft_wrap=True)
 

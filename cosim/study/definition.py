@@ -22,7 +22,7 @@ KEYS = {
 }  # fmt: skip
 REFERENCE_KEYS = {"set", "param", "algorithm", "step"}
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
-METHODS = ("latin_hypercube", "random")
+METHODS = ("latin_hypercube", "random", "sobol", "morris")
 FINEST = "finest"
 MOST = 1_000_000
 """Values, repeats and samples of a study: at a millisecond each, a quarter of an hour."""
@@ -59,7 +59,13 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Sample:
-    """How many values of each distribution are drawn, and how."""
+    """How many values of each distribution are drawn, and how.
+
+    Attributes:
+        count: values; of `sobol` its base samples, of `morris` its trajectories.
+        method: one of `METHODS`.
+        seed: of the random numbers.
+    """
 
     count: int
     method: str = "latin_hypercube"
@@ -125,6 +131,11 @@ class Study:
     reference: ReferenceRun | None = None
     repeats: int = 1
     reuse: bool = True
+
+    @property
+    def sampled(self) -> dict[str, Distribution]:
+        """The parameters that are sampled."""
+        return {k: v for k, v in self.parameters.items() if isinstance(v, Distribution)}
 
 
 def read_study(path: Path | str) -> Study:
@@ -338,8 +349,15 @@ class _Reader:
             raise self.fail(f"[sample] method = {method!r} is not one of {', '.join(METHODS)}")
         if "count" not in table:
             raise self.fail("[sample] count is missing")
+        count = self.count("[sample] count", table["count"], 1)
+        if method == "sobol" and count & (count - 1):
+            below = 1 << (count.bit_length() - 1)
+            raise self.fail(
+                f"[sample] count = {count} is no power of 2, which a Sobol sequence needs to fill "
+                f"its space evenly; give {below} or {2 * below}"
+            )
         return Sample(
-            self.count("[sample] count", table["count"], 1),
+            count,
             method,
             self.count("[sample] seed", table.get("seed", 0), 0, 2**63 - 1),
         )

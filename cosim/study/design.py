@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +15,7 @@ from scipy.special import ndtr, ndtri
 
 from ..errors import ScenarioError
 from .definition import Algorithm, Distribution, Sample, Study
+from .global_designs import DESIGNS
 
 Vector = NDArray[np.float64]
 
@@ -41,19 +43,44 @@ class Point:
         return (self.scenario, tuple(self.variants.items()), str(self.algorithm), self.step)
 
 
-def draw(name: str, axis: Distribution, sample: Sample) -> list[float]:
-    """Values of a sampled parameter.
+def drawn(axes: Mapping[str, Distribution], sample: Sample) -> list[dict[str, float]]:
+    """Sampled values, one row per run of each variant.
 
-    Each parameter has random numbers of its own, from the seed and its name: another parameter in
-    the study leaves them as they are, and so does a larger count with method `random`.
+    With `latin_hypercube` and `random` each parameter has random numbers of its own, from the seed
+    and its name: another parameter in the study leaves them as they are, and so does a larger count
+    with `random`. `sobol` and `morris` draw all parameters together.
+
+    Raises:
+        InputError: `sobol` and `morris` need SALib.
+        ScenarioError: a distribution without ends, of which `morris` takes both.
     """
+    if sample.method in DESIGNS:
+        columns = DESIGNS[sample.method](sample, len(axes)).T
+    else:
+        columns = np.array([_alone(name, sample) for name in axes])
+    rows = zip(*(quantile(axes[n], u) for n, u in zip(axes, columns, strict=True)), strict=True)
+    found = [dict(zip(axes, map(float, row), strict=True)) for row in rows]
+    for name, axis in axes.items():
+        if not all(math.isfinite(row[name]) for row in found):
+            raise ScenarioError(
+                f"[param] {name}: {sample.method} takes both ends of a distribution, and normal = "
+                f"[{axis.first:g}, {axis.second:g}] has none; give minimum and maximum"
+            )
+    return found
+
+
+def _alone(name: str, sample: Sample) -> Vector:
+    """Probabilities of one parameter's values."""
     words = np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype=np.uint32)
     random = np.random.default_rng([sample.seed, *words.tolist()])
     if sample.method == "random":
-        u = random.random(sample.count)
-    else:
-        # one value in each of `count` equally probable intervals, in random order
-        u = (random.permutation(sample.count) + random.random(sample.count)) / sample.count
+        return random.random(sample.count)
+    # one value in each of `count` equally probable intervals, in random order
+    return (random.permutation(sample.count) + random.random(sample.count)) / sample.count
+
+
+def quantile(axis: Distribution, u: Vector) -> Vector:
+    """Values below which a distribution lies with given probabilities."""
     found: Vector
     if axis.kind == "uniform":
         found = axis.first + (axis.second - axis.first) * u
@@ -63,25 +90,21 @@ def draw(name: str, axis: Distribution, sample: Sample) -> list[float]:
         low, high = (ndtr((end - axis.first) / axis.second) for end in (axis.minimum, axis.maximum))
         found = axis.first + axis.second * ndtri(low + (high - low) * u)
         found = np.clip(found, axis.minimum, axis.maximum)  # rounding may leave the interval
-    return [float(value) for value in found]
+    return found
 
 
 def points(study: Study, scenarios: list[str]) -> list[Point]:
     """All points, without reference runs.
 
     Raises:
-        ScenarioError: lists of different lengths in a `zip`.
+        InputError: lists of different lengths in a `zip`; as of `drawn`.
     """
-    sampled = {k: v for k, v in study.parameters.items() if isinstance(v, Distribution)}
-    drawn: list[dict[str, float]] = [{}]
-    if study.sample is not None:
-        columns = [draw(name, axis, study.sample) for name, axis in sampled.items()]
-        drawn = [dict(zip(sampled, row, strict=True)) for row in zip(*columns, strict=True)]
+    samples = drawn(study.sampled, study.sample) if study.sample is not None else [{}]
     return [
         replace(point, scenario=scenario, parameters={**point.parameters, **values})
         for scenario in scenarios
         for point in _listed(study)
-        for values in drawn
+        for values in samples
     ]
 
 

@@ -173,7 +173,7 @@ class StudyPlan:
         tasks: by key, in the order of the study, reference runs that nobody asked for last.
         signals: what is compared with the reference runs.
         provider: where the FMUs are.
-        points: how many points the study has; more than tasks where some are the same run.
+        points: key of the run of each point of the study; some may be the same run.
         single: instances whose FMU allows one instance per process only.
     """
 
@@ -181,7 +181,7 @@ class StudyPlan:
     tasks: Mapping[str, Task]
     signals: tuple[str, ...]
     provider: Found
-    points: int
+    points: tuple[str, ...]
     single: tuple[str, ...] = ()
 
 
@@ -208,7 +208,7 @@ def plan_study(study: Study, provider: Provider | None) -> StudyPlan:
         reference = keys[len(asked) + index] if designed and compared else ""
         point = replace(everything[index], parameters=parameters)
         tasks[key] = Task(key, group, point, reference, designed, notes)
-    return StudyPlan(study, tasks, signals, found, len(asked), tuple(single))
+    return StudyPlan(study, tasks, signals, found, tuple(keys[: len(asked)]), tuple(single))
 
 
 def _scenarios(study: Study) -> dict[str, Scenario]:

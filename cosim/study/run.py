@@ -22,6 +22,8 @@ from .definition import Study, read_study
 from .parallel import in_threads, on_scheduler
 from .picture import plot
 from .planning import StudyPlan, Task, plan_study
+from .sensitivity import Sensitivity, sensitivities, write_csv
+from .sensitivity_picture import parallel, tornado
 from .store import Store
 from .table import StudyTable, tabulate
 
@@ -56,7 +58,8 @@ class StudyResult:
         computed, reused: runs that were made now, and at an earlier start.
         corrupt: result files that could not be used and were made again.
         notes: what was left out, and why.
-        files: table and plot.
+        sensitivities: what the spread of each sampled parameter does to the results.
+        files: tables and plots.
         wall_s: time that this start took [s].
     """
 
@@ -67,6 +70,7 @@ class StudyResult:
     reused: int
     corrupt: tuple[Path, ...]
     notes: tuple[str, ...]
+    sensitivities: tuple[Sensitivity, ...]
     files: tuple[Path, ...]
     wall_s: float
 
@@ -104,6 +108,7 @@ class StudyResult:
             "notes": list(self.notes),
             "units": {name: unit for name, unit in self.table.units.items() if unit},
             "variants": self.table.variants(),
+            "sensitivity": [row for item in self.sensitivities for row in item.rows()],
             "rows": self.table.rows,
             "files": [str(path) for path in self.files],
             "wall_s": self.wall_s,
@@ -140,7 +145,7 @@ def run_study(
         provider: where variants come from; as of `cosim.run`.
         progress: told after each run.
         warn: told about result files that cannot be used.
-        picture: plot error against cost into study.png.
+        picture: plot error against cost, and what sampled parameters do.
 
     Raises:
         InputError: the study is wrong; nothing was run.
@@ -190,7 +195,10 @@ def run_study(
         report()  # runs may have been kept since the last report
         raise
     table = tabulate(plan, store)
+    found = sensitivities(study, table, plan.points) if study.sample else []
     files = _write(study, folder, table, picture)
+    if study.sample:
+        files += _write_sensitivity(plan, folder, table, found, picture)
     return StudyResult(
         study=study,
         folder=folder,
@@ -199,6 +207,7 @@ def run_study(
         reused=len(plan.tasks) - len(missing),
         corrupt=tuple(store.corrupt),
         notes=tuple(notes),
+        sensitivities=tuple(found),
         files=tuple(files),
         wall_s=time.perf_counter() - started,
     )
@@ -219,9 +228,9 @@ def _missing(plan: StudyPlan, store: Store, retry: bool) -> tuple[list[Task], in
 
 def _notes(plan: StudyPlan) -> list[str]:
     notes = list(dict.fromkeys(note for task in plan.tasks.values() for note in task.notes))
-    same = plan.points - sum(task.designed for task in plan.tasks.values())
+    same = len(plan.points) - sum(task.designed for task in plan.tasks.values())
     if same:
-        notes.append(f"{same} of {plan.points} points are the same run as another one")
+        notes.append(f"{same} of {len(plan.points)} points are the same run as another one")
     return notes
 
 
@@ -236,6 +245,22 @@ def _write(study: Study, folder: Path, table: StudyTable, picture: bool) -> list
     if picture:
         files.append(folder / "study.png")
         plot(table, study.text or study.name, files[-1])
+    return files
+
+
+def _write_sensitivity(
+    plan: StudyPlan, folder: Path, table: StudyTable, found: list[Sensitivity], picture: bool
+) -> list[Path]:
+    files = []
+    title = plan.study.text or plan.study.name
+    if found:
+        files.append(write_csv(found, folder / "sensitivity.csv"))
+        if picture:
+            files.append(folder / "sensitivity.png")
+            tornado(found, title, files[-1])
+    lines = folder / "parallel.png"
+    if picture and parallel(plan.study, table, plan.points, title, lines):
+        files.append(lines)
     return files
 
 

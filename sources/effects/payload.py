@@ -13,12 +13,22 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 MASS = Quantity("mass", "kg", "mass, 0 = absent", start=5.0, minimum=0.0, strength=True)
-POSITION = Quantity("position", "m", "where it sits, from the reference point in body axes", size=3)
+POSITION = Quantity(
+    "position",
+    "m",
+    "where it sits, from the reference point in body axes",
+    size=3,
+    # a mass at the reference point does not tell where it sits; on either side it does, and what it
+    # does is nearly linear in the place: 0.2 m are a hand's length on an arm, half a base's radius
+    hints=SearchHints(tries=(-0.2, 0.2)),
+)
 
 EFFECT = Effect("payload", "Mass fixed to a body.", ("body",), MASS, source="mechanics")
 

@@ -16,7 +16,9 @@ from pathlib import Path
 from .readers import READERS, temporary
 
 LONGEST = 10.0
-"""[s] That an input may take."""
+"""[s] of processor time that an input may take."""
+SILENT = 12 * LONGEST
+"""[s] without an answer after which a worker is given up; a busy machine takes that long."""
 GOOD = ("read", "refused")
 _BATCH = 50
 """Inputs between looks at the clock."""
@@ -93,8 +95,7 @@ class Worker:
                 continue
             begun: int | None = None
             while first < last:
-                # a fresh worker imports first
-                line = self._line(LONGEST * (12 if begun is None else 1.5))
+                line = self._line(SILENT)
                 if not line:
                     number = first if begun is None else begun
                     first = self._lost(number, line is not None, statistics)
@@ -132,7 +133,7 @@ class Worker:
                 "the worker ends before its first answer, most likely as a reader refuses its good "
                 "files; run it by hand: python -m tests.fuzz.worker FOLDER 1"
             )
-        outcome = f"process ended with {code}" if died else f"took more than {LONGEST:g} s"
+        outcome = f"process ended with {code}" if died else f"no answer within {SILENT:g} s"
         statistics.add(number, outcome, LONGEST)
         self.close()
         return number + 1

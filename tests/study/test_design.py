@@ -12,11 +12,16 @@ from scipy.stats import kstest
 
 from cosim.errors import InputError, ScenarioError, UnknownNameError, ValueRangeError, VariantError
 from cosim.study import Distribution, Sample, read_study, study_from
-from cosim.study.design import draw, points, reference_of
+from cosim.study.design import drawn, points, reference_of
 
 
 def made(table: dict[str, Any]) -> list[Any]:
     return points(study_from({"scenario": "x", **table}), ["x"])
+
+
+def draw(name: str, axis: Distribution, sample: Sample) -> list[float]:
+    """Samples of one parameter."""
+    return [row[name] for row in drawn({name: axis}, sample)]
 
 
 def test_grid_combines_each_with_each() -> None:
@@ -166,8 +171,8 @@ def test_the_reference_run_is_like_the_run_but_for_what_is_said() -> None:
             r"minimum 2 is not below maximum 1",
         ),
         (
-            {"param": {"a.b": {"uniform": [0, 1]}}, "sample": {"count": 3, "method": "sobol"}},
-            r"\[sample\] method = 'sobol' is not one of latin_hypercube, random",
+            {"param": {"a.b": {"uniform": [0, 1]}}, "sample": {"count": 3, "method": "halton"}},
+            r"\[sample\] method = 'halton' is not one of latin_hypercube, random, sobol, morris",
         ),
         ({"algorithm": {"extrapolation": 1}}, r'algorithm .*: write "jacobi", or \{ name ='),
         ({"reference": "finest"}, r'reference "finest" needs a list of at least two steps'),
