@@ -21,6 +21,8 @@ from .schema import RUN, strict
 
 WHOLE = 0.25
 """Share of a count up to which noise is rounded off: half a count is two deviations and more."""
+FAINT = 1e-3
+"""Share of a column's deviation below which noise that nobody stated is taken for rounding."""
 COUNTED = (48620 / 12870 / 12) ** 0.5
 """Noise that differences of whole counts show over a count (`smooth.roughness`): each rounding is
 taken back by the next sample, so its differences are of one order more, sqrt(C(18, 9) / C(16, 8))
@@ -133,7 +135,9 @@ class MappedLogs:
                 log.own[column][1] if column in log.own else log[column]
                 for log in self.logs.values()
             ]
-            self._carried[column] = noise(columns) or 0.0
+            found = noise(columns) or 0.0
+            faint = found < FAINT * float(np.nanstd(np.concatenate(columns)))
+            self._carried[column] = 0.0 if faint else found
         stated, quantum = self.noise.get(column, 0.0), float(entry.get("quantum", 0.0))
         found, known = self._carried[column], math.hypot(stated, COUNTED * quantum)
         evident = found > LOUD**0.5 * known
