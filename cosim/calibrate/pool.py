@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..master.elsewhere import Elsewhere, Workers
 from ..master.session import RUNAWAY, Session
 from .parts import Vector
 
@@ -68,10 +69,17 @@ class SessionPool:
         self._lock = threading.Lock()
         self._ran: OrderedDict[tuple[Key, Hashable], Ran] = OrderedDict()
         self._size = 0
-        self._idle: dict[Key, list[tuple[object, Session]]] = {}
+        self._idle: dict[Key, list[tuple[object, Session | Elsewhere]]] = {}
         self._count = 0
+        self._elsewhere: dict[int, Workers] = {}
 
-    def take(self, key: Key) -> Session | None:
+    def elsewhere(self, count: int) -> Workers:
+        """Other processes that run sessions, the same for all who ask for as many."""
+        if count not in self._elsewhere:
+            self._elsewhere[count] = Workers(count)
+        return self._elsewhere[count]
+
+    def take(self, key: Key) -> Session | Elsewhere | None:
         """An idle session, if there is one; nobody else gets it until it is given back."""
         with self._lock:
             idle = self._idle.get(key)
@@ -80,7 +88,7 @@ class SessionPool:
             self._count -= 1
             return idle.pop()[1]
 
-    def give(self, key: Key, session: Session, inputs: object) -> None:
+    def give(self, key: Key, session: Session | Elsewhere, inputs: object) -> None:
         """Keep a session for later.
 
         Args:
@@ -88,7 +96,7 @@ class SessionPool:
             session: nobody uses it.
             inputs: what the key identifies, kept alive with it.
         """
-        surplus: list[Session] = []
+        surplus: list[Session | Elsewhere] = []
         with self._lock:
             idle = self._idle.pop(key, [])
             self._idle[key] = [*idle, (inputs, session)]  # the last one again
@@ -99,7 +107,7 @@ class SessionPool:
         for item in surplus:
             item.close()
 
-    def _taken(self, key: Key) -> list[tuple[object, Session]]:
+    def _taken(self, key: Key) -> list[tuple[object, Session | Elsewhere]]:
         found = self._idle.pop(key, [])
         self._count -= len(found)
         return found

@@ -12,13 +12,14 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..data.segments import relative_pose
 from ..data.signals import Signal
 from ..errors import FmuCallError
+from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
 from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
@@ -75,8 +76,22 @@ class Simulator:
         spans = (float(run.times[0]), float(run.times[-1]), interval, run.lead)
         return Key(self.problem.kind, (run.name, spans, id(run.inputs)))
 
+    def _prepared(self, run: MeasuredRun) -> Session | Elsewhere:
+        """A new prepared run; in other processes where an FMU holds Python's lock."""
+        if self.workers > 1 and locked(self.problem.plain()):
+            master, duration, options = self._planned(run)
+            return Elsewhere(
+                master.outline(duration, **options), self._pool.elsewhere(self.workers)
+            )
+        return self.session(run)
+
     def session(self, run: MeasuredRun) -> Session:
         """A new prepared run."""
+        master, duration, options = self._planned(run)
+        return Session(master, duration, **options)
+
+    def _planned(self, run: MeasuredRun) -> tuple[Master, float, dict[str, Any]]:
+        """Master, duration and options of a prepared run."""
         problem = self.problem
         master = Master(
             problem.plain(), problem.algorithm, problem.step, options=problem.chosen_options
@@ -87,13 +102,15 @@ class Simulator:
         first = float(run.times[0]) - run.lead
         last = float(run.times[-1]) + max(channel.shift for channel in problem.channels)
         count = math.ceil((last - first) / size - COINCIDENT)
-        return Session(
+        return (
             master,
             count * size,
-            inputs=run.inputs,
-            record=list(dict.fromkeys(channel.signal for channel in problem.channels)),
-            every=every,
-            start=first if abs(first) > COINCIDENT * interval else 0.0,
+            {
+                "inputs": run.inputs,
+                "record": list(dict.fromkeys(channel.signal for channel in problem.channels)),
+                "every": every,
+                "start": first if abs(first) > COINCIDENT * interval else 0.0,
+            },
         )
 
     def simulate(self, theta: Vector, run: MeasuredRun | str) -> Vector:
@@ -154,12 +171,18 @@ class Simulator:
 
     def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
+        if later:  # only sessions of this process can be driven by what is late
+            key = key._replace(run=(key.run, "late"))
         which = values | {CLOCK + name: value for name, value in later.items()}
         if (known := self._pool.ran(key, which, limit)) is not None:
             return known
         with self._lock:
-            session = self._pool.take(key) or self.session(run)
-        session.shift(later)
+            session = self._pool.take(key)
+            if later:
+                session = session if isinstance(session, Session) else self.session(run)
+                session.shift(later)
+            elif session is None:
+                session = self._prepared(run)
         try:
             times, rows = session.run(values, limit=limit)
         except FmuCallError:

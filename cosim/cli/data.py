@@ -141,14 +141,21 @@ def clock_line(topic: TopicReport) -> str:
 @data_app.command("example")
 def example_command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="To write.")],
+    fan: Annotated[
+        bool,
+        typer.Option("--fan", help="A motor with a fan, whose FMU is made of fan.py by pythonfmu."),
+    ] = False,
 ) -> None:
     """Write the logs of an example robot, and a system for it: CSV files, and ROS 2 bags.
 
     Example: `cosim data example robot`
     """
+    from ..intake import fan_example
     from ..intake.example import write
 
-    if not write(folder):
+    if fan:
+        fan_example.write(folder)
+    elif not write(folder):
         say("note: without bags, which need the library rosbags: pip install rosbags")
     print(folder)
 

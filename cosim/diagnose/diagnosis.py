@@ -16,12 +16,16 @@ from ..calibrate.input_noise import propagated
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
+from .adding import made_of
 from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
 from .exchange import reconsidered
 from .experiment import propose
 from .facts import Table
+from .foreign import Adapter, attached
+from .foreign_file import leave_system
+from .foreign_words import placed
 from .further import judged
 from .grey_box import Site, site, unnamed
 from .linear import SampleStack
@@ -59,14 +63,17 @@ def diagnose(
         workers: threads, one per core if not given.
         without: effects that are left out of the catalogue, to see what it says of data that have
             them: it should end with `unexplained`, or with laws that do the same.
-        law_at: make a law from the data there (`load.flange`), and do not ask the catalogue.
+        law_at: make a law from the data there (`load.flange`; `fan.tau` of an FMU without
+            sources), and do not ask the catalogue.
 
     Raises:
         CosimError: the declared system cannot be simulated, no effect of that name fits it, or no
             law can enter there.
         UnknownNameError: there is no such place.
     """
-    begun, asked = time.perf_counter(), site(problem, law_at) if law_at else None
+    begun = time.perf_counter()
+    problem, adapters = attached(problem)
+    asked = site(problem, placed(law_at, adapters)) if law_at else None
     simulator = Simulator(problem, workers=workers)
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
@@ -80,7 +87,7 @@ def diagnose(
         # threads of BLAS wait in loops, at the cost of simulations
         with threadpool_limits(1, user_api="blas"):
             base = search.calibrated()
-            return _searched(search, base, findings, out, say, begun, asked)
+            return _searched(search, base, findings, out, say, begun, asked, adapters)
     finally:
         search.close()
 
@@ -103,9 +110,11 @@ def _searched(
     say: Callable[[str], None],
     begun: float,
     asked: Site | None = None,
+    adapters: tuple[Adapter, ...] = (),
 ) -> Diagnosis:
     problem = search.raw
     result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
+    result.adapters = adapters
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
@@ -162,6 +171,8 @@ def _searched(
     _look_further(result)
     if out is not None and result.answer.laws:
         result.files += leave_fmus(problem, result.after.effects, out, result.warnings)
+        made = made_of(problem, result.after)
+        result.files += leave_system(problem, adapters, made, out, result.warnings)
     result.wall = time.perf_counter() - begun
     return result
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from ..calibrate.problem import Problem
 from .adding import made_of
 from .answer import Verdict
 from .facts import Table
+from .foreign import Adapter
+from .foreign_words import said
 from .further import Further
 from .grey_box import LawFromData
 from .localise import Place
@@ -51,6 +53,7 @@ class Diagnosis:
         bursts: times of sudden residuals of a model that is at the noise elsewhere, by run.
         files: written ones.
         findings: on the data.
+        adapters: at the connections of FMUs without sources.
     """
 
     problem: Problem
@@ -74,6 +77,7 @@ class Diagnosis:
     wall: float = 0.0
     warnings: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
+    adapters: tuple[Adapter, ...] = ()
 
     def _repr_html_(self) -> str:
         from .notebook import shown
@@ -88,9 +92,14 @@ class Diagnosis:
     @property
     def reason(self) -> str:
         """The verdict in sentences."""
-        parts = ["" if self.asked else self.answer.reason]
+        parts = ["" if self.asked else self.answer.reason, self.inside]
         parts += [self.law.reason] if self.law is not None else []
-        return " ".join(parts).strip() or self.answer.reason
+        return " ".join(part for part in parts if part) or self.answer.reason
+
+    @property
+    def inside(self) -> str:
+        """Whether what is missing lies inside an FMU without sources, "" if there is none."""
+        return "" if self.asked else said(self.answer, self.located, self.adapters)
 
     def rms(self, which: str, purpose: str) -> dict[str, float | None]:
         """Channel -> RMS residual in its unit over the runs of a purpose."""
@@ -121,6 +130,8 @@ class Diagnosis:
             "warnings": self.warnings,
             "findings": [finding.to_dict() for finding in self.findings],
             "model": made_of(self.problem, self.after),
+            "inside": self.inside,
+            "adapters": {a.name: {**asdict(a), "where": a.where} for a in self.adapters},
             "withheld": list(self.withheld),
             "localisation": [place.to_dict() for place in self.located],
             "law_from_data": None if self.law is None else self.law.to_dict(),

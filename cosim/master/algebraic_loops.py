@@ -128,6 +128,16 @@ def consistent(
     return rows
 
 
+def relayed(system: System, layout: Layout) -> Rows:
+    """Operations that bring what relays take to where they give it, in the order of feedthrough."""
+    position = {name: index for index, name in enumerate(layout.instances)}
+    rows: Rows = []
+    for name in system.order():
+        if system.members[name].description.extra.get("relay"):
+            rows += [*exchange(layout, position[name]), (Op.GET, position[name])]
+    return rows
+
+
 def reached(system: System, layout: Layout) -> bool:
     """Whether external inputs are passed on to fetched outputs at the same instant."""
     influences = _influences(system, layout)

@@ -32,6 +32,7 @@ from .execution import Execution
 from .initialization import initialize
 from .kernel.stepper import Compiled
 from .master import Master
+from .outline import Outline
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
@@ -71,9 +72,21 @@ class Session:
                 "the master of a Session", master, "a Master", "write Session(Master(system), 10.0)"
             )
         need_texts("targets of a Session", targets, 'targets=["load.J"]')
+        self.master = master
         outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
-        self.master, self.names, self.count = master, outline.observed, outline.count
-        self.times = outline.times[::every].copy()
+        self._prepare(outline, targets)
+
+    @classmethod
+    def of(cls, outline: Outline) -> Self:
+        """A session of a run that is outlined already; it has no `master`."""
+        found = cls.__new__(cls)
+        found._prepare(outline, ())
+        return found
+
+    def _prepare(self, outline: Outline, targets: Sequence[str]) -> None:
+        """Make what repetitions share."""
+        self.system, self.names, self.count = outline.system, outline.observed, outline.count
+        self.times = outline.times[:: outline.every].copy()
         self.targets = tuple(targets)
         self.work = 0
         self._later: dict[str, float] = {}
@@ -90,14 +103,14 @@ class Session:
             raise
 
     def _block(self, name: str) -> tuple[Block, Any]:
-        member, variables = self.master.system.variables(name)
-        position = list(self.master.system.members).index(member.name)
+        member, variables = self.system.variables(name)
+        position = list(self.system.members).index(member.name)
         whole = [member.description.whole(v.name) for v in variables]
         return Block(self._run.instances[position], whole), variables
 
     def _begin(self, name: str) -> list[Any]:
         """Values of an array as the system has them."""
-        member, (variable,) = self.master.system.variables(name)
+        member, (variable,) = self.system.variables(name)
         given = member.parameters.get(variable.name, variable.start)
         if len(given) != variable.size:
             raise ValueRangeError(f"{name} has no start values; set it as a whole")

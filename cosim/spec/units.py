@@ -45,8 +45,11 @@ def _powers(**exponents: int) -> Exponents:
 
 
 _ZERO = _powers()
+ANY = "any"
+"""Unit of what adapters pass on, whatever it is."""
 _SYMBOLS: dict[str, tuple[Exponents, float, float]] = {
     "1": (_ZERO, 1.0, 0.0),
+    ANY: (_ZERO, 1.0, 0.0),
     "%": (_ZERO, 0.01, 0.0),
     **{name: (_powers(**{name: 1}), 1.0, 0.0) for name in BASE},
     "N": (_powers(kg=1, m=1, s=-2), 1.0, 0.0),
@@ -126,11 +129,13 @@ def parse(symbol: str) -> Unit:
 
 
 def conversion(source: Unit, target: Unit) -> tuple[float, float]:
-    """Gain and offset of `target_value = gain * source_value + offset`.
+    """Gain and offset of `target_value = gain * source_value + offset`; 1 and 0 to or from `any`.
 
     Raises:
         UnitError: the two measure different things.
     """
+    if ANY in (source.symbol, target.symbol):
+        return 1.0, 0.0
     if source.exponents != target.exponents:
         raise UnitError(
             f"{source.symbol!r} (SI {source.dimension()}) does not convert into "

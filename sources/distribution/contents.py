@@ -26,7 +26,7 @@ from cosim.spec.variant import parse_name
 from cosim.study.definition import read_study
 from cosim.study.planning import plan_study
 from cosim.system.provider import Provider
-from cosim.system.toml import SystemFile, read_system
+from cosim.system.toml import DeclaredConnection, SystemFile, read_system
 from cosim.system.variants import apply, component
 from sources.model import ModelError
 from sources.packaging import catalog
@@ -105,6 +105,17 @@ def declared(mapping: Path, provider: Provider) -> Problem:
     """The declared system of a mapping as a problem without data."""
     file = find_system(mapping, str(read_mapping(mapping).get("system", "")))
     return Problem(mapping.parent.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
+
+
+def beside_foreign(provider: Provider) -> Problem:
+    """What stands beside an FMU without sources: the bench of the example, and all adapters."""
+    instances = {"motor": "bare_motor/winding", "rotor": "rotor/rigid"}
+    instances |= {name: f"adapter/{name}" for name in fidelities("adapter")}
+    wires = (
+        DeclaredConnection("motor.tau", "rotor.tau_a"), DeclaredConnection("rotor.w", "motor.w"),
+    )  # fmt: skip
+    file = SystemFile(places.scenarios(), "beside_foreign", "", instances, {}, wires)
+    return Problem(file.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
 
 
 def of_diagnosis(problem: Problem) -> list[str]:

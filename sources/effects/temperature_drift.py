@@ -46,6 +46,7 @@ EFFECT = Effect(
     ("rotation",),
     B,
     source="Bittencourt 2010",
+    contains=("viscous",),  # what has not begun to warm up
 )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from html import escape
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 
@@ -85,7 +85,7 @@ def _token(*contents: str) -> str:
 def component_json(variant: Variant) -> bytes:
     """`extra/cosim/component.json`: ports, balances and effects, for masters that look for them."""
     model, name = variant.model, variant.name
-    content = {
+    content: dict[str, Any] = {
         "variant": str(name),
         "component": name.component,
         "fidelity": name.fidelity,
@@ -119,6 +119,8 @@ def component_json(variant: Variant) -> bytes:
         content["left_out"] = [
             {"what": what, "amount": amount, "unit": unit} for what, amount, unit in model.left_out
         ]
+    if model.component.relay:
+        content["relay"] = True
     looks = model_scene(model, {entry.name for entry in variant.entries})
     if looks:
         content["scene"] = looks

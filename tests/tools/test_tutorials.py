@@ -9,13 +9,15 @@ import pytest
 
 from tests.tools.pages import MARK, ROOT, Page
 
-PAGES = sorted(
-    path for path in (ROOT / "docs").rglob("*.md") if MARK.search(path.read_text(encoding="utf-8"))
-)
+PAGES = [
+    path
+    for path in (ROOT / "README.md", ROOT / "sources/README.md", *sorted(ROOT.glob("docs/**/*.md")))
+    if MARK.search(path.read_text(encoding="utf-8"))
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_code_of_a_page_runs(path: Path, tmp_path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     page = Page(tmp_path)

@@ -53,6 +53,18 @@ class Facts:
             found = found[key]
         return found
 
+    def places_in_words(self, effect: Mapping[str, Any]) -> str:
+        """The place of an effect; with FMUs without sources, also where it would do the same."""
+        others = effect.get("other_places", ()) if self.table.get("adapters") else ()
+        places = [effect["place"], *(other.rpartition(" at ")[2] for other in others)]
+        return " or ".join(dict.fromkeys(map(self.in_words, places)))
+
+    def in_words(self, place: str) -> str:
+        """A place in words; of an adapter at an FMU without sources, where that is."""
+        instance = place.partition(".")[0]
+        adapter = self.table.get("adapters", {}).get(instance)
+        return str(adapter["where"]) if adapter else f"at {place_in_words(place)}"
+
     # -- printed ----------------------------------------------------------------------------------
 
     def _shown(self, printed: str, kind: str, path: Sequence[str | int], class_: str = "") -> Html:

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...calibrate.checks.finding import LASTING
 from ...display.html import Html, command, join, quantity, tag, words
-from .facts import Facts, inside, place_in_words, sentence
+from .facts import Facts, inside, sentence
 
 ADVICE = Path(__file__).parent / "advice.toml"
 LABELS = {
@@ -62,10 +62,9 @@ def told(facts: Facts) -> Story:
 # -- parts -----------------------------------------------------------------------------------------
 
 
-def named(effect: Mapping[str, Any]) -> Html:
+def named(facts: Facts, effect: Mapping[str, Any]) -> Html:
     """An effect with its place, in words."""
-    at = place_in_words(effect["place"])
-    return join(inside(effect["text"]), ", at ", at)
+    return join(inside(effect["text"]), ", ", facts.places_in_words(effect))
 
 
 def label(effect: str, place: str) -> Html:
@@ -92,10 +91,11 @@ def _meant(effect: str, text: str) -> Html:
     return join(advice().get(effect, {}).get("means", f"{sentence(text)}."))
 
 
-def _check(effect: str, place: str) -> Html:
-    found = advice().get(effect, {}).get("check")
+def _check(facts: Facts, effect: Mapping[str, Any]) -> Html:
+    found = advice().get(effect["effect"], {}).get("check")
     what = found or "Look at this place of the machine and repeat the run that shows it most."
-    return join(tag("b", "Check"), " (", place_in_words(place), "): ", what)
+    where = facts.places_in_words(effect).removeprefix("at ")
+    return join(tag("b", "Check"), " (", where, "): ", what)
 
 
 def _before_after(facts: Facts) -> Html:
@@ -144,6 +144,11 @@ def _add(facts: Facts) -> list[Html]:
     model, line = facts.at("model"), run_line(facts)
     if not model["variants"]:
         return []
+    if any(name in facts.table.get("adapters", {}) for name in model["variants"]):
+        return [join(
+            tag("b", "Add it to the model"), ": ", tag("code", "system.toml"), " beside this page "
+            "is your system with an adapter that carries it, and with all calibrated values.",
+        )]  # fmt: skip
     changes = words([tag("code", f'{n} = "{v}"') for n, v in model["variants"].items()])
     parts: list[object] = [
         tag("b", "Add it to the model"), ": write ", changes, " under ",
@@ -169,7 +174,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     effects = facts.effects
     several = len(effects) > 1
     items = [
-        join(named(effect), *([" – ", size(facts, n)] if size(facts, n) else []))
+        join(named(facts, effect), *([" – ", size(facts, n)] if size(facts, n) else []))
         for n, effect in enumerate(effects)
     ]
     headline = join(
@@ -179,8 +184,8 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     meaning = [_meant(effect["effect"], effect["text"]) for effect in effects]
     meaning.append(_before_after(facts))
     meaning += [same_traces(effect) for effect in effects]
-    meaning.append(_left(facts))
-    steps = [_check(effect["effect"], effect["place"]) for effect in effects]
+    meaning += [join(facts.table.get("inside", "")), _left(facts)]
+    steps = [_check(facts, effect) for effect in effects]
     steps.append(
         join(tag("b", "Repair"), " what should not be there, or keep it and ", tag("b", "tell the "
              "model"), ".")
@@ -192,8 +197,8 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
 
 def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     effects = facts.effects
-    first = words([named(effect) for effect in effects])
-    others = [named(rival) for rival in facts.rivals]
+    first = words([named(facts, effect) for effect in effects])
+    others = [named(facts, rival) for rival in facts.rivals]
     headline = join(
         "The machine has something that the model lacks, and these runs fit more than one "
         "explanation: ", first, "; or ", words(others, "or"), ".",
@@ -207,7 +212,7 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         join(label(e["effect"], e["place"]), ": ", _meant(e["effect"], e["text"])) for e in causes
     ]
     meaning += [same_traces(effect) for effect in effects]
-    meaning += [_before_after(facts), _left(facts)]
+    meaning += [join(facts.table.get("inside", "")), _before_after(facts), _left(facts)]
     steps = []
     proposal = facts.at("proposed_experiment")
     if proposal:
@@ -219,7 +224,7 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  facts.number("proposed_experiment", "distance"), " σ apart after calibration.")
         )  # fmt: skip
         steps.append(_again("with these runs added to the data set"))
-    steps += [_check(e["effect"], e["place"]) for e in causes]
+    steps += [_check(facts, e) for e in causes]
     steps += _add(facts)
     return headline, _some(meaning), steps
 
@@ -309,7 +314,7 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     headline = join(
         "The machine does something that neither the model nor the catalogue knows: the model "
         "misses ", tag("b", facts.worst), " by ", _misses(facts, "after"), " its sensor's noise",
-        join("; what is missing enters most likely at ", place_in_words(at)) if at else "", ".",
+        join("; what is missing enters most likely ", facts.in_words(at)) if at else "", ".",
     )  # fmt: skip
     meaning = [
         join("Calibration and every effect of the catalogue were tried; none explains what is left "
@@ -332,6 +337,7 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  tag("a", "places", href="#where"), "): the cause may lie elsewhere, or in several "
                  "places.")
         )  # fmt: skip
+    meaning.append(join(facts.table.get("inside", "")))
     steps = []
     hints = facts.table.get("hints") or []
     if hints:
@@ -341,7 +347,7 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         )  # fmt: skip
     if where is not None:
         steps.append(
-            join(tag("b", "Look"), " at ", place_in_words(at), ": what there depends on ",
+            join(tag("b", "Look"), " ", facts.in_words(at), ": what there depends on ",
                  tag("b", driver), "?")
         )  # fmt: skip
     steps += [

@@ -4,6 +4,7 @@
 
 First order in the communication step. An output with direct feedthrough is that of the held inputs,
 so a chain of n such instances delays a signal by n steps. Independent of the order of instances.
+Relays (adapters between two FMUs) are no such instances: their outputs are fetched anew at t_k.
 
 Options:
     extrapolation: order 1 or 2 lets continuous inputs follow the polynomial through the last
@@ -23,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ...system.system import System
-from ..algebraic_loops import consistent, find_loops, reached
+from ..algebraic_loops import consistent, find_loops, reached, relayed
 from ..extrapolation import factors, means, set_derivatives, side_by_side, without_parts
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 
@@ -43,6 +44,9 @@ def compile_plan(
     extrapolated, spans = means(system, layout, extrapolation)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
+    if extrapolation == 0:
+        passed = relayed(system, layout)
+        fresh = [*passed, *fresh, *(passed if fresh else ())]
     # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too
     again = extrapolation == 0 or reached(system, layout)
     step: list[tuple[int, ...]] = [(Op.EXTERNAL,), *(fresh if again else ()), (Op.RECORD,)]
