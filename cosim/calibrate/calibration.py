@@ -271,7 +271,7 @@ class _Finer:
         """Minus the model values over the noise, up to the data, by run."""
         simulator = self.simulator.of(self.simulator.problem.changed(step=step))
         try:
-            return dict(simulator.residuals(theta, None))
+            return dict(simulator.residuals(theta, None, plain=True))
         finally:
             self.evaluations += simulator.evaluations
             simulator.close()

@@ -1,43 +1,97 @@
-"""Clocks of channels that are late by what is estimated: targets `clock:CHANNEL` of a parameter."""
+"""Clocks of a log's columns that are late by what is estimated: targets `clock:NAME`.
+
+A late clock stamps t what was there at t - late. For a channel the comparison is shifted: it reads
+the simulated signal at t - late. A column that drives an input is read at t + late, so a late
+sensor that drives the model needs no future of the model. Both may be negative.
+
+The same quantity has two roles: declared, it is a parameter of the mapping; undeclared, it is the
+effect `delay` at a column of the log (`Shift`).
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnknownNameError, listing
+from ..spec.hints import SearchHints
 from .parts import CLOCK, Channel, Parameter
 
 if TYPE_CHECKING:
     from .estimate import Estimate
+    from .problem import Problem
 
 Vector = NDArray[np.float64]
+LONGEST, PART = 0.5, 0.25
+"""Longest delay that is looked for [s]: messages of robots are no older; and the share of the
+shortest run that it may be, lest hardly anything is left to compare."""
+SHORTEST, APART = 2e-3, 1.5
+"""Shortest delay that is tried on its own [s], and the factor from one to the next: between two, a
+signal of 1 / (pi delay) still keeps a cosine of 0.9 with what is tried."""
 
 
-def check_clock(target: str, channels: Iterable[str], where: str) -> None:
-    """Refuse the clock of a channel that does not exist.
+@dataclass(frozen=True)
+class Shift:
+    """A delay of columns of the log that nobody declared, of either sign.
+
+    Attributes:
+        channels: that read what was there so much earlier.
+        inputs: driven inputs that follow their columns so much later; negative where the columns
+            themselves are late.
+    """
+
+    channels: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+
+    def added_to(self, problem: Problem, prefix: str) -> Problem:
+        """The problem with the delay as a parameter, 0 at its nominal value.
+
+        Args:
+            problem: with these channels and inputs.
+            prefix: of the parameter's name.
+        """
+        reach = min(LONGEST, PART * min(float(run.times[-1]) for run in problem.runs))
+        count = max(1, math.ceil(math.log(reach / SHORTEST) / math.log(APART)))
+        sizes = [SHORTEST * (reach / SHORTEST) ** (k / count) for k in range(count + 1)]
+        targets = [(CLOCK + name, 1.0) for name in self.channels]
+        targets += [(CLOCK + name, -1.0) for name in self.inputs]
+        # held commands act at ticks of a rig that has them
+        lattice = problem.search.step if self.inputs and problem.ticks else 0.0
+        hints = SearchHints(tries=(*(-d for d in sizes), *sizes), lattice=lattice)
+        delay = Parameter(
+            prefix + "t_d", "s", 0.0, -reach, reach, tuple(targets), "effect", strength=True,
+            span=5.0 * SHORTEST, text="delay, 0 = absent", hints=hints,
+        )  # fmt: skip
+        return problem.with_parameters([*problem.parameters, delay])
+
+
+def check_clock(target: str, channels: Iterable[str], inputs: Iterable[str], where: str) -> None:
+    """Refuse the clock of what is neither a channel nor a driven input.
 
     Raises:
         UnknownNameError: with the nearest names.
     """
     name = target.removeprefix(CLOCK)
-    if name not in channels:
+    known = [*channels, *inputs]
+    if name not in known:
         raise UnknownNameError(
-            f"{where}: {target!r}: there is no channel {name!r} that is measured; "
-            f"{listing(channels, name)}"
+            f"{where}: {target!r}: there is no channel {name!r} that is measured, and no input of "
+            f"this name that a column drives; {listing(known, name)}"
         )
 
 
 def clocked(parameters: Iterable[Parameter]) -> set[str]:
-    """Channels whose clock a parameter sets."""
+    """Channels and inputs whose clock a parameter sets."""
     return {n.removeprefix(CLOCK) for p in parameters for n, _ in p.targets if n.startswith(CLOCK)}
 
 
 def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
-    """How late clocks were found to be, by the name of the parameter."""
+    """How late declared clocks were found to be, by the name of the parameter."""
     return {
         p.name: {
             "value": float(estimate.theta[i]),
@@ -47,12 +101,12 @@ def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
             "at_bound": p.name in estimate.at_bound,
         }
         for i, p in enumerate(estimate.problem.parameters)
-        if clocked([p])
+        if clocked([p]) and p.role != "effect"
     }
 
 
 def bounds(parameters: Iterable[Parameter], run: str) -> dict[str, tuple[float, float]]:
-    """Least and greatest lateness [s] of the clocks of a run, by channel."""
+    """Least and greatest lateness [s] of the clocks of a run, by channel or input."""
     found: dict[str, tuple[float, float]] = {}
     for p in parameters:
         if p.run not in ("", run):
@@ -74,16 +128,20 @@ def masked(
 ) -> Vector:
     """Measured values without those that a late clock may move out of what is simulated.
 
-    Else the number of residuals would depend on what is estimated.
+    Else the number of residuals would depend on what is estimated. Where a column that drives an
+    input is late, nothing counts once it has ended.
 
     Args:
         times: of the samples [s].
         data: one column per channel.
         channels: of the columns.
-        late: bounds of the lateness, by channel.
+        late: bounds of the lateness, by channel or input.
         begin: of the simulation [s].
     """
     data = data.copy()
+    names = {channel.name for channel in channels}
+    ahead = max((high for name, (_, high) in late.items() if name not in names), default=0.0)
+    data[times + ahead > times[-1]] = np.nan
     for index, channel in enumerate(channels):
         if channel.name in late:
             low, high = late[channel.name]

@@ -30,7 +30,7 @@ def step_error(simulator: Simulator, theta: Vector, step: float) -> dict[str, Ve
     factor, fine = (1.0, problem.step) if problem.ticks else (2.0, step / 2.0)
     # limits on time are those of another step
     coarse, exact = (
-        simulator.limited({}).of(problem.changed(step=size)).residuals(theta, None)
+        simulator.limited({}).of(problem.changed(step=size)).residuals(theta, None, plain=True)
         for size in (step, fine)
     )
     return {

@@ -96,7 +96,9 @@ def jacobian(
             if rough is not None and low and high:
                 bend = first + second - 2.0 * found[run.name, -1, 0.0][1]
                 rough[:, :, place] = bend / (high - low) / problem.sigma + gap
-        output.append(Sensitivity(run.name, np.array(mine, dtype=np.intp), values, rough))
+        rough = None if rough is None else run.white(rough)
+        columns_ = np.array(mine, dtype=np.intp)
+        output.append(Sensitivity(run.name, columns_, run.white(values), rough))
     return output
 
 
@@ -206,7 +208,7 @@ def directional(
         if first and second:
             bends[:, :, place] = (above + below - 2 * base) / (second - first) / problem.sigma
     back = directions.T / scale
-    return Sensitivity(run.name, columns, slopes @ back, bends @ back)
+    return Sensitivity(run.name, columns, run.white(slopes @ back), run.white(bends @ back))
 
 
 def _sides(

@@ -309,7 +309,8 @@ class Joined(MappedLogs):
         source = known(unit, where) if unit else None
         for name, factor in _targets(entry, where):
             if name.startswith(CLOCK):
-                check_clock(name, self.columns, where)
+                inputs = [target for target, _, _ in self.drivers()]
+                check_clock(name, self.columns, inputs, where)
             wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"
@@ -394,7 +395,9 @@ class Joined(MappedLogs):
             log.values,
             lead,
             anchor,
-        )
+            {t: abs(self.conversion(t, c, e)[0]) * self.input_noise(c, e)
+             for t, c, e in self.drivers()},
+        )  # fmt: skip
 
     def _measured(self, log: Log, channel: Channel) -> Vector:
         column = self.columns[channel.name]

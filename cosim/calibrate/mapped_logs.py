@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +14,19 @@ from ..data.logs import DataSet, Log, LoggedRun
 from ..data.segments import pieces, windows
 from ..errors import ScenarioError, listing
 from .checks.finding import Finding
+from .checks.smooth import LOUD, noise
 from .columns import apart, check_rising, expand, prepared
 from .parts import COINCIDENT
 from .schema import RUN, strict
 
+WHOLE = 0.25
+"""Share of a count up to which noise is rounded off: half a count is two deviations and more."""
+FAINT = 1e-3
+"""Share of a column's deviation below which noise that nobody stated is taken for rounding."""
+COUNTED = (48620 / 12870 / 12) ** 0.5
+"""Noise that differences of whole counts show over a count (`smooth.roughness`): each rounding is
+taken back by the next sample, so its differences are of one order more, sqrt(C(18, 9) / C(16, 8))
+times as large."""
 LONGEST = 5.0
 """Intervals between samples longer than this many usual ones are gaps in the inputs."""
 
@@ -49,6 +59,7 @@ class MappedLogs:
             column: sigma for name, sigma in data.noise.items() for column in expand(name)
         }
         self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
+        self._carried: dict[str, float] = {}
         self.logs: dict[str, Log] = {}
         self.purposes: dict[str, str] = {}
         lead = float(self.table.get("lead", 0.0))
@@ -107,6 +118,44 @@ class MappedLogs:
                 names = entry["columns"]
                 found += expand(names) if isinstance(names, str) else names
         return found
+
+    def input_noise(self, column: str, entry: Mapping[str, Any]) -> float:
+        """Standard deviation of the noise of a column that drives an input, in its unit.
+
+        As the mapping says it; else as the sheet does, unless the column evidently carries more. A
+        sheet's noise that rounding to counts takes off again is none.
+        """
+        if entry.get("interpolation") == "slope":
+            return 0.0  # what is integrated of it is the column itself, as noisy as it is
+        if "sigma" in entry:
+            return float(entry["sigma"])
+        if column not in self._carried:
+            # what is held changes at its own times
+            columns = [
+                log.own[column][1] if column in log.own else log[column]
+                for log in self.logs.values()
+            ]
+            found = noise(columns) or 0.0
+            faint = found < FAINT * float(np.nanstd(np.concatenate(columns)))
+            self._carried[column] = 0.0 if faint else found
+        stated, quantum = self.noise.get(column, 0.0), float(entry.get("quantum", 0.0))
+        found, known = self._carried[column], math.hypot(stated, COUNTED * quantum)
+        evident = found > LOUD**0.5 * known
+        if evident:
+            found = math.sqrt(found**2 - (COUNTED * quantum) ** 2)
+        sigma = found if evident else stated
+        if quantum:
+            sigma = math.hypot(sigma, quantum / 12**0.5) if sigma > WHOLE * quantum else 0.0
+        if not evident:
+            return sigma
+        unit = self.units.get(column, "")
+        text = (
+            f"drives an input and carries noise of about {found:.3g} {unit}, by its differences; "
+            "give its sigma in [inputs] if that is known"
+        )
+        if not any((f.kind, f.column) == ("input", column) for f in self.findings):
+            self.findings.append(Finding("note", "input", "", column, text))
+        return sigma
 
     def _unbroken(self, name: str, log: Log) -> Log:
         """The log up to the first gap in what drives the system.

@@ -13,6 +13,7 @@ from ..data.signals import Signal
 from ..errors import ValueRangeError
 from ..fmu.description import Variable
 from ..spec.hints import NO_HINTS, SearchHints
+from .whitening import InputNoise
 
 Vector = NDArray[np.float64]
 Role = Literal["declared", "nuisance", "effect"]
@@ -22,8 +23,8 @@ COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
 CLOCK = "clock:"
-"""Begins the name of a target that is no variable of the system: `clock:CHANNEL`, how late the
-clock of a channel is [s]."""
+"""Begins the name of a target that is no variable of the system: `clock:CHANNEL` or `clock:INPUT`,
+how late the clock of a channel, or of the column that drives an input, is [s]."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Parameter:
     Attributes:
         name, unit, text: for people.
         nominal, minimum, maximum: start value and bounds.
-        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`.
+        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`, `clock:INPUT`.
         role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
         run: name of the only run that it concerns, "" for all.
         prior: standard deviation around the nominal value that is known beforehand, None if nothing
@@ -196,6 +197,9 @@ class MeasuredRun:
         values: entries of the run in its description.
         lead: the simulation begins this much before the first sample [s].
         anchor: sample in whose frame relative poses are given.
+        noisy: driven input -> standard deviation of the noise with which it was logged, in the
+            input's unit.
+        noise: what that adds to residuals, None if nothing (`input_noise.propagated`).
     """
 
     name: str
@@ -207,6 +211,12 @@ class MeasuredRun:
     values: Mapping[str, Any] = field(default_factory=dict)
     lead: float = 0.0
     anchor: int = 0
+    noisy: Mapping[str, float] = field(default_factory=dict)
+    noise: InputNoise | None = None
+
+    def white(self, rows: Vector) -> Vector:
+        """Residuals, or derivatives of model values, over their noise, made white."""
+        return rows if self.noise is None else self.noise.white(rows)
 
 
 class Sensitivity(NamedTuple):

@@ -83,7 +83,7 @@ CHANNEL: dict[str, Check] = {
 }  # fmt: skip
 INPUT: dict[str, Check] = {
     "column": text, "columns": either("a column or a list of columns", text, texts),
-    "gain": number, "unit": text, "quantum": positive,
+    "gain": number, "unit": text, "quantum": positive, "sigma": at_least_zero,
     "interpolation": one_of("hold", "linear", "slope", "window"),
 }  # fmt: skip
 COLUMN: dict[str, Check] = {

@@ -1,7 +1,8 @@
 """Simulates a problem: with prepared sessions that are shared, in threads, within limits on work.
 
 Residuals are (measured - model) / sigma, one row per sample and one column per channel, NaN where
-nothing was measured.
+nothing was measured (see `reach.apart` for what a late clock moves out of a run). Where noise of
+logged inputs adds to them, they are made white (`whitening`), and derivatives with them.
 """
 
 from __future__ import annotations
@@ -16,13 +17,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..data.segments import relative_pose
+from ..data.signals import Signal
 from ..errors import FmuCallError
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
-from .parts import COINCIDENT, MeasuredRun, Sampler, Vector
+from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
+from .reach import apart, known
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -111,7 +114,7 @@ class Simulator:
         )
 
     def simulate(self, theta: Vector, run: MeasuredRun | str) -> Vector:
-        """What the channels would read: one row per sample.
+        """What the channels would read: one row per sample, NaN where clocks have moved it out.
 
         Raises:
             StepError: an FMU failed, or the run exceeded its limit.
@@ -119,12 +122,42 @@ class Simulator:
         """
         problem = self.problem
         run = problem.run(run) if isinstance(run, str) else run
-        ran = self._ran(problem.values(theta, run), run)
+        late = problem.lateness(theta, run)
+        later = {name: -late[name] for name in run.inputs if late.get(name)}
+        ran = self._ran(problem.values(theta, run), run, later)
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
+        return self._read(run, ran, late)
+
+    def driven(
+        self, theta: Vector, run: MeasuredRun, inputs: Sequence[Mapping[str, Signal]]
+    ) -> list[Vector]:
+        """What the channels would read with some other inputs each time, those not named as logged.
+
+        Raises:
+            StepError, ValueRangeError: as of `simulate`.
+        """
+        problem, late = self.problem, self.problem.lateness(theta, run)
+        session = self.session(run)
+        found = []
+        try:
+            for given in inputs:
+                session.drive(given)
+                times, rows = session.run(problem.values(theta, run))
+                ran = Ran(session.names, times, rows, session.work, run.inputs)
+                found.append(self._read(run, ran, late))
+        finally:
+            session.close()
+        with self._lock:
+            self.evaluations += len(found)
+        return found
+
+    def _read(self, run: MeasuredRun, ran: Ran, late: Mapping[str, float]) -> Vector:
+        """What the channels read of a simulated run."""
+        problem = self.problem
         place = {name: column for column, name in enumerate(ran.names)}
-        sampler, late = Sampler(run.times, ran.times), problem.lateness(theta, run)
+        sampler = Sampler(run.times, ran.times)
         read = np.column_stack(
             [
                 c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
@@ -134,14 +167,22 @@ class Simulator:
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)
-        return read
+        return known(run, problem.channels, late, read) if late else read
 
-    def _ran(self, values: dict[str, float], run: MeasuredRun) -> Ran:
+    def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
-        if (known := self._pool.ran(key, values, limit)) is not None:
+        if later:  # only sessions of this process can be driven by what is late
+            key = key._replace(run=(key.run, "late"))
+        which = values | {CLOCK + name: value for name, value in later.items()}
+        if (known := self._pool.ran(key, which, limit)) is not None:
             return known
         with self._lock:
-            session = self._pool.take(key) or self._prepared(run)
+            session = self._pool.take(key)
+            if later:
+                session = session if isinstance(session, Session) else self.session(run)
+                session.shift(later)
+            elif session is None:
+                session = self._prepared(run)
         try:
             times, rows = session.run(values, limit=limit)
         except FmuCallError:
@@ -151,7 +192,7 @@ class Simulator:
             raise
         ran = Ran(session.names, times, rows, session.work, run.inputs)
         self._pool.give(key, session, run.inputs)
-        if self._pool.remember(key, values, ran):
+        if self._pool.remember(key, which, ran):
             with self._lock:
                 self.evaluations += 1
         return ran
@@ -167,14 +208,25 @@ class Simulator:
             return list(threads.map(function, items))
 
     def residuals(
-        self, theta: Vector, purpose: str | Iterable[str] | None = "identification"
+        self,
+        theta: Vector,
+        purpose: str | Iterable[str] | None = "identification",
+        *,
+        plain: bool = False,
     ) -> list[tuple[str, Vector]]:
-        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all)."""
+        """(run, (measured - model) / sigma) for the runs of a purpose (or named, or all).
+
+        Args:
+            theta: values.
+            purpose: see there.
+            plain: with what noise of the inputs adds, else made white (`whitening`).
+        """
         runs = self.problem.chosen(purpose)
         models = self.spread(lambda run: self.simulate(theta, run), runs)
+        rows = [apart(run, model, self.problem.sigma) for run, model in zip(runs, models)]  # noqa: B905
         return [
-            (run.name, (run.data - model) / self.problem.sigma)
-            for run, model in zip(runs, models, strict=True)
+            (run.name, row if plain else run.white(row))
+            for run, row in zip(runs, rows, strict=True)
         ]
 
     def close(self) -> None:

@@ -61,6 +61,7 @@ def calibrate_command(
     from ..calibrate.checks.examine import examine
     from ..calibrate.checks.finding import passed
     from ..calibrate.checks.late import check_late
+    from ..calibrate.input_noise import propagated
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
@@ -74,6 +75,8 @@ def calibrate_command(
         stage = "checking the data"
         with display.watch("calibrating", lambda: f"{stage}: {simulator.evaluations} simulations"):
             findings = _usable(problem, examine(simulator))
+            simulator, counted = propagated(simulator)
+            findings += counted
             stage = "fitting"
             estimate, exchange = calibrated(simulator)
             findings += _usable(problem, passed(check_late(estimate), problem.source.allow))

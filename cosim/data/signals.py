@@ -186,6 +186,43 @@ class Table:
         return clock
 
 
+class Shifted:
+    """A signal that comes some time later, or earlier, than it says.
+
+    What is held is given as its mean over an interval, so that it follows the shift smoothly where
+    its steps lie between communication points. Beyond a table's ends its first and last value hold.
+
+    Args:
+        signal: which.
+        later: by so much [s]; negative for earlier.
+        interval: over which what is held is read, from the time that is asked for on [s].
+    """
+
+    def __init__(self, signal: Signal, later: float, interval: float) -> None:
+        self.signal, self.later, self.interval = signal, later, interval
+        self.unit = signal.unit
+        self.text = f"{signal.text}, {later:+.6g} s"
+
+    def at(self, times: Vector) -> Vector:
+        """Values at these times."""
+        wanted, table = times - self.later, self.signal
+        if not isinstance(table, Table):
+            values: Vector = table.at(wanted)
+            return values
+        if table.interpolation == "linear":
+            return np.asarray(np.interp(wanted, table.times, table.values))
+        knots = table.times
+        areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * table.values[:-1])])
+
+        def area(t: Vector) -> Vector:
+            before = np.minimum(t - knots[0], 0.0) * table.values[0]
+            after = np.maximum(t - knots[-1], 0.0) * table.values[-1]
+            return np.asarray(np.interp(t, knots, areas) + before + after)
+
+        mean: Vector = (area(wanted + self.interval) - area(wanted)) / self.interval
+        return mean
+
+
 def _exact(values: ArrayLike) -> list[Any]:
     """Values that doubles do not carry, as they are; none if doubles do."""
     items = values.tolist() if isinstance(values, np.ndarray) else values

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..calibrate.parts import CLOCK
 from ..calibrate.problem import Problem
 from ..installation import places
 from .models import Fitted
@@ -30,7 +31,8 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
     estimate = fitted.estimate
     for parameter, value in zip(estimate.problem.parameters, estimate.theta.tolist(), strict=True):
         if parameter.role != "nuisance" and not parameter.run:
-            table["values"].update(parameter.set(value))
+            own = parameter.set(value).items()
+            table["values"].update((n, v) for n, v in own if not n.startswith(CLOCK))
     return table
 
 

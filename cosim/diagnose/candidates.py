@@ -7,11 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
+from ..calibrate.clocks import Shift, clocked
 from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..calibrate.refinement import Refinement
 from ..system.variants import component
 
+LOG, DELAY = "log", "delay"
+"""Where columns of the log are late, and what that is called: as the effect in the system."""
+SHOWS = "Late sensor or clock of what was logged."
+FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -47,6 +52,7 @@ class Candidate:
         effect, port: of the catalogue.
         text: one line about the effect.
         refinement: the fidelity that it stands for, None for an effect.
+        shift: the delay of columns of the log that it stands for, None for what is in the system.
         contains: effects that its law becomes for some values of its parameters.
     """
 
@@ -56,6 +62,7 @@ class Candidate:
     port: str
     text: str = ""
     refinement: Refinement | None = None
+    shift: Shift | None = None
     contains: tuple[str, ...] = field(default=(), compare=False)
 
     @property
@@ -75,13 +82,17 @@ class Candidate:
 
     @property
     def change(self) -> dict[str, str]:
-        """As of `cosim run --set`."""
+        """As of `cosim run --set`; nothing for a delay of the log's columns."""
+        if self.shift is not None:
+            return {}
         if self.refinement is not None:
             return {self.instance: self.refinement.fidelity}
         return {self.instance: f"+{self.effect}@{self.port}"}
 
     def added_to(self, problem: Problem) -> Problem:
         """The problem on the system with this effect, which is absent at the nominal values."""
+        if self.shift is not None:
+            return self.shift.added_to(problem, self.prefix)
         if self.refinement is not None:
             return self.refinement.added_to(problem, self.instance)
         return problem.with_effects(self.change)
@@ -105,7 +116,35 @@ def candidates(problem: Problem) -> list[Candidate]:
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
-    return found
+    return found + delays(problem)
+
+
+def delays(problem: Problem) -> list[Candidate]:
+    """Delays of columns of the log: of each alone, and of all that one instance gives or takes.
+
+    What a mapping declares is not asked again. Elements of a vector come in one message.
+    """
+    declared = clocked(problem.parameters)
+    gives: dict[str, list[str]] = {}
+    takes: dict[str, list[str]] = {}
+    single: dict[str, Shift] = {}
+    for channel in problem.channels:
+        if channel.name not in declared:
+            gives.setdefault(channel.signal.partition(".")[0], []).append(channel.name)
+            if not channel.signal.endswith("]"):
+                single[channel.name] = Shift(channels=(channel.name,))
+    for target in dict.fromkeys(name for run in problem.runs for name in run.inputs):
+        if target not in declared:
+            takes.setdefault(target.partition(".")[0], []).append(target)
+            if not target.endswith("]"):
+                single[target] = Shift(inputs=(target,))
+    groups = {
+        f"{name}.outputs": Shift(channels=tuple(few)) for name, few in gives.items() if few[1:]
+    } | {f"{name}.inputs": Shift(inputs=tuple(few)) for name, few in takes.items() if few[1:]}
+    return [
+        Candidate(LOG, LOG, DELAY, place, FOLLOWS if shift.inputs else SHOWS, shift=shift)
+        for place, shift in (single | groups).items()
+    ]
 
 
 def balances(problem: Problem) -> dict[tuple[str, str], str]:

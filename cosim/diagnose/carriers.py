@@ -21,7 +21,7 @@ def leave_fmus(
     for item in effects:
         model = model.changed(item.change)
     files = []
-    for name in dict.fromkeys(item.instance for item in effects):
+    for name in dict.fromkeys(n for item in effects for n in item.change):
         try:
             source = locate(model.instances[name], problem.provider)
         except CosimError as error:

@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
-from ..calibrate.checks.late import check_late
 from ..calibrate.deferred import step_error
+from ..calibrate.input_noise import propagated
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
@@ -78,16 +78,15 @@ def diagnose(
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
+    with threadpool_limits(1, user_api="blas"):
+        simulator, counted = propagated(simulator)
+    findings += counted
     search = Search(simulator, say, None if asked is None else [], without=without)
     search.prepare()
     try:
         # threads of BLAS wait in loops, at the cost of simulations
         with threadpool_limits(1, user_api="blas"):
             base = search.calibrated()
-            late = passed(check_late(base.estimate), problem.source.allow)
-            findings += late
-            if any(f.severity == "error" for f in late):
-                return _refused(problem, findings, begun)
             return _searched(search, base, findings, out, say, begun, asked, adapters)
     finally:
         search.close()
@@ -276,7 +275,7 @@ def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
     theta = fitted.estimate.theta
     errors = step_error(simulator, theta, step)
     for name, residual in simulator.residuals(theta, None):
-        result.residuals[which, name] = residual + errors[name] / problem.sigma
+        result.residuals[which, name] = residual + whole[name].white(errors[name] / problem.sigma)
     simulator.close()
 
 

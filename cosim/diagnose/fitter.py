@@ -131,7 +131,9 @@ class Fitter(Judge):
         real = simulator.limited({}).of(problem)
         errors = step_error(real, theta, self.raw.step)
         values = {
-            name: (data[name] - errors[name]) / problem.sigma - residual
+            name: data[name] / problem.sigma
+            - problem.run(name).white(errors[name] / problem.sigma)
+            - residual
             for name, residual in real.residuals(theta, None)
         }
         return values
@@ -164,7 +166,7 @@ class Fitter(Judge):
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
         span = abs(value) or item.strength.span
         least = item.strength.minimum
-        if item.strength.unit == "s":
+        if item.strength.unit == "s" and least >= 0.0:
             least = FLOOR * item.strength.span
             value = max(value, least)
         moved = [replace(p, span=span, minimum=least) if p.name == item.strength.name else p

@@ -96,6 +96,8 @@ def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:
     """
     model = problem.model
     for item in fitted.effects:
+        if item.shift is not None:
+            continue
         if raw.instances[item.instance] != problem.instances.get(item.instance):
             raise VariantError(
                 f"{problem.file.path}: {item.label} was found on {item.instance} = "

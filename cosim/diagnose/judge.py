@@ -173,7 +173,7 @@ class Judge:
         """
         last = other.signature.strength if other.signature is not None else None
         tick = self.raw.step if self.raw.ticks else 0.0
-        if last is not None and last.unit == "s" and other.estimate.values[last.name] < tick:
+        if last is not None and last.unit == "s" and abs(other.estimate.values[last.name]) < tick:
             return False
         return any(
             stack.largest(second - first) > MATERIAL

@@ -65,8 +65,11 @@ class Probe:
 
     @property
     def scanned(self) -> bool:
-        """Whether all usual values of its strength are tried: a spring, whose mass oscillates."""
-        return self.candidate.refinement is not None and bool(self.strength.hints.tries)
+        """Whether all usual values of its strength are tried: a spring, whose mass oscillates, or a
+        delay, beyond which signals oscillate.
+        """
+        added = self.candidate.refinement or self.candidate.shift
+        return added is not None and bool(self.strength.hints.tries)
 
     @property
     def mix(self) -> Mix:
@@ -191,7 +194,7 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
     known = balances(problem)
     for c in candidates:
         part = element_of(c.port)
-        if c.refinement is not None:
+        if c.refinement is not None or c.shift is not None:
             result.append(Batch(None, ((c, None),)))
         elif part and (c.instance, c.effect, part[0]) in ports:
             key = (c.instance, c.effect, part[0])

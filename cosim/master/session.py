@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
+from ..data.signals import Shifted, Signal
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
 from ..fmu.exchange import Block
 from ..fmu.library import WORK
@@ -88,6 +89,7 @@ class Session:
         self.times = outline.times[:: outline.every].copy()
         self.targets = tuple(targets)
         self.work = 0
+        self._later: dict[str, float] = {}
         self._stack = ExitStack()
         try:
             self._execution = Execution(outline, self._stack)
@@ -174,6 +176,35 @@ class Session:
             raise self._execution.stopped(error, keep=False) from error
         self.work = self._steps_of_solvers() - begun + self.count * len(run.instances)
         return run.recorded_times(), run.rows[: run.row].copy()
+
+    def shift(self, later: Mapping[str, float]) -> None:
+        """Let inputs come later than their signals say, from the next run on (see `Shifted`).
+
+        Args:
+            later: driven input, as the run has it -> by how much [s], negative for earlier; those
+                that are not named come in time.
+        """
+        wanted = {name: value for name, value in later.items() if value}
+        if wanted == self._later:
+            return
+        outline = self._execution.outline
+        self.drive(
+            {
+                name: Shifted(outline.signals[name], value, outline.step)
+                for name, value in wanted.items()
+            }
+        )
+        self._later = wanted
+
+    def drive(self, signals: Mapping[str, Signal]) -> None:
+        """Drive some inputs by other signals from the next run on, the others by their own.
+
+        Args:
+            signals: driven input, as the run has it -> what drives it.
+        """
+        outline = self._execution.outline
+        self._run.external[:] = self.master.tabulate({**outline.signals, **signals}, outline.times)
+        self._later = {}
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):

@@ -137,7 +137,8 @@ def test_clocks_have_units_and_names(folder: Path) -> None:
     # 20 * 0.001 rounds
     assert it.lateness(theta, "one") == pytest.approx(dict.fromkeys(("x", "y", "yaw"), 0.02))
     with pytest.raises(
-        UnknownNameError, match=r"no channel 'yow' that is measured; did you mean 'yaw'"
+        UnknownNameError,
+        match=r"no channel 'yow' that is measured, and no input .*; did you mean 'yaw'",
     ):
         problem(folder, CLOCK.replace("clock:yaw", "clock:yow"))
     with pytest.raises(UnitError, match=r"nuisance clock: clock:x"):

@@ -23,6 +23,7 @@ KINDS = {
     "frozen": "a sensor that stands still for a while",
     "gap": "missing rows",
     "gaps": "cells without a number",
+    "input": "noise of a column that drives the model",
     "held": "a column whose values stand for several samples each",
     "jitter": "sample times that are not even",
     "mixed": "a column that two runs have in common",

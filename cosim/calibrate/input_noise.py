@@ -1,0 +1,176 @@
+"""Noise of logged inputs that drive the model: what it adds to the residuals of a run.
+
+A logged speed e_k off at sample k drives the model wrongly from there on: what it integrates from
+white noise is a random walk (heading). To first order, with g_k the response of all channels to the
+input's sample k over their noise, the residuals of a right model have the covariance
+
+    C = 1 + A A',    A = sigma (g_1, g_2, ...)
+
+and `whitening` makes them white. A is taken once, at the declared system's nominal values, and is
+the same for all models that are compared: the determinant of C cancels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.signals import Table
+from .checks.finding import Finding
+from .whitening import LEAST, InputNoise
+
+if TYPE_CHECKING:
+    from .parts import MeasuredRun
+    from .simulator import Simulator
+
+Vector = NDArray[np.float64]
+NODES = 25
+"""Moments of a run at which an input is moved; responses to others are interpolated."""
+BLOCKS = 150
+"""Columns of an input: samples are taken together, lest there be more. Their mean is kept exactly,
+and so is what the model integrates from it once they are over; what it does meanwhile (a bridge
+between both ends, of a sixth of their variance) counts as more noise of these samples."""
+LARGE = 10.0
+"""Times its noise by which an input is moved: far above rounding, and still a small speed."""
+
+
+def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
+    """The simulator of a problem that counts the noise of its inputs, and what was counted.
+
+    Args:
+        simulator: of the problem at its nominal values, whose runs say how noisy inputs are.
+
+    Raises:
+        CosimError: it cannot be simulated.
+    """
+    problem = simulator.problem
+    if not any(sigma > 0.0 for run in problem.runs for sigma in run.noisy.values()):
+        return simulator, []
+    found = simulator.spread(lambda run: _noise(simulator, run), problem.runs)
+    largest: dict[str, tuple[float, float, str]] = {}
+    runs = []
+    for run, (noise, sizes) in zip(problem.runs, found, strict=True):
+        runs.append(replace(run, noise=noise))
+        for target, (size, channel) in sizes.items():
+            if size > largest.get(target, (0.0, 0.0, ""))[0]:
+                largest[target] = size, run.noisy[target], channel
+    findings = [
+        Finding(
+            "note", "input", "", target,
+            f"its noise of {sigma:.3g} moves {channel} by up to {size:.3g} times that channel's "
+            "own; intervals and tests count it",
+        )
+        for target, (size, sigma, channel) in largest.items() if size**2 > LEAST
+    ]  # fmt: skip
+    return simulator.of(problem.changed(runs=runs)), findings
+
+
+def _noise(
+    simulator: Simulator, run: MeasuredRun
+) -> tuple[InputNoise | None, dict[str, tuple[float, str]]]:
+    """Directions of a run; input -> the largest deviation that it gives a channel, and which."""
+    if not run.noisy:
+        return None, {}
+    channels = [c.name for c in simulator.problem.channels]
+    parts, sizes = [], {}
+    beyond = np.zeros(run.data.shape)
+    for target, sigma in run.noisy.items():
+        table = run.inputs[target]
+        if not isinstance(table, Table) or not sigma > 0.0:
+            continue
+        part, bridges = _columns(simulator, run, target, table, sigma)
+        beyond += bridges
+        spread = np.sqrt(np.sum(part**2, axis=2))
+        place = np.unravel_index(int(np.argmax(spread)), spread.shape)
+        sizes[target] = float(spread[place]), channels[int(place[1])]
+        parts.append(part)
+    if not parts:
+        return None, sizes
+    weights = 1.0 / np.sqrt(1.0 + beyond)
+    return InputNoise.of(np.concatenate(parts, axis=2) * weights[:, :, None], weights), sizes
+
+
+def _columns(
+    simulator: Simulator, run: MeasuredRun, target: str, table: Table, sigma: float
+) -> tuple[Vector, Vector]:
+    """What noise of one input adds to residuals: (samples, channels, blocks of its samples).
+
+    And the variance over the noise's of what these blocks leave of each sample.
+    """
+    problem = simulator.problem
+    count = int(np.searchsorted(table.times, run.times[-1], "right"))
+    width = max(1, -(-count // BLOCKS))
+    blocks = np.arange(0, count, width)
+    nodes = np.unique(np.linspace(0, blocks.size - 1, NODES).round().astype(int))
+    change = LARGE * sigma
+
+    def moved(block: int) -> dict[str, Table]:
+        values = table.values.copy()
+        values[blocks[block] : blocks[block] + width] += change
+        other = Table(
+            table.times, values, unit=table.unit, interpolation=table.interpolation,
+            text=table.text, extend=table.extend,
+        )  # fmt: skip
+        return {target: other}
+
+    base, *rest = simulator.driven(problem.nominal, run, [{}, *(moved(int(k)) for k in nodes)])
+    one = sigma / np.sqrt(width) / change / problem.sigma
+    responses = [np.where(np.isfinite(run.data), (r - base) * one, 0.0) for r in rest]
+    begins = np.searchsorted(run.times, table.times[blocks])
+    between = _better(responses, begins[nodes])
+    found = np.empty((*run.data.shape, blocks.size))
+    for block in range(blocks.size):
+        after = int(np.searchsorted(nodes, block, "right"))
+        low, high = max(after - 1, 0), min(after, nodes.size - 1)
+        share = (block - nodes[low]) / max(nodes[high] - nodes[low], 1)
+        found[:, :, block] = between(
+            responses[low], responses[high], begins[nodes[low]], begins[nodes[high]],
+            begins[block], share,
+        )  # fmt: skip
+    bridges = np.zeros(run.data.shape)
+    ends = np.append(begins[1:], run.times.size)
+    for block, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        last = found[min(end, run.times.size - 1), :, block]
+        bridges[begin:end] += last**2 * (1.0 - 1.0 / width**2) / 6.0
+    return found, bridges
+
+
+Between = Callable[[Vector, Vector, int, int, int, float], Vector]
+
+
+def _better(responses: list[Vector], begins: NDArray[np.intp]) -> Between:
+    """The way between two responses that gives those which were simulated between them."""
+    left = {}
+    for way in (_at_one_time, _after_one_time):
+        left[way] = sum(
+            float(np.sum((way(a, c, i, k, j, (j - i) / max(k - i, 1)) - b) ** 2))
+            for a, b, c, i, j, k in zip(
+                responses, responses[1:], responses[2:], begins, begins[1:], begins[2:],
+                strict=False,
+            )
+        )  # fmt: skip
+    return min(left, key=lambda way: left[way])
+
+
+def _at_one_time(first: Vector, second: Vector, i: int, k: int, j: int, share: float) -> Vector:
+    """Between responses at the same time: what is integrated stays where it was put."""
+    found = _after_one_time(first, first, i, i, j, 0.0)
+    found[k:] = (1.0 - share) * first[k:] + share * second[k:]
+    return found
+
+
+def _after_one_time(first: Vector, second: Vector, i: int, k: int, j: int, share: float) -> Vector:
+    """Between responses so long after the input was moved: what dies out again."""
+    found = np.zeros_like(first)
+    for response, begin, part in ((first, i, 1.0 - share), (second, k, share)):
+        if part and begin <= j:
+            found[j:] += part * response[begin : begin + found.shape[0] - j]
+        elif part:
+            found[j : j + found.shape[0] - begin] += part * response[begin:]
+            # its run ended too soon: as it was then
+            found[j + found.shape[0] - begin :] += part * response[-1]
+    return found

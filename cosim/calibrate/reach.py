@@ -1,0 +1,48 @@
+"""Samples that late clocks move out of a run: nobody knows what should be compared there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .parts import COINCIDENT, Channel, MeasuredRun
+
+Vector = NDArray[np.float64]
+
+
+def known(
+    run: MeasuredRun, channels: Sequence[Channel], late: Mapping[str, float], read: Vector
+) -> Vector:
+    """What channels would read, NaN where clocks have moved what was measured out of the run.
+
+    Args:
+        run: measured.
+        channels: of its columns.
+        late: how late clocks are [s], by channel or input.
+        read: one column per channel.
+    """
+    times, read = run.times, read.copy()
+    close = COINCIDENT * float(np.median(np.diff(times)))
+    begin = float(times[0]) - run.lead - close
+    end = float(times[-1]) - max([0.0, *(late.get(name, 0.0) for name in run.inputs)]) + close
+    for index, channel in enumerate(channels):
+        wanted = times - late.get(channel.name, 0.0)
+        out = (wanted < begin) | (wanted > end)
+        read[out & np.isfinite(run.data[:, index]), index] = np.nan
+    return read
+
+
+def apart(run: MeasuredRun, read: Vector, sigma: Vector) -> Vector:
+    """(measured - read) / sigma of a run, as noise where it is not known what would be read.
+
+    A sample that is a sigma off to either side in turn is worth neither more nor less than one
+    that is explained; one that is left out would be worth half a nat.
+    """
+    found = np.asarray((run.data - read) / sigma, dtype=np.float64)
+    out = np.isnan(read) & np.isfinite(run.data)
+    if np.any(out):
+        side = np.where(np.arange(run.times.size) % 2 == 0, 1.0, -1.0)
+        found[out] = np.broadcast_to(side[:, None], found.shape)[out]
+    return found

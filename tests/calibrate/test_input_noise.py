@@ -1,0 +1,147 @@
+"""Noise of logged wheel speeds is a random walk of the pose, and residuals are made white."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.calibrate import Problem, read_problem
+from cosim.calibrate.differences import jacobian
+from cosim.calibrate.fit import fit
+from cosim.calibrate.input_noise import propagated
+from cosim.calibrate.whitening import InputNoise
+from cosim.errors import ScenarioError
+from cosim.intake.example import NOISE, RADIUS, TRACK, drive, write_csv
+from tests.problems import simulator
+
+SIGMA = 0.1
+"""[rad/s] Of a wheel's speed; its random walk turns the robot by 0.017 rad in the end."""
+MAPPING = f"""
+system = "robot.toml"
+step = 0.02
+period = 0.02
+algorithm = "gauss_seidel"
+time = "pose.stamp_ns"
+[columns]
+left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
+y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
+yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
+[inputs]
+"base.w_l" = {{ column = "left" }}
+"base.w_r" = {{ column = "right" }}
+[parameters]
+"base.pose_x" = 1.5
+"base.pose_y" = -0.7
+"base.pose_phi" = 3.0
+[channels]
+x = {{ signal = "base.x", sigma = {NOISE[0]} }}
+y = {{ signal = "base.y", sigma = {NOISE[1]} }}
+yaw = {{ signal = "base.phi", sigma = {NOISE[2]} }}
+[[parameter]]
+name = "r"
+unit = "m"
+nominal = {RADIUS}
+min = 0.04
+max = 0.06
+targets = "base.r"
+[[run]]
+name = "one"
+files = {{ cmd = "one_cmd.csv", pose = "one_pose.csv" }}
+purpose = "identification"
+"""
+
+
+def logged(folder: Path, seed: int, sigma: float, said: str = "") -> Problem:
+    """A robot that moves by exact arcs, with wheel speeds logged with noise; `said` of them."""
+    run = drive(seed)
+    chance = np.random.default_rng([seed, 1])
+    left, right = (v + chance.normal(0.0, sigma, v.size) for v in (run.left, run.right))
+    write_csv(replace(run, left=left, right=right), "one", folder)
+    (folder / "robot.toml").write_text(
+        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
+        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
+    )
+    mapping = MAPPING
+    if said:
+        mapping = mapping.replace('"left" }', f'"left", {said} }}')
+        mapping = mapping.replace('"right" }', f'"right", {said} }}')
+    (folder / "dataset.toml").write_text(mapping)
+    return read_problem(folder)
+
+
+@pytest.mark.slow
+def test_estimates_are_as_far_off_as_their_intervals_say(tmp_path: Path) -> None:
+    """And without the noise of the inputs they are not: mean squares over the deviation."""
+    counted, not_counted, sizes = [], [], []
+    for seed in range(6):
+        problem = logged(tmp_path, seed, SIGMA, f"sigma = {SIGMA}")
+        plain = simulator(problem, 1)
+        white, notes = propagated(plain)
+        assert {note.column for note in notes} == {"base.w_l", "base.w_r"}
+        for one, kept in ((plain, not_counted), (white, counted)):
+            estimate = fit(one)
+            kept.append((float(estimate.theta[0]) - RADIUS) / float(estimate.deviation[0]))
+        sizes.append(float(np.nanmean(estimate.residuals[0][1] ** 2)))
+    # 6 squares of a normal deviate: mean 1, deviation 0.6; blocks may only widen intervals
+    assert np.mean(np.square(counted)) < 2.8
+    assert np.mean(np.square(not_counted)) > 5.0
+    # 6 x 900 residuals give 0.02; interpolated responses and bridges may leave a twentieth
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.06)
+
+
+def test_noise_that_nobody_stated_is_estimated_and_said(tmp_path: Path) -> None:
+    problem = logged(tmp_path, 3, SIGMA)
+    # 600 samples tell it to a tenth; speeds that jump within a third of the differences add
+    for sigma in problem.runs[0].noisy.values():
+        assert 0.8 * SIGMA < sigma < 1.6 * SIGMA
+    said = [f for f in problem.source.findings if f.kind == "input"]
+    assert [f.column for f in said] == ["left", "right"] and "give its sigma" in said[0].text
+
+
+def test_clean_inputs_change_nothing(tmp_path: Path) -> None:
+    problem = logged(tmp_path, 3, 0.0)
+    assert set(problem.runs[0].noisy.values()) == {0.0}
+    one = simulator(problem, 1)
+    assert propagated(one) == (one, [])
+
+
+def test_residuals_and_derivatives_are_made_white_alike(tmp_path: Path) -> None:
+    problem = logged(tmp_path, 3, SIGMA, f"sigma = {SIGMA}")
+    plain = simulator(problem, 1)
+    white, _ = propagated(plain)
+    theta = problem.nominal
+    ((_, before),) = plain.residuals(theta)
+    ((_, after),) = white.residuals(theta)
+    ((_, same),) = white.residuals(theta, plain=True)
+    run = white.problem.runs[0]
+    assert np.array_equal(before, same, equal_nan=True)
+    assert np.array_equal(run.white(before), after, equal_nan=True)
+    (slope,), (changed,) = jacobian(plain, theta), jacobian(white, theta)
+    assert np.array_equal(run.white(slope.values), changed.values, equal_nan=True)
+
+
+def test_one_direction_is_taken_off_by_its_variance() -> None:
+    factors = np.zeros((4, 1, 1))
+    factors[:2, 0, 0] = 3.0
+    noise = InputNoise.of(factors, np.ones((4, 1)))
+    assert noise is not None
+    rows = np.array([[1.0], [1.0], [1.0], [np.nan]])
+    along = 1.0 / math.sqrt(1.0 + 18.0)  # its variance is 3^2 + 3^2
+    # the basis has single precision
+    assert noise.white(rows)[:, 0] == pytest.approx(
+        [along, along, 1.0, np.nan], rel=1e-6, nan_ok=True
+    )
+    # of a shorter run the direction has less variance
+    assert noise.white(rows[:1])[0, 0] == pytest.approx(1.0 / math.sqrt(10.0), rel=1e-6)
+    assert InputNoise.of(0.01 * factors, np.ones((4, 1))) is None
+
+
+def test_a_negative_deviation_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"base\.w_l: sigma .*0 or more"):
+        logged(tmp_path, 3, SIGMA, "sigma = -1.0")

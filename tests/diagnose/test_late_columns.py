@@ -1,0 +1,138 @@
+"""Columns of a log that are late, or early, are named with their delay; no FMU carries it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.candidates import Candidate, delays
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.search import Search
+from cosim.intake.example import RADIUS, TRACK, drive, write_csv
+from tests.problems import simulator
+
+pytestmark = pytest.mark.slow
+
+NAMES = ("one", "two", "three", "four")
+MAPPING = f"""
+system = "robot.toml"
+step = 0.01
+period = 0.01
+algorithm = "gauss_seidel"
+time = "pose.stamp_ns"
+[columns]
+left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
+x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
+y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
+yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
+[inputs]
+"base.w_l" = "left"
+"base.w_r" = "right"
+[channels]
+x = {{ signal = "base.x", sigma = 0.002 }}
+y = {{ signal = "base.y", sigma = 0.002 }}
+yaw = {{ signal = "base.phi", sigma = 0.004 }}
+[[parameter]]
+name = "r"
+unit = "m"
+nominal = {RADIUS}
+min = 0.04
+max = 0.06
+targets = "base.r"
+"""
+START = "".join(
+    f"""
+[[nuisance]]
+name = "start of {name}"
+unit = "{unit}"
+per_run = true
+nominal = "first:{name}"
+span = 0.3
+targets = "base.pose_{state}"
+"""
+    for name, unit, state in (("x", "m", "x"), ("y", "m", "y"), ("yaw", "rad", "phi"))
+)
+DECLARED = """
+[[nuisance]]
+name = "clock"
+unit = "s"
+nominal = 0.0
+min = -0.5
+max = 0.5
+targets = ["clock:x", "clock:y", "clock:yaw"]
+"""
+
+
+def written(folder: Path, late: float, mapping: str = MAPPING) -> Problem:
+    """Runs of a robot by exact arcs, whose camera's clock is late; no FMU is in them."""
+    runs = ""
+    for seed, name in enumerate(NAMES):
+        write_csv(drive(40 + seed, late=late), name, folder)
+        runs += (
+            f'[[run]]\nname = "{name}"\npurpose = "{"validation" if seed > 1 else "identification"}'
+            f'"\nfiles = {{ cmd = "{name}_cmd.csv", pose = "{name}_pose.csv" }}\n'
+        )
+    (folder / "robot.toml").write_text(
+        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
+        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
+    )
+    (folder / "dataset.toml").write_text(mapping + START + runs)
+    return read_problem(folder)
+
+
+def found(problem: Problem) -> tuple[Fitted, Fitted | None]:
+    search = Search(simulator(problem, 1), only=delays(problem))
+    base = search.calibrated()
+    winner = search.round(base).winner
+    search.close()
+    return base, winner
+
+
+@pytest.mark.parametrize("late", [0.2, -0.12])
+def test_a_late_camera_and_late_wheels_are_named_with_their_delay(
+    tmp_path: Path, late: float
+) -> None:
+    """Which of both clocks is the late one no log says: one early is the other late."""
+    base, winner = found(written(tmp_path, late))
+    assert winner is not None
+    effect = winner.effects[-1]
+    assert effect.label in ("delay at log.base.outputs", "delay at log.base.inputs")
+    name = f"{effect.prefix}t_d"
+    place = winner.problem.index(name)
+    assert winner.estimate.low[place] < late < winner.estimate.high[place]
+    # a twentieth of the camera's interval of 40 ms: cut at its samples, clocks are known better
+    assert winner.estimate.values[name] == pytest.approx(late, abs=2e-3)
+    assert 2.0 * base.estimate.robust > 4.0 * base.estimate.count
+    assert 2.0 * winner.estimate.robust < 1.2 * winner.estimate.count
+
+
+def test_clocks_that_agree_are_not_named(tmp_path: Path) -> None:
+    assert found(written(tmp_path, 0.0))[1] is None
+
+
+def test_a_declared_clock_is_not_named_again(tmp_path: Path) -> None:
+    """As a nuisance it is the same quantity: it takes what the effect would."""
+    problem = written(tmp_path, 0.2, MAPPING + DECLARED)
+    assert {c.port for c in delays(problem)} == {"base.w_l", "base.w_r", "base.inputs"}
+    base, winner = found(problem)
+    assert winner is None
+    assert base.estimate.values["clock"] == pytest.approx(0.2, abs=2e-3)  # as above
+
+
+def test_a_delay_is_of_columns_and_needs_no_fmu(tmp_path: Path) -> None:
+    problem = written(tmp_path, 0.0)
+    few = delays(problem)
+    assert {c.port for c in few} == {
+        "x", "y", "yaw", "base.outputs", "base.w_l", "base.w_r", "base.inputs"
+    }  # fmt: skip
+    for item in few:
+        added = item.added_to(problem)
+        assert item.change == {} and added.instances == problem.instances
+        delay = added.parameters[-1]
+        assert (delay.minimum, delay.maximum, delay.nominal) == (-0.5, 0.5, 0.0)
+        assert delay.name == f"{item.prefix}t_d"
+    assert isinstance(few[0], Candidate) and few[0].effect == "delay"
