@@ -37,8 +37,6 @@ SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml
 NAMES = ("ST", "MS", "MX")
 COLUMNS = ("speed", "current", "voltage", "angle")
 SEED = 4
-LATE = "delay at log."
-"""Begins the label of a column of the log that is late."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +59,7 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Whether no effect is named but that a late column is late, and no channel is lost."""
-        if "late" in self.kind and self.outcome == "effect_found":
-            return all(name.startswith(LATE) for name in self.by) and not self.lost
+        """Whether no effect is named and no channel is lost."""
         return self.outcome not in ("effect_found", "confounded") and not self.lost
 
 

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
+from ..calibrate.checks.late import check_late
 from ..calibrate.deferred import step_error
 from ..calibrate.input_noise import propagated
 from ..calibrate.problem import Problem
@@ -87,6 +88,10 @@ def diagnose(
         # threads of BLAS wait in loops, at the cost of simulations
         with threadpool_limits(1, user_api="blas"):
             base = search.calibrated()
+            late = passed(check_late(base.estimate), problem.source.allow)
+            findings += late
+            if any(f.severity == "error" for f in late):
+                return _refused(problem, findings, begun)
             return _searched(search, base, findings, out, say, begun, asked, adapters)
     finally:
         search.close()
