@@ -16,7 +16,7 @@ from typing import Any
 
 from ..data.logs import DataSet, read_data_set, runs_of
 from ..errors import InputError, ScenarioError, UnknownNameError, listing
-from ..files import read_toml
+from ..files import exists, is_file, read_toml
 from ..installation import builder, places
 from ..installation.examples import example_sets, named_mappings, read_mapping
 from ..system.provider import Provider
@@ -28,7 +28,7 @@ from .schema import check_mapping
 
 def _folder(given: Path) -> Path:
     """The folder of a data set, which may be named as one that comes with cosim."""
-    if given.exists():
+    if exists(given):
         return given
     known = example_sets()
     if str(given) in known:
@@ -46,7 +46,7 @@ def _folder(given: Path) -> Path:
 
 def _mapping(given: Path) -> Path:
     """A mapping file, which may be named as one that comes with cosim."""
-    if given.exists() or given.suffix == ".toml":
+    if exists(given) or given.suffix == ".toml":
         return given
     known = named_mappings()
     if given.as_posix() not in known:
@@ -93,7 +93,7 @@ def find_system(path: Path, name: str) -> SystemFile:
     for folder in (path.parent, *path.parents, places.scenarios()):
         files.append(folder / "systems" / f"{name}.toml")
     for file in files:
-        if file.is_file():
+        if is_file(file):
             return read_system(file)
     known = [item.stem for item in sorted((places.scenarios() / "systems").glob("*.toml"))]
     raise UnknownNameError(f"{path}: there is no system {name!r}; {listing(known, name)}")

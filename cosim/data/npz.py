@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
+import sys
 import zipfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -101,4 +102,8 @@ def _array(content: bytes, head: _Head) -> NDArray[Any]:
     if not head.dtype.itemsize:
         return np.zeros(head.shape, head.dtype)
     flat = np.frombuffer(content, head.dtype, offset=head.begin)
+    if head.dtype.kind == "U":
+        codes = np.frombuffer(content, f"{head.dtype.byteorder}u4", offset=head.begin)
+        if codes.size and int(codes.max()) > sys.maxunicode:
+            raise ValueError(f"an array of text has the character {codes.max()}, which is none")
     return flat.reshape(head.shape, order="F" if head.fortran else "C")

@@ -71,7 +71,14 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     entries = _directory_size(path) // _ENTRY
     if excess := FILES.excess(entries):
         raise ArchiveError(f"its directory is too long: {excess}")
+    length = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():  # else so much memory is asked for
+            if info.compress_size > length:
+                raise zipfile.BadZipFile(
+                    f"its entry {info.filename[:_LONGEST]!r} claims {info.compress_size} bytes of "
+                    f"an archive of {length}"
+                )
         yield archive
 
 

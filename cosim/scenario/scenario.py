@@ -18,7 +18,7 @@ from ..data.comparison import Reference, circle
 from ..data.logs import Log, read_data_set, read_log
 from ..data.signals import Constant, Signal, SignalVector, Table
 from ..errors import ScenarioError, UnknownNameError, listing, within
-from ..files import flatten, read_toml
+from ..files import flatten, is_file, read_toml
 from ..installation import places
 from ..reading.limits import DATA
 from ..system.toml import SystemFile, read_system
@@ -136,7 +136,7 @@ def find(name: str, folder: Path | None = None) -> tuple[ScenarioFile, str]:
     for place in (folder, Path()):
         for length in range(len(parts), 0, -1):
             path = place.joinpath(*parts[:length]) / "scenario.toml"
-            if path.is_file():
+            if is_file(path):
                 run = "/".join(parts[length:])
                 return read_scenario(path, "/".join(parts[:length])), run
     known = [item.name for item in scenario_files(folder)]
@@ -297,10 +297,10 @@ class _Reader:
             return read_system(self.folder / name)
         for folder in (self.folder, *self.folder.parents):
             path = folder / "systems" / f"{name}.toml"
-            if path.is_file():
+            if is_file(path):
                 return read_system(path)
         path = places.scenarios() / "systems" / f"{name}.toml"
-        if path.is_file():
+        if is_file(path):
             return read_system(path)
         known = [item.stem for item in sorted((places.scenarios() / "systems").glob("*.toml"))]
         raise UnknownNameError(

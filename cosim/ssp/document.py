@@ -132,7 +132,7 @@ def open_package(path: Path, ssd: str = "SystemStructure.ssd") -> File:
     if not path.is_dir():
         folder, _ = archive.unpacked(path, "ssp", "an SSP", ScenarioError)
     file = File(folder, ssd, f"{path}: {ssd}")
-    if not file.path.is_file():
+    if not is_file(file.path):
         present = ", ".join(sorted(item.name for item in folder.glob("*.ssd"))) or "no .ssd at all"
         raise ScenarioError(f"{path}: has no {ssd}; it has {present}")
     return file

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError, UnknownNameError, listing
-from ..files import flatten, read_toml
+from ..files import flatten, is_file, read_toml
 from ..installation import places
 from ..reading.schema import is_finite, shown
 
@@ -146,7 +146,7 @@ def read_study(path: Path | str) -> Study:
         UnknownNameError: there is none of this name.
     """
     path = Path(path)
-    if path.suffix != ".toml" and not path.is_file():
+    if path.suffix != ".toml" and not is_file(path):
         known = {item.stem: item for item in (places.scenarios() / "studies").glob("*.toml")}
         if str(path) not in known:
             raise UnknownNameError(

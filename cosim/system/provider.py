@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ..errors import FmuFileError, VariantError, listing
+from ..files import is_file
 from ..spec.variant import file_stem
 
 
@@ -36,7 +37,7 @@ class FolderProvider:
         name = file_stem(variant) + ".fmu"
         for place in ("", "fmi2", "fmi3", "python"):
             path = self.folder / place / name
-            if path.is_file():
+            if is_file(path):
                 return path
         present = sorted({item.stem.replace("-", "/", 1) for item in self.folder.rglob("*.fmu")})
         raise VariantError(
@@ -72,7 +73,7 @@ def locate(reference: str, provider: Provider | None, base: Path | None = None) 
     """
     if reference.endswith(".fmu"):
         path = (base or Path()) / reference
-        if not path.is_file():
+        if not is_file(path):
             raise FmuFileError(f"{path}: there is no such file")
         return path
     if provider is None:

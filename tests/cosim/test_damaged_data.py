@@ -68,6 +68,7 @@ def _npy(shape: str, values: bytes = b"", dtype: str = "<f8") -> bytes:
         (_npy("(1, -1)", bytes(8)), "has the shape (1, -1)"),
         (_npy("(1,)", bytes(8), "|O"), "holds Python objects, which could run anything"),
         (_npy("(1,)", bytes(8), "q9"), "is not a whole npz archive of numbers"),
+        (_npy("(1,)", b"\xff" * 8, "<U2"), "has the character 4294967295, which is none"),
         (_npy("((((1"), "is not a whole npz archive of numbers"),
         (b"\x93NUMPY\x01\x00\xff\xff", "has a header of 65545 bytes"),
         (b"text", "its entry 'time.npy' is no array of numpy"),

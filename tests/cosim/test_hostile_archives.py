@@ -49,6 +49,16 @@ def test_a_small_archive_that_unpacks_to_much(
     assert open_fmu(path).description.name == "m"
 
 
+def test_an_entry_that_claims_more_than_there_is(tmp_path: Path) -> None:
+    path = pack(tmp_path / "claims.fmu", fmi2())
+    content = bytearray(path.read_bytes())
+    place = content.index(b"PK\x01\x02") + 20  # the packed size in the directory
+    content[place : place + 4] = (4_000_000_000).to_bytes(4, "little")
+    path.write_bytes(content)
+    assert "claims 4000000000 bytes of an archive of" in refused(path)
+    assert "claims 4000000000 bytes" in str(check(path)[0])  # nothing of that size is asked for
+
+
 def test_limits_are_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     for text, value in (("8GB", 8 * 10**9), ("2 GiB", 2**31), ("1.5e3", 1500), ("", DATA.default)):
         monkeypatch.setenv(DATA.variable, text)

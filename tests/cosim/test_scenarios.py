@@ -128,6 +128,7 @@ def test_one_run_per_row_of_a_table(folder: Path) -> None:
         ("duration = 0.1", 'duration = "long"', "duration must be a number, not 'long'"),
         ("duration =", "durration =", "a scenario has no key 'durration'; did you mean 'duration'"),
         ('system = "disc"', 'system = "disk"', "there is no system 'disk'"),
+        ('system = "disc"', f'system = "{"d" * 300}"', "there is no system 'ddd"),
         ('column = "tau"', 'column = "tua"', "torque.csv: has no column 'tua'; did you mean 'tau'"),
         ('"torque.csv"', '"lost.csv"', "lost.csv: there is no such file"),
         ("[inputs]", "[inputs", "is not TOML"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 import sys
 from pathlib import Path
 from typing import Any
@@ -261,6 +262,17 @@ def test_damaged_bags_are_refused_by_name(tmp_path: Path, name: str) -> None:
         assert str(path) in str(caught.value)
     with pytest.raises(ScenarioError, match="there is no such file"):
         inspect(tmp_path / f"other_{name}")
+
+
+def test_a_message_without_a_time_is_named(tmp_path: Path) -> None:
+    kind = T["geometry_msgs/msg/PoseStamped"]
+    sent = [(t, "/pose", kind(header(t), pose(0.0, 0.0, 0.0))) for t in TIMES]
+    (path,) = write(tmp_path / "bag", sent, "SQLITE3").glob("*.db3")
+    with sqlite3.connect(path) as base:
+        base.execute("UPDATE messages SET timestamp = X'FF' WHERE id = 3")
+    base.close()
+    with pytest.raises(ScenarioError, match=r"a message of /pose was recorded at b'\\xff', which"):
+        inspect(path)
 
 
 def test_without_the_library_the_way_out_is_said(

@@ -81,6 +81,11 @@ def read(path: Path, topics: tuple[str, ...], recorded: bool = False) -> Source:
         ) from error
     made = []
     for name, own in found.items():
+        if strange := [t for t in own.received if not isinstance(t, int)]:
+            raise ScenarioError(
+                f"{path}: a message of {name} was recorded at {strange[0]!r}, which is no time; "
+                "record the bag again"
+            )
         columns, notes = _columns(own)
         if columns:
             made.append(_topic(name, own, columns, notes, recorded))
