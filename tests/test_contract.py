@@ -198,6 +198,7 @@ def test_effect_has_an_effect(name: str) -> None:
         differs = False
         for seed in range(8):
             nearer = 10.0 ** -(seed % 4)  # some effects live close to standstill
+            nearer *= 1.0 if seed < 4 else -1.0  # some act in one direction
             point = {k: v * nearer for k, v in _random_point(oracle, on, seed).items()}
             present, null = oracle.outputs(point, 0.01 * seed), oracle.outputs({**point, **absent})
             differs |= any(present[k] != null[k] for k in present)

@@ -61,8 +61,11 @@ class InputNoise:
 
         Args:
             rows: (samples, channels) or (samples, channels, columns); of fewer samples where a run
-                was cut.
+                was cut. Channels beyond those that noise was propagated to stay as they are.
         """
+        count = self.basis.shape[1]
+        if rows.shape[1] > count:  # channels that are only looked at come after the measured ones
+            return np.concatenate([self.white(rows[:, :count]), rows[:, count:]], axis=1)
         basis, part = self._begun(rows.shape[0])
         weights = self.weights[: rows.shape[0]]
         even = rows * (weights if rows.ndim == 2 else weights[:, :, None])

@@ -139,6 +139,10 @@ def test_one_direction_is_taken_off_by_its_variance() -> None:
     )
     # of a shorter run the direction has less variance
     assert noise.white(rows[:1])[0, 0] == pytest.approx(1.0 / math.sqrt(10.0), rel=1e-6)
+    # a channel that is only looked at stays as it is
+    beside = noise.white(np.column_stack([rows, [5.0, 6.0, 7.0, 8.0]]))
+    assert np.array_equal(beside[:, :1], noise.white(rows), equal_nan=True)
+    assert beside[:, 1].tolist() == [5.0, 6.0, 7.0, 8.0]
     assert InputNoise.of(0.01 * factors, np.ones((4, 1))) is None
 
 

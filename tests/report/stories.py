@@ -103,7 +103,7 @@ def table(verdict: str) -> dict[str, Any]:
                                                else ["speed"]))
             for which in ("before", "after") for purpose in ("identification", "validation")
         },
-        "evaluations": 174, "wall_s": 63.3, "files": [],
+        "evaluations": 174, "wall_s": 63.3, "files": [], "inside": "", "adapters": {},
     }  # fmt: skip
     if verdict == "confounded":
         content["alternatives"] = [
