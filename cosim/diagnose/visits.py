@@ -38,7 +38,7 @@ def followed(
         system.variables(name)
     names = {run.name for run in runs}
     silent = [
-        replace(run, data=np.zeros((run.times.size, len(variables))))
+        replace(run, data=np.zeros((run.times.size, len(variables))), noise=None)
         for run in problem.runs
         if run.name in names
     ]

@@ -208,7 +208,9 @@ class LawBench:
         problem = self.shaped(shape, law)
         spies = [Channel(name, "", 1.0, self.site.prefix + name) for name in outputs]
         runs = [
-            replace(problem.run(n), data=np.zeros((problem.run(n).times.size, len(spies))))
+            replace(
+                problem.run(n), data=np.zeros((problem.run(n).times.size, len(spies))), noise=None
+            )
             for n in self.names
         ]
         problem = problem.changed(
