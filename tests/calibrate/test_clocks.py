@@ -12,7 +12,8 @@ from cosim.calibrate.clocks import clocked, offsets
 from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
 from cosim.errors import UnitError, UnknownNameError, ValueRangeError
-from cosim.intake.example import FRAME, RADIUS, TRACK, drive, write_csv
+from cosim.intake.example import FRAME, RADIUS, drive, write_csv
+from tests.robot_logs import CLOCK, COLUMNS, START, write_system
 
 LATE = 0.11
 MAPPING = f"""
@@ -22,13 +23,7 @@ period = 0.01
 algorithm = "gauss_seidel"
 time = "pose.stamp_ns"
 relative = [["x", "y", "yaw"]]
-[columns]
-left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
-y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
-yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
-[inputs]
+{COLUMNS}[inputs]
 "base.w_l" = "left"
 "base.w_r" = "right"
 [channels]
@@ -47,37 +42,13 @@ name = "one"
 files = {{ cmd = "one_cmd.csv", pose = "one_pose.csv" }}
 purpose = "identification"
 """
-CLOCK = """
-[[nuisance]]
-name = "clock"
-unit = "s"
-nominal = 0.0
-min = -0.5
-max = 0.5
-targets = ["clock:x", "clock:y", "clock:yaw"]
-"""
-START = "".join(
-    f"""
-[[nuisance]]
-name = "start of {name}"
-unit = "{unit}"
-per_run = true
-nominal = "first:{name}"
-span = 0.3
-targets = "base.pose_{state}"
-"""
-    for name, unit, state in (("x", "m", "x"), ("y", "m", "y"), ("yaw", "rad", "phi"))
-)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("clocks")
     write_csv(drive(7, late=LATE), "one", made)
-    (made / "robot.toml").write_text(
-        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
-        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
-    )
+    write_system(made)
     return made
 
 

@@ -15,8 +15,9 @@ from cosim.calibrate.fit import fit
 from cosim.calibrate.input_noise import propagated
 from cosim.calibrate.whitening import InputNoise
 from cosim.errors import ScenarioError
-from cosim.intake.example import NOISE, RADIUS, TRACK, drive, write_csv
+from cosim.intake.example import NOISE, RADIUS, drive, write_csv
 from tests.problems import simulator
+from tests.robot_logs import COLUMNS, write_system
 
 SIGMA = 0.1
 """[rad/s] Of a wheel's speed; its random walk turns the robot by 0.017 rad in the end."""
@@ -26,13 +27,7 @@ step = 0.02
 period = 0.02
 algorithm = "gauss_seidel"
 time = "pose.stamp_ns"
-[columns]
-left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
-y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
-yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
-[inputs]
+{COLUMNS}[inputs]
 "base.w_l" = {{ column = "left" }}
 "base.w_r" = {{ column = "right" }}
 [parameters]
@@ -63,10 +58,7 @@ def logged(folder: Path, seed: int, sigma: float, said: str = "") -> Problem:
     chance = np.random.default_rng([seed, 1])
     left, right = (v + chance.normal(0.0, sigma, v.size) for v in (run.left, run.right))
     write_csv(replace(run, left=left, right=right), "one", folder)
-    (folder / "robot.toml").write_text(
-        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
-        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
-    )
+    write_system(folder)
     mapping = MAPPING
     if said:
         mapping = mapping.replace('"left" }', f'"left", {said} }}')

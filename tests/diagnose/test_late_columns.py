@@ -11,8 +11,9 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, delays
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
-from cosim.intake.example import RADIUS, TRACK, drive, write_csv
+from cosim.intake.example import RADIUS, drive, write_csv
 from tests.problems import simulator
+from tests.robot_logs import CLOCK, COLUMNS, START, write_system
 
 pytestmark = pytest.mark.slow
 
@@ -23,13 +24,7 @@ step = 0.01
 period = 0.01
 algorithm = "gauss_seidel"
 time = "pose.stamp_ns"
-[columns]
-left = {{ source = "cmd.left_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-right = {{ source = "cmd.right_rpm", hold = true, from = "rpm", unit = "rad/s" }}
-x = {{ source = "pose.px_mm", from = "mm", unit = "m" }}
-y = {{ source = "pose.py_mm", from = "mm", unit = "m" }}
-yaw = {{ source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }}
-[inputs]
+{COLUMNS}[inputs]
 "base.w_l" = "left"
 "base.w_r" = "right"
 [channels]
@@ -44,27 +39,6 @@ min = 0.04
 max = 0.06
 targets = "base.r"
 """
-START = "".join(
-    f"""
-[[nuisance]]
-name = "start of {name}"
-unit = "{unit}"
-per_run = true
-nominal = "first:{name}"
-span = 0.3
-targets = "base.pose_{state}"
-"""
-    for name, unit, state in (("x", "m", "x"), ("y", "m", "y"), ("yaw", "rad", "phi"))
-)
-DECLARED = """
-[[nuisance]]
-name = "clock"
-unit = "s"
-nominal = 0.0
-min = -0.5
-max = 0.5
-targets = ["clock:x", "clock:y", "clock:yaw"]
-"""
 
 
 def written(folder: Path, late: float, mapping: str = MAPPING) -> Problem:
@@ -76,10 +50,7 @@ def written(folder: Path, late: float, mapping: str = MAPPING) -> Problem:
             f'[[run]]\nname = "{name}"\npurpose = "{"validation" if seed > 1 else "identification"}'
             f'"\nfiles = {{ cmd = "{name}_cmd.csv", pose = "{name}_pose.csv" }}\n'
         )
-    (folder / "robot.toml").write_text(
-        '[instances]\nbase = "diff_drive/rolling"\n[parameters]\n'
-        f'"base.r" = {RADIUS}\n"base.track" = {TRACK}\n'
-    )
+    write_system(folder)
     (folder / "dataset.toml").write_text(mapping + START + runs)
     return read_problem(folder)
 
@@ -116,7 +87,7 @@ def test_clocks_that_agree_are_not_named(tmp_path: Path) -> None:
 
 def test_a_declared_clock_is_not_named_again(tmp_path: Path) -> None:
     """As a nuisance it is the same quantity: it takes what the effect would."""
-    problem = written(tmp_path, 0.2, MAPPING + DECLARED)
+    problem = written(tmp_path, 0.2, MAPPING + CLOCK)
     assert {c.port for c in delays(problem)} == {"base.w_l", "base.w_r", "base.inputs"}
     base, winner = found(problem)
     assert winner is None
