@@ -16,7 +16,8 @@ from .fmi3 import Fmi3
 _libraries: dict[str, Any] = {}
 WORK = "cosim_work"
 """Function that counts the steps that an instance's solver has made; FMI knows none, so only FMUs
-that have it can be limited without looking at the clock."""
+that have it can be limited without looking at the clock. Our packager gives it to its FMUs, whose
+C code changes nothing of the process; an FMU with it is not watched (`Instance.watched`)."""
 _functions: dict[tuple[str, int], dict[str, Any]] = {}
 
 

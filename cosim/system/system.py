@@ -22,7 +22,7 @@ from ..drawing import svg as drawing
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
 from ..fmu.description import Description, PowerPort, Variable
-from ..fmu.values import TYPES, boolean, check_values
+from ..fmu.values import TYPES, boolean, check_values, plain
 from ..spec.units import conversion
 from . import feedthrough
 from .provider import Provider, locate
@@ -490,7 +490,7 @@ def _way(out: Variable, into: Variable) -> str:
 
 def _given(value: Any, found: list[Any]) -> Any:
     """A checked value as it is kept: one for all elements as one, lists as they were given."""
-    return value if isinstance(value, (list, tuple)) else found[0] if len(found) == 1 else value
+    return found[0] if len(found) == 1 and not isinstance(value, (list, tuple)) else plain(value)
 
 
 def _article(causality: str) -> str:

@@ -59,6 +59,13 @@ class _Code(IntEnum):
     SUBSTEP = 14
     HOLD = 15
     SET_DERIVATIVES = 16
+    WATCHED2 = 17
+    WATCHED3 = 18
+
+
+_STEPS = {2: _Code.STEP2, 3: _Code.STEP3}
+_WATCHED = {2: _Code.WATCHED2, 3: _Code.WATCHED3}
+"""By FMI version."""
 
 
 UNFIT = 1002
@@ -189,6 +196,7 @@ class Kernel:
             times=self._array(bound.times),
             step=bound.step,
             end=bound.outline.end,
+            bounded=bound.outline.end - 2.0 * bound.step,
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
@@ -417,11 +425,13 @@ def _instructions(
             for index in range(a, b):
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
-            add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+            codes = _WATCHED if instances[a].watched else _STEPS
+            add(codes[instances[a].binding.version], a, a + 1)
         elif op is Op.SET_DERIVATIVES:
             add(_Code.SET_DERIVATIVES, *told[a, b])
         elif op is Op.SUBSTEP:
-            found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
+            kind = 2 * instances[a].watched + (instances[a].binding.version == 3)
+            found.append((_Code.SUBSTEP, a, 4 * b + kind))
         elif op in (Op.SET, Op.GET):
             for index in range(*spans[op, a]):
                 code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3

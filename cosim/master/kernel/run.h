@@ -7,7 +7,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3 };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE };
 /* FMI knows 0 (ok), 1 (warning) and more that are errors; what it does not know is one, too. */
@@ -84,7 +84,7 @@ typedef struct {
   const Instruction *instructions;
   int64_t n_instructions, n_members;
   const double *times;
-  double step, end; /* the time at which the run ends */
+  double step, end, bounded; /* when the run ends; from when on steps may miss that by rounding */
   const double *external; /* rows per communication point */
   const int64_t *external_slot;
   int64_t n_external;

@@ -80,6 +80,7 @@ class Run(ct.Structure):
     _fields_ = (
         ("members", P), ("calls", P), ("values", P), ("instructions", P),
         ("n_instructions", I64), ("n_members", I64), ("times", P), ("step", D), ("end", D),
+        ("bounded", D),
         ("external", P), ("external_slot", P), ("n_external", I64), ("copies", P),
         ("records", P),
         ("n_record", I64), ("every", I64), ("row", I64), ("rows", P), ("terms", P),
