@@ -120,7 +120,7 @@ static inline Member *step2(Run *run, Member *m, const Member *end, double t, do
   const unsigned modes = watched ? MODES() : 0;
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step2)m->step)(m->component, t, h, 1);
+    *status = ((Step2)m->step)(m->component, t, h, run->final);
     if (watched && MODES() != modes) undo_modes(m, modes);
     if (!*status) continue;
     if (FAILED(*status)) return m;
@@ -134,7 +134,7 @@ static inline Member *step3(Run *run, Member *m, const Member *end, double t, do
   const unsigned modes = watched ? MODES() : 0;
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
+    *status = ((Step3)m->step)(m->component, t, h, run->final, &event, &stop, &early, &m->reached);
     if (watched && MODES() != modes) undo_modes(m, modes);
     if (!*status && !stop) continue;
     if (!FAILED(*status) && stop) *status = TERMINATED;
@@ -256,7 +256,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
   Call *const calls = run->calls, *call = 0;
   Member *const members = run->members, *member = 0;
-  const double now = run->times[run->index], size = bounded(run, now, run->step);
+  const double now = run->now, size = run->size;
   const Derivatives *refused = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
@@ -342,10 +342,44 @@ static int execute(Run *run, int64_t first, int64_t last) {
 /* Communication steps from run->index up to `last`; 0 or the status that ended it. */
 EXPORT int cosim_run(Run *run, int64_t last) {
   int status = 0;
-  for (; run->index < last; run->index++)
+  for (; run->index < last; run->index++) {
+    run->now = run->times[run->index];
+    run->size = bounded(run, run->now, run->step);
     if ((status = execute(run, 0, run->n_instructions))) break;
+  }
   run->at = 0;
   return status;
+}
+
+/* Instructions from first to before last, with steps of this size from this time on. */
+EXPORT int cosim_do(Run *run, int64_t first, int64_t last, double time, double size) {
+  run->now = time;
+  run->size = size;
+  const int status = execute(run, first, last);
+  run->at = 0;
+  return status;
+}
+
+/* Each member keeps its present state, returns to the one that it keeps, or forgets it. */
+EXPORT int cosim_states(Run *run, int what) {
+  for (int64_t i = 0; i < run->n_members; i++) {
+    Member *const m = run->members + i;
+    int status = 0;
+    run->at = m;
+    if (what == RESTORE) status = ((SetState)m->set_state)(m->component, m->state);
+    else if (m->state) status = ((KeepState)m->free_state)(m->component, &m->state);
+    if (what == SAVE && !FAILED(status)) {
+      m->state = 0;
+      status = ((KeepState)m->get_state)(m->component, &m->state);
+    }
+    if (FAILED(status)) {
+      run->failed_member = i;
+      return status;
+    }
+    if (status) m->warned = 1;
+  }
+  run->at = 0;
+  return 0;
 }
 
 /* Steps that the solvers of all members have made so far, as far as they count them. */
