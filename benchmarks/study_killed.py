@@ -136,6 +136,7 @@ def disturbed(folder: Path, runs: int, every: int, stops: int) -> Seen:
                 stages.pop(0)
                 largest = max(map(resident, workers))
                 seen.memory.append((count, resident(master), resident(scheduler), largest))
+                print(seen, file=sys.stderr, flush=True)
             if stop_at and count >= stop_at[0]:
                 stop_at.pop(0)
                 master.send_signal(signal.SIGKILL)

@@ -138,10 +138,7 @@ class Instance:
     @property
     def functions(self) -> dict[str, int]:
         """Addresses of the C functions."""
-        return {
-            name: ct.cast(function, ct.c_void_p).value or 0
-            for name, function in self._functions.items()
-        }
+        return self._functions.addresses
 
     def function(self, name: str) -> Any:
         """A C function as a ctypes object; its first argument is `address`."""
