@@ -23,9 +23,9 @@ from cosim.master.session import Session
 
 T = TypeVar("T")
 STEP = 1e-4
-WORK = 300_000
+WORK = 5_000_000
 """FMU-steps of a run, at least; and at least `STEPS` steps."""
-STEPS = 50
+STEPS = 100
 ROUNDS = 3
 """The least counts."""
 
@@ -73,14 +73,14 @@ def measure(count: int) -> list[str]:
     per_step = (whole - start) / (count * (steps - 1))
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     times = [f"{time / count * 1e6:.0f}" for time in (build, bind, start)]
-    return [str(count), *times, f"{per_step * 1e9:.1f}", f"{memory:.0f}"]
+    return [str(count), *times, f"{per_step * 1e9:.0f}", f"{memory:.0f}"]
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("counts", type=int, nargs="*", default=[12, 120, 1200, 12000])
-    table = Table("FMUs", "build [µs]", "bind [µs]", "start [µs]", "step [ns]", "memory [MB]")
+    table = Table("FMUs", "build, µs", "bind, µs", "start, µs", "step, ns", "memory, MB")
     measure(12)  # archives and libraries are opened
     for count in parser.parse_args().counts:
         table.add_row(*measure(count))

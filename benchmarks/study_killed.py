@@ -197,11 +197,11 @@ def main() -> None:
         ("damaged result files", len(answer["corrupt"])),
         ("made by the last start, found by it", f"{answer['computed']}, {answer['reused']}"),
         ("the same as undisturbed", f"{same} of {len(calm_rows)}"),
-        ("time; undisturbed on one thread [s]", f"{took:.0f}; {calm_took:.0f}"),
+        ("time; undisturbed on one thread", f"{took:.0f} s; {calm_took:.0f} s"),
     ):
         table.add_row(what, str(value))
     Console(width=100).print(table)
-    memory = Table("runs kept", "study [MB]", "scheduler [MB]", "largest worker [MB]")
+    memory = Table("runs kept", "study, MB", "scheduler, MB", "largest worker, MB")
     for count, *sizes in seen.memory:
         memory.add_row(str(count), *(f"{size:.0f}" for size in sizes))
     Console(width=100).print(memory)
