@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
+import functools
 import importlib.util
 import sys
 from collections.abc import Mapping
@@ -32,21 +33,28 @@ def _allocator() -> tuple[Any, Any]:
     return _CALLOC(("calloc", runtime)), _FREE(("free", runtime))
 
 
-def _format_in_c(callbacks: _Callbacks) -> Any:
-    """Let the logger see formatted text: ctypes cannot read C's variable arguments, fmpy's can."""
+@functools.cache
+def _formatter() -> Any:
+    """The library that formats messages in C, None if this machine has none."""
     found = importlib.util.find_spec("fmpy")
     folder = {"win32": "win64", "darwin": "darwin64"}.get(sys.platform, "linux64")
     if found is None or not found.submodule_search_locations:
         return None
     root = Path(found.submodule_search_locations[0])
-    path = root / "logging" / folder / f"logging{library_suffix()}"
     try:
-        library = ct.CDLL(str(path))
+        library = ct.CDLL(str(root / "logging" / folder / f"logging{library_suffix()}"))
         library.addLoggerProxy.argtypes = [_P]
         library.addLoggerProxy.restype = None
-        library.addLoggerProxy(ct.byref(callbacks))
     except (OSError, AttributeError):  # no such binary for this machine: unformatted text
         return None
+    return library
+
+
+def _format_in_c(callbacks: _Callbacks) -> Any:
+    """Let the logger see formatted text: ctypes cannot read C's variable arguments, fmpy's can."""
+    library = _formatter()
+    if library is not None:
+        library.addLoggerProxy(ct.byref(callbacks))
     return library
 
 

@@ -22,7 +22,7 @@ import ctypes as ct
 import math
 import os
 import weakref
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -32,14 +32,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import EndRequest, FmuCallError, ValueRangeError
 from .archive import Fmu, open_fmu
+from .assignment import Assignment
 from .calls import announce
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
-from .library import bind
+from .library import WORK, bind
 from .messages import STATUS, forget, new_key, status_name, take
 from .surroundings import MODES, kept, modes
-from .values import check_values
 
 Vector = NDArray[np.float64]
 ENDED = 1000
@@ -51,6 +51,7 @@ WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
 """How messages begin that are more than information."""
 
 _single: set[str] = set()
+_UNWATCHED = contextlib.nullcontext()
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,9 @@ class Instance:
         fmu: an opened FMU, or the path of one.
         name: its name in messages.
         logging: let the FMU log everything, not errors alone.
+
+    Attributes:
+        watched: whether it is looked up what its calls leave changed in this process.
 
     Raises:
         FmuFileError: the file cannot be run here.
@@ -90,6 +94,7 @@ class Instance:
         announce(self.name, "loading its library")
         self.binding: Fmi2 | Fmi3
         self.binding, self._functions = bind(fmu)
+        self.watched = WORK not in self._functions
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments(True)
         self._warned: dict[str, float] = {}
@@ -133,10 +138,7 @@ class Instance:
     @property
     def functions(self) -> dict[str, int]:
         """Addresses of the C functions."""
-        return {
-            name: ct.cast(function, ct.c_void_p).value or 0
-            for name, function in self._functions.items()
-        }
+        return self._functions.addresses
 
     def function(self, name: str) -> Any:
         """A C function as a ctypes object; its first argument is `address`."""
@@ -196,13 +198,8 @@ class Instance:
         """Note what a call has changed in this process that was put back."""
         self.note(f"changed {what} in {when}, which was put back")
 
-    @contextlib.contextmanager
-    def _putting_back(self, when: str) -> Iterator[None]:
-        found: list[str] = []
-        with kept(found):
-            yield
-        for what in found:
-            self.changed(what, when)
+    def _putting_back(self, when: str) -> contextlib.AbstractContextManager[None]:
+        return kept(lambda what: self.changed(what, when)) if self.watched else _UNWATCHED
 
     def get_part(self, part: Part) -> None:
         """One get call for the values of a block's part."""
@@ -297,24 +294,7 @@ class Instance:
             ValueRangeError: of another type or size, not finite, not exact, or out of bounds.
             FmuCallError: the FMU refused.
         """
-        arrays: dict[str, list[Any]] = {}
-        for name, value in values.items():
-            variables = self.description.expand(name)
-            found = check_values(self.label, variables, value)
-            if variables[0].index is None:
-                Block(self, variables).set(found)
-                continue
-            whole = self.description.whole(name)
-            if whole.name not in arrays:
-                begun = not math.isnan(self.time)
-                arrays[whole.name] = self.fetch(whole.name) if begun else list(whole.start)
-            if len(arrays[whole.name]) != whole.size:
-                raise ValueRangeError(
-                    f"{self.label}: {whole.name} has no start values; set it as a whole"
-                )
-            arrays[whole.name][variables[0].index] = found[0]
-        for name, items in arrays.items():
-            Block(self, [self.description.find(name)]).set(items)
+        Assignment(self, values).give()
 
     # -- phases ----------------------------------------------------------------------------------
 
@@ -343,9 +323,9 @@ class Instance:
         if not self._finalizer.alive:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
-        before = modes.get()
+        before = modes.get() if self.watched else 0
         status = self._step(self.address, time, size, *self._step_arguments)
-        if modes.get() != before:
+        if self.watched and modes.get() != before:
             modes.put(before)
             self.changed(MODES, "a step")
         if status or self.binding.stopped():

@@ -6,6 +6,7 @@ import atexit
 import ctypes as ct
 import os
 import sys
+from functools import cached_property
 from typing import Any
 
 from ..errors import FmuFileError
@@ -16,8 +17,20 @@ from .fmi3 import Fmi3
 _libraries: dict[str, Any] = {}
 WORK = "cosim_work"
 """Function that counts the steps that an instance's solver has made; FMI knows none, so only FMUs
-that have it can be limited without looking at the clock."""
-_functions: dict[tuple[str, int], dict[str, Any]] = {}
+that have it can be limited without looking at the clock. Our packager gives it to its FMUs, whose
+C code changes nothing of the process; an FMU with it is not watched (`Instance.watched`)."""
+
+
+class Functions(dict[str, Any]):
+    """C functions of a library by name."""
+
+    @cached_property
+    def addresses(self) -> dict[str, int]:
+        """Where they are."""
+        return {name: ct.cast(item, ct.c_void_p).value or 0 for name, item in self.items()}
+
+
+_functions: dict[tuple[str, int], Functions] = {}
 
 
 def _library(fmu: Fmu) -> Any:
@@ -41,7 +54,7 @@ def _library(fmu: Fmu) -> Any:
     return _libraries[path]
 
 
-def bind(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
+def bind(fmu: Fmu) -> tuple[Fmi2 | Fmi3, Functions]:
     """A binding to an FMU's library, and its functions, made once for all instances.
 
     Raises:
@@ -52,10 +65,10 @@ def bind(fmu: Fmu) -> tuple[Fmi2 | Fmi3, dict[str, Any]]:
     try:
         binding = Fmi2(library) if fmu.description.fmi == 2 else Fmi3(library)
         if key not in _functions:
-            functions = {
-                name: _prototype(library, name, signature)
+            functions = Functions(
+                (name, _prototype(library, name, signature))
                 for name, signature in binding.SIGNATURES.items()
-            }
+            )
             for name, signature in binding.OPTIONAL.items():
                 if hasattr(library, name):
                     functions[name] = _prototype(library, name, signature)

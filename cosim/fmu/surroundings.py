@@ -14,7 +14,7 @@ import os
 import platform
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,10 +137,11 @@ class Surroundings:
 
 
 @contextlib.contextmanager
-def kept(changed: list[str]) -> Iterator[None]:
-    """Put back what the block changes, and add to `changed` what that was."""
+def kept(tell: Callable[[str], None]) -> Iterator[None]:
+    """Put back what the block changes, and tell what that was."""
     before = Surroundings.now()
     try:
         yield
     finally:
-        changed += before.restore()
+        for what in before.restore():
+            tell(what)

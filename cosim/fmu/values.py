@@ -135,6 +135,11 @@ def _flat(where: str, name: str, first: Variable, count: int, value: Any) -> lis
     return items
 
 
+def plain(value: Any) -> Any:
+    """Lists in place of arrays and tuples, so that two values can be compared."""
+    return [plain(v) for v in value] if isinstance(value, (list, tuple, np.ndarray)) else value
+
+
 def _checked(where: str, variable: Variable, value: Any) -> Any:
     """One value, as its type carries it."""
     name, type_ = variable.name, variable.type

@@ -105,6 +105,11 @@ def consistent(
                     if source in driver and source in influences.get(driver[source], ()):
                         needs[target].add(driver[source])
     waiting = set(needs)
+    looped = set().union(*(members for members, _ in loops)) if loops else set()
+    owned: dict[str, set[str]] = {}
+    for name in waiting - looped:
+        owned.setdefault(name.partition(".")[0], set()).add(name)
+    order = system.order()
     rows: Rows = []
     while waiting:
         before = len(waiting)
@@ -113,16 +118,12 @@ def consistent(
             if inside and all(not (needs[name] - members) & waiting for name in inside):
                 rows.append((Op.SOLVE, index))
                 waiting -= members
-        looped = set().union(*(members for members, _ in loops)) if loops else set()
-        for name in system.order():
-            ready = {
-                output
-                for output in waiting - looped
-                if output.partition(".")[0] == name and not needs[output] & waiting
-            }
+        for name in order:
+            ready = {output for output in owned.get(name, ()) if not needs[output] & waiting}
             if ready:
                 rows += [*exchange(layout, position[name]), (Op.GET, position[name])]
                 waiting -= ready
+                owned[name] -= ready
         if len(waiting) == before:  # cannot be: what is left would be a loop
             raise AssertionError(f"no order for {sorted(waiting)}")
     return rows

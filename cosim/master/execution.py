@@ -142,13 +142,6 @@ class Execution:
 
     def _make(self) -> Stepper:
         wanted, plan = self.outline.executor, self.outline.plan
-        if plan.stepper is not None:
-            if wanted == "c":
-                raise ValueRangeError(
-                    f"executor 'c': algorithm {plan.algorithm!r} makes its steps in Python; take "
-                    "executor auto"
-                )
-            return plan.stepper(self.run)
         objects = [
             name
             for name, carries in zip(plan.layout.names, plan.layout.objects.tolist(), strict=True)
@@ -159,6 +152,8 @@ class Execution:
                 f"executor 'c': {objects[0]} is a string, a binary or an integer of 64 bits, which "
                 "the executor in Python passes on; take executor auto, or do not record it"
             )
+        if plan.stepper is not None and (wanted != "c" or kernel.find() is not None):
+            return plan.stepper(self.run)
         if objects or wanted == "python" or (wanted == "auto" and kernel.find() is None):
             return Interpreted(self.run)
         try:

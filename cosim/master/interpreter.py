@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cached_property
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
+from ..fmu.assignment import Assignment
 from ..fmu.attributes import INTEGERS
 from ..fmu.description import Variable
 from ..fmu.exchange import Block
@@ -114,6 +115,8 @@ class Interpreter:
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
         self.started = False
+        self._given: dict[int, Mapping[str, Any]] = {}
+        self._assignments: dict[int, Assignment] = {}
 
     @cached_property
     def _integers(self) -> set[str]:
@@ -170,9 +173,13 @@ class Interpreter:
         self.started = False
         for newton in self.newtons:
             newton.valid[0] = 0
-        for instance, member in zip(self.instances, self.system.members.values(), strict=True):
+        for index, member in enumerate(self.system.members.values()):
+            instance = self.instances[index]
             instance.reset()
-            instance.set(member.parameters)
+            if self._given.get(index) != member.parameters:
+                self._given[index] = dict(member.parameters)
+                self._assignments[index] = Assignment(instance, member.parameters)
+            self._assignments[index].give()
 
     def size(self, time: float, step: float) -> float:
         """A step that does not miss the end of the run by rounding, and never goes beyond."""

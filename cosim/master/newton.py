@@ -79,16 +79,17 @@ class Newton:
 
     def newton_step(self, rest: list[float], z: list[float]) -> tuple[float, list[float]]:
         """The change of z and its relative size."""
-        size, change = 0.0, []
-        for i, row in enumerate(self.inverse.tolist()):
-            total = 0.0
-            for factor, item in zip(row, rest, strict=True):
-                total += factor * item
-            change.append(total)
-            relative = abs(total) / max(1.0, abs(z[i]))
+        total = np.zeros(self.n)
+        with np.errstate(all="ignore"):
+            # column by column: each sum is made in the order of its row, as in compiled code
+            for column, item in zip(self.inverse.T.copy(), rest, strict=True):
+                total += column * item
+            relatives = np.abs(total) / np.fmax(1.0, np.abs(z))
+        size = 0.0
+        for relative in relatives.tolist():
             if not relative <= size:  # so that nan counts as large
                 size = relative
-        return size, change
+        return size, total.tolist()
 
     def difference(
         self, function: Callable[[list[float]], list[float]], z: list[float], value: list[float]
@@ -113,21 +114,18 @@ class Newton:
 def invert(matrix: list[list[float]]) -> list[list[float]] | None:
     """Inverse by Gauss-Jordan elimination with partial pivoting, None if there is none."""
     n = len(matrix)
-    rows = [list(row) + [1.0 if i == j else 0.0 for j in range(n)] for i, row in enumerate(matrix)]
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(rows[i][k]) > abs(rows[best][k]):
-                best = i
-        pivot = rows[best][k]
-        if not 1e-13 < abs(pivot) < np.inf:
-            return None
-        rows[k], rows[best] = rows[best], rows[k]
-        for j in range(2 * n):
-            rows[k][j] /= pivot
-        for i in range(n):
-            factor = rows[i][k]
-            if i != k and factor != 0.0:
-                for j in range(2 * n):
-                    rows[i][j] -= factor * rows[k][j]
-    return [row[n:] for row in rows]
+    rows = np.hstack([np.array(matrix).reshape(n, n), np.eye(n)])
+    with np.errstate(all="ignore"):
+        for k in range(n):
+            sizes = np.abs(rows[k:, k])
+            best = k if np.isnan(sizes[0]) else k + int(np.nanargmax(sizes))  # the first of equals
+            pivot = float(rows[best, k])
+            if not 1e-13 < abs(pivot) < np.inf:
+                return None
+            rows[[k, best]] = rows[[best, k]]
+            rows[k] /= pivot
+            others = np.flatnonzero(rows[:, k])
+            others = others[others != k]
+            rows[others] -= rows[others, k, None] * rows[k]
+    inverse: list[list[float]] = rows[:, n:].tolist()
+    return inverse

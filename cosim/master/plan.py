@@ -43,6 +43,7 @@ class Op(IntEnum):
     )
 
 
+_OPS = tuple(Op)
 PARTS = 1 << 16
 
 
@@ -199,7 +200,7 @@ def operations(items: Iterable[Sequence[int]]) -> Integers:
 
 def decoded(rows: Integers) -> list[tuple[Op, int, int]]:
     """The operations in these rows, as the interpreter takes them."""
-    return [(Op(op), a, b) for op, a, b in rows.tolist()]
+    return [(_OPS[op], a, b) for op, a, b in rows.tolist()]
 
 
 def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) -> Layout:

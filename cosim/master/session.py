@@ -96,7 +96,7 @@ class Session:
             self._run = self._execution.run
             self._stepper = self._execution.prepare()
             self._blocks = {name: self._block(name) for name in self.targets}
-            counting = [i for i in self._run.instances if WORK in i.functions]
+            counting = [i for i in self._run.instances if not i.watched]
             self._counters = [(i.function(WORK), i.address) for i in counting]
         except BaseException:
             self._stack.close()

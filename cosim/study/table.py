@@ -76,12 +76,12 @@ class StudyTable:
         groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
         for row in self.rows:
             groups.setdefault(tuple(_key(row.get(name)) for name in keys), []).append(row)
-        found = []
+        found, errors = [], self.errors
         for rows in groups.values():
             done = [row for row in rows if row["status"] == "ok"]
             item: dict[str, Any] = {name: rows[0].get(name) for name in keys}
             item.update(runs=len(rows), failed=len(rows) - len(done))
-            for name in self.errors:
+            for name in errors:
                 values = [row[name] for row in done if row.get(name) is not None]
                 item[name] = statistics.median(values) if values else None
                 item[f"worst.{name}"] = max(values) if values else None
@@ -106,14 +106,14 @@ class StudyTable:
 
     def write_csv(self, path: Path) -> Path:
         """Write a CSV file whose head names each column with its unit, `step [s]`."""
+        columns = self.columns
         with atomic(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(
-                f"{name} [{self.units[name]}]" if self.units.get(name) else name
-                for name in self.columns
+                f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in columns
             )
             for row in self.rows:
-                cells = (_cell(row.get(name)) for name in self.columns)
+                cells = (_cell(row.get(name)) for name in columns)
                 writer.writerow("" if cell is None else cell for cell in cells)
         return path
 

@@ -22,7 +22,7 @@ from ..drawing import svg as drawing
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
 from ..fmu.description import Description, PowerPort, Variable
-from ..fmu.values import TYPES, boolean, check_values
+from ..fmu.values import TYPES, boolean, check_values, plain
 from ..spec.units import conversion
 from . import feedthrough
 from .provider import Provider, locate
@@ -394,25 +394,28 @@ class System:
 
     def bonds(self) -> list[Bond]:
         """Pairs of power ports whose efforts and flows are connected to each other."""
-        ports = [
-            (member, port) for member in self.members.values() for port in member.description.ports
-        ]
+        takers: dict[str, list[str]] = {}  # who takes the first effort may take all of them
+        for connection in self.connections:
+            takers.setdefault(connection.source, []).append(connection.target.partition(".")[0])
+        place = {name: index for index, name in enumerate(self.members)}
         found = []
-        for giver, port in ports:
-            if port.causality != "gives_effort":
-                continue
-            for taker, other in ports:
-                if other.causality == "gives_motion" and len(other.effort) == len(port.effort):
-                    terms = self._bond_terms(giver, port, taker, other)
-                    if terms:
-                        found.append(
-                            Bond(f"{giver.name}.{port.name}", f"{taker.name}.{other.name}", terms)
-                        )
+        for giver in self.members.values():
+            for port in giver.description.ports:
+                if port.causality != "gives_effort":
+                    continue
+                near = takers.get(f"{giver.name}.{port.effort[0]}", ()) if port.effort else place
+                for taker in map(self.members.__getitem__, sorted({*near}, key=place.__getitem__)):
+                    for other in taker.description.ports:
+                        if terms := self._bond_terms(giver, port, taker, other):
+                            ends = f"{giver.name}.{port.name}", f"{taker.name}.{other.name}"
+                            found.append(Bond(*ends, terms))
         return found
 
     def _bond_terms(
         self, giver: Member, port: PowerPort, taker: Member, other: PowerPort
     ) -> tuple[tuple[str, str, int], ...]:
+        if other.causality != "gives_motion" or len(other.effort) != len(port.effort):
+            return ()
         efforts = [(f"{giver.name}.{a}", f"{taker.name}.{b}")
                    for a, b in zip(port.effort, other.effort, strict=True)]  # fmt: skip
         flows = [(f"{taker.name}.{b}", f"{giver.name}.{a}")
@@ -490,7 +493,7 @@ def _way(out: Variable, into: Variable) -> str:
 
 def _given(value: Any, found: list[Any]) -> Any:
     """A checked value as it is kept: one for all elements as one, lists as they were given."""
-    return value if isinstance(value, (list, tuple)) else found[0] if len(found) == 1 else value
+    return found[0] if len(found) == 1 and not isinstance(value, (list, tuple)) else plain(value)
 
 
 def _article(causality: str) -> str:

@@ -138,6 +138,28 @@ def test_power_bonds(provider) -> None:
     )
 
 
+def test_bonds_are_looked_for_along_connections(provider, monkeypatch) -> None:
+    """Each port with each other one would be 10^8 pairs for 12 000 FMUs."""
+    system = System("many", provider)
+    for k in range(20):
+        system.add(f"gearbox{k}", "gearbox/ratio")
+        system.add(f"load{k}", "inertia/disc")
+        system.connect(f"gearbox{k}.tau_b", f"load{k}.tau")
+        system.connect(f"load{k}.w", f"gearbox{k}.w_b")
+    pairs: list[str] = []
+    terms = System._bond_terms
+
+    def counted(self, giver, *arguments):
+        pairs.append(giver.name)
+        return terms(self, giver, *arguments)
+
+    monkeypatch.setattr(System, "_bond_terms", counted)
+    assert [bond.name for bond in system.bonds()] == [
+        f"gearbox{k}.flange_b -- load{k}.flange" for k in range(20)
+    ]
+    assert len(pairs) == 20
+
+
 def test_a_half_connected_port_is_no_bond(provider) -> None:
     system = System(provider=provider)
     system.add("gearbox", "gearbox/ratio")

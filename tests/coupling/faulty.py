@@ -47,7 +47,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned r[], size_t n, const double v[]) 
 NONE(fmi2GetInteger) NONE(fmi2SetInteger) NONE(fmi2GetBoolean) NONE(fmi2SetBoolean)
 NONE(fmi2GetString) NONE(fmi2SetString)
 #define REFUSED(name) EXPORT int name(void *c, void *a, size_t b, void *d) { return 3; }
-REFUSED(fmi2GetFMUstate) REFUSED(fmi2SetFMUstate) REFUSED(fmi2FreeFMUstate)
+@STATES@
 REFUSED(fmi2SerializedFMUstateSize) REFUSED(fmi2SerializeFMUstate)
 REFUSED(fmi2DeSerializeFMUstate) REFUSED(fmi2SetRealInputDerivatives)
 REFUSED(fmi2GetRealOutputDerivatives) REFUSED(fmi2CancelStep) REFUSED(fmi2GetStatus)
@@ -72,6 +72,17 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int keep) {
 }
 """
 
+REFUSES = "REFUSED(fmi2GetFMUstate) REFUSED(fmi2SetFMUstate) REFUSED(fmi2FreeFMUstate)"
+KEEPS = """
+EXPORT int fmi2GetFMUstate(void *c, void **s) {
+  *s = malloc(sizeof(Model));
+  memcpy(*s, c, sizeof(Model));
+  return 0;
+}
+EXPORT int fmi2SetFMUstate(void *c, void *s) { memcpy(c, s, sizeof(Model)); return 0; }
+EXPORT int fmi2FreeFMUstate(void *c, void **s) { free(*s); *s = 0; return 0; }
+"""
+
 XML = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="faulty" guid="{0}">
   <CoSimulation modelIdentifier="faulty" canHandleVariableCommunicationStepSize="true"
@@ -92,14 +103,16 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def build_faulty(folder: Path, **claims: str) -> Path:
+def build_faulty(folder: Path, *, keeps: bool = False, **claims: str) -> Path:
     """Build it for this machine. It claims states and derivatives, and refuses both.
 
     Args:
         folder: where it goes.
+        keeps: whether it keeps the states that it claims to keep.
         claims: other capabilities, or other values of them.
     """
-    binary = compile_c({"faulty.c": CODE}, "faulty.c", "faulty", host_platform())
+    code = CODE.replace("@STATES@", KEEPS if keeps else REFUSES)
+    binary = compile_c({"faulty.c": code}, "faulty.c", "faulty", host_platform())
     path = folder / "faulty.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", claiming(claims))

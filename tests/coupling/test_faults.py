@@ -58,6 +58,23 @@ def test_failing_steps_end_the_run_with_its_recording(
     np.testing.assert_allclose(recording["good.y"], recording.time, atol=1e-12)
 
 
+@pytest.mark.parametrize("algorithm", ["iterated", "adaptive"])
+@pytest.mark.parametrize("mode", ["error", "discard", "fatal"])
+def test_steps_that_may_be_repeated_fail_alike_in_both_executors(
+    algorithm: str, mode: str, tmp_path: Path
+) -> None:
+    faulty = build_faulty(tmp_path, keeps=True)
+    texts, rows = [], []
+    for executor in ("python", "c"):
+        failed = rf"bad \(faulty\): a step of .* failed with status '{mode}'"
+        with pytest.raises(StepError, match=failed) as caught:
+            Master(pair(faulty, mode), algorithm, 0.1, executor=executor).run(1.0)
+        assert caught.value.recording is not None
+        texts.append(str(caught.value))
+        rows.append(caught.value.recording.values.tobytes())
+    assert texts[0] == texts[1] and rows[0] == rows[1]
+
+
 def test_failing_in_threads_blocks_nobody(faulty: Path) -> None:
     outcomes: list[str] = []
 

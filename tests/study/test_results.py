@@ -16,6 +16,7 @@ from cosim.study import run_study, study_from
 from cosim.study.compute import GroupRunner, StudyChangedError
 from cosim.study.picture import _points
 from cosim.study.planning import plan_study
+from cosim.study.table import StudyTable
 from tests.cosim_fmus import rewrite
 from tests.coupling.faulty import MODES
 from tests.study.conftest import BASE
@@ -26,6 +27,24 @@ SWAP = {
     "param": {"load.J": [0.07, 0.09]},
     "keep": ["load.w", "motor.tau"],
 }
+
+
+def test_a_table_is_written_without_looking_at_all_rows_for_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+    columns = StudyTable.columns.fget
+    assert columns is not None
+
+    def counted(table: StudyTable) -> list[str]:
+        looks.append(len(table.rows))
+        return columns(table)
+
+    monkeypatch.setattr(StudyTable, "columns", property(counted))
+    rows = [{"key": str(k), "status": "ok", "step": 1e-3, "rms.w": 0.5 * k} for k in range(50)]
+    text = StudyTable(rows).write_csv(tmp_path / "table.csv").read_text(encoding="utf-8")
+    assert len(looks) == 1
+    assert text.splitlines()[0] == "key,status,step,rms.w" and text.count("\n") == 51
 
 
 def test_rows_are_what_cosim_run_gives_bit_for_bit(run: Any, provider: Any) -> None:

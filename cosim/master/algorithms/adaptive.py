@@ -36,13 +36,15 @@ from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import smooth
 from ..interpreter import Interpreter
+from ..kernel.programs import Programs
 from ..options import positive, refuse_without_states
-from ..plan import Op, Plan, decoded, final_operations, initial_sweep, lay_out, operations
-from ..rollback import restore, saved
+from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 
 Vector = NDArray[np.float64]
 SHORTEST = 1e-6
 """Shortest step, relative to the communication step."""
+FRESH, STEP = 0, 1
+"""Programs: connected values brought up to date; a step of all instances."""
 SLACK = 1e-9
 """Part of a communication step by which two instants may differ and be the same."""
 
@@ -122,7 +124,7 @@ class StepControl:
         layout = run.layout
         self.raster = run.step
         self.limit = settings.longest or 100.0 * self.raster
-        self.sweep, self.step = decoded(run.plan.solving), decoded(run.plan.step)
+        self.programs = Programs(run, run.plan.solving, run.plan.step)
         self.sources = np.unique(layout.copy_source[settings.smooth])
         self.nominal = np.array([self._nominal(layout.names[slot]) for slot in self.sources])
         held = set(layout.copy_source[~settings.smooth].tolist()) | set(layout.external.tolist())
@@ -181,18 +183,13 @@ class StepControl:
         """A step of all instances; energy into both ends of each bond, and what went over it."""
         run, layout = self.run, self.run.layout
         before = run.values[layout.bond_output].copy()
-        for op, a, b in self.step:
-            if op is Op.STEP:
-                run.instances[a].step(time, size)
-            else:
-                run.do(op, a, b)
+        self.programs.do(STEP, time, size)
         inputs = run.values[layout.bond_input]
         terms = layout.bond_sign * inputs * (before + run.values[layout.bond_output]) * 0.5 * size
         energy, passed = np.zeros(len(layout.bonds)), np.zeros(len(layout.bonds))
         np.add.at(energy, layout.bond_index, terms)
         np.add.at(passed, layout.bond_index, 0.5 * np.abs(terms))
-        for op, a, b in self.sweep:
-            run.do(op, a, b)
+        self.programs.do(FRESH, time + size)
         return energy, passed
 
     def _step(self, size: float, target: int | None) -> None:
@@ -200,10 +197,10 @@ class StepControl:
         run = self.run
         begin = run.values.copy()
         time, half = self.time, 0.5 * size
-        with saved(run) as before:
+        with self.programs.saved() as before:
             self.go(time, size)
             whole = run.values[self.sources].copy()
-            restore(run, before)
+            self.programs.restore(before)
             first, passed = self.go(time, half)
             middle = run.values.copy()
             second, also = self.go(time + half, half)
@@ -216,7 +213,7 @@ class StepControl:
                         f"{size:.3g} s misses the tolerance {self.settings.tolerance:g} of the "
                         f"step control ({self._worst(begin, whole)})"
                     )
-                restore(run, before)
+                self.programs.restore(before)
                 self.size = size * (max(0.2, 0.9 * error**-0.5) if np.isfinite(error) else 0.2)
                 return
         self.taken += 1
@@ -274,8 +271,7 @@ class StepControl:
         run = self.run
         run.index = index
         run.do(Op.EXTERNAL, 0, 0)
-        for op, a, b in self.sweep:
-            run.do(op, a, b)
+        self.programs.do(FRESH, float(run.times[index]))
         if index < run.times.size - 1:  # the last one is recorded by the operations of the end
             self._keep(run.values, run.values)
 
@@ -299,4 +295,5 @@ class StepControl:
             "shortest_s": self.shortest if self.taken else 0.0,
             "longest_s": self.longest,
         }
+        self.programs.report()
         return {"step_control": control}

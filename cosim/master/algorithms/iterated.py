@@ -28,14 +28,17 @@ from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import smooth
 from ..interpreter import Interpreter
+from ..kernel.programs import Programs
 from ..newton import Newton
 from ..options import positive, refuse_without_states
-from ..plan import Op, Plan, decoded, final_operations, initial_sweep, lay_out, operations
-from ..rollback import Checkpoint, restore, saved
+from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
+from ..rollback import Checkpoint
 
 Vector = NDArray[np.float64]
 FIXED_POINT = 12
 """Repetitions before Newton's method takes over."""
+FRESH, STEP = 0, 1
+"""Programs: connected values brought up to date, and a step with that."""
 
 
 def compile_plan(
@@ -75,7 +78,10 @@ class Iterated:
         self.run, self.tolerance = run, tolerance
         self.sources = np.unique(run.layout.copy_source[smooth])
         self.newton = Newton(self.sources.size, tolerance)
-        self.before, self.sweep = decoded(run.plan.step), decoded(run.plan.solving)
+        everyone = range(len(run.instances))
+        whole = operations([(op, a) for op in (Op.SET, Op.STEP, Op.GET) for a in everyone])
+        fresh = run.plan.solving
+        self.programs = Programs(run, fresh, np.concatenate([whole, fresh]))
         self.held = np.zeros(0)
         self.repetitions = 0
 
@@ -83,8 +89,9 @@ class Iterated:
         """Go on up to a communication point."""
         run = self.run
         while run.index < last:
-            for op, a, b in self.before:
-                run.do(op, a, b)
+            run.do(Op.EXTERNAL, 0, 0)
+            self.programs.do(FRESH, run.instants[run.index])
+            run.do(Op.RECORD, 0, 0)
             self.step()
             run.index += 1
 
@@ -105,14 +112,15 @@ class Iterated:
         return self.repetitions
 
     def report(self) -> Mapping[str, Any]:
-        """Nothing to say."""
+        """Nothing to say; instances are told of warnings."""
+        self.programs.report()
         return {}
 
     def step(self) -> None:
         """One communication step."""
         run = self.run
         begin = run.values.copy()
-        with saved(run) as before:
+        with self.programs.saved() as before:
             end = begin[self.sources].tolist()
             settled = not self.newton.valid[0] and self.fixed_point(before, begin, end)
             if not settled:
@@ -152,7 +160,7 @@ class Iterated:
     def attempt(self, before: Checkpoint, begin: Vector, end: list[float]) -> list[float]:
         """End values of a step with inputs from given end values."""
         run, layout = self.run, self.run.layout
-        restore(run, before)
+        self.programs.restore(before)
         self.repetitions += 1
         values = run.values
         values[self.sources] = 0.5 * (begin[self.sources] + np.array(end))
@@ -160,10 +168,7 @@ class Iterated:
             values[layout.copy_source] * layout.copy_gain + layout.copy_offset
         )
         self.held = values[self.input_slots].copy()
-        for op in (Op.SET, Op.STEP, Op.GET):
-            for index in range(len(run.instances)):
-                run.do(op, index, 0)
-        for op, a, b in self.sweep:
-            run.do(op, a, b)
+        time = run.instants[run.index]
+        self.programs.do(STEP, time, run.size(time, run.step))
         found: list[float] = values[self.sources].tolist()
         return found

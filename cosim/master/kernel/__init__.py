@@ -59,12 +59,21 @@ class _Code(IntEnum):
     SUBSTEP = 14
     HOLD = 15
     SET_DERIVATIVES = 16
+    WATCHED2 = 17
+    WATCHED3 = 18
+
+
+_STEPS = {2: _Code.STEP2, 3: _Code.STEP3}
+_WATCHED = {2: _Code.WATCHED2, 3: _Code.WATCHED3}
+"""By FMI version."""
 
 
 UNFIT = 1002
 """Status of a set call that was not made, because a number does not fit the variable's type."""
 UNSETTLED = 1003
 """Status of an algebraic loop that has no solution or does not settle."""
+SAVE, RESTORE, FORGET = range(3)
+"""What `Kernel.states` does."""
 TOO_LONG, TOO_LARGE = 1004, 1005
 """Statuses of a run that took more than its limit, and of one that ran away."""
 
@@ -120,6 +129,15 @@ def _load(path: str) -> Any:
     library.cosim_run.argtypes, library.cosim_run.restype = [structures.P, structures.I64], ct.c_int
     library.cosim_run_within.argtypes = [structures.P, structures.I64, structures.D, structures.D]
     library.cosim_run_within.restype = ct.c_int
+    library.cosim_do.argtypes = [
+        structures.P,
+        structures.I64,
+        structures.I64,
+        structures.D,
+        structures.D,
+    ]
+    library.cosim_do.restype = ct.c_int
+    library.cosim_states.argtypes, library.cosim_states.restype = [structures.P, ct.c_int], ct.c_int
     library.cosim_size.argtypes, library.cosim_size.restype = [ct.c_int], structures.I64
     sizes = [library.cosim_size(what) for what in range(len(structures.ALL))]
     expected = [ct.sizeof(kind) for kind in structures.ALL]
@@ -153,15 +171,17 @@ class Kernel:
 
     Args:
         bound: the run, whose arrays it works on.
-        plan: what to do in a communication step, if not the run's own plan.
+        programs: sequences of operations for `do`; steps may be taken back then.
     """
 
-    def __init__(self, bound: Interpreter, plan: Plan | None = None) -> None:
+    def __init__(
+        self, bound: Interpreter, programs: Sequence[NDArray[np.int64]] | None = None
+    ) -> None:
         path = find()
         if path is None:
             raise FileNotFoundError(library_name())
         self._library = _load(str(path))
-        plan = plan or bound.plan
+        plan = bound.plan
         layout, instances = plan.layout, bound.instances
         self._keep: list[Any] = [bound]
         self._made: dict[type[ct.Structure], Any] = {}
@@ -189,6 +209,7 @@ class Kernel:
             times=self._array(bound.times),
             step=bound.step,
             end=bound.outline.end,
+            bounded=bound.outline.end - 2.0 * bound.step,
             external=self._array(bound.external),
             external_slot=self._array(layout.external),
             n_external=bound.external.shape[1],
@@ -221,6 +242,7 @@ class Kernel:
             bond_energy=self._array(bound.bond_energy),
             bond_turnover=self._array(bound.bond_turnover),
             n_terms=len(layout.bond_output),
+            final=programs is None,
             carried=_carried(plan),
         )  # fmt: skip
         if bound.witness is not None:
@@ -244,6 +266,11 @@ class Kernel:
                 )
             )
         self.run.loops = self._structures(structures.Loop, loops)
+        self._programs = []
+        for program in programs or ():
+            first = len(instructions)
+            instructions += _instructions(plan, program, spans, calls, instances, told)
+            self._programs.append((first, len(instructions)))
         self.run.instructions = self._structures(structures.Instruction, instructions)
         self.run.means = self._structures(
             structures.Mean,
@@ -325,6 +352,15 @@ class Kernel:
         self._enter()
         return int(self._library.cosim_run_within(ct.addressof(self.run), last, limit, most))
 
+    def do(self, program: int, time: float, size: float) -> int:
+        """A program, whose steps have this size and begin at this time; 0, or what ended it."""
+        first, last = self._programs[program]
+        return int(self._library.cosim_do(ct.addressof(self.run), first, last, time, size))
+
+    def states(self, what: int) -> int:
+        """All instances SAVE, RESTORE or FORGET their states; 0, or the first refusal."""
+        return int(self._library.cosim_states(ct.addressof(self.run), what))
+
     def _enter(self) -> None:
         if self._bound.witness is not None:
             self._bound.witness.enter()
@@ -389,7 +425,12 @@ class Kernel:
 def _member(instance: Instance) -> structures.Member:
     functions = instance.functions
     step = functions[f"fmi{instance.binding.version}DoStep"]
-    return structures.Member(instance.address, step, functions.get(WORK, 0))
+    binding = instance.binding
+    states = [
+        functions.get(f"fmi{binding.version}{verb}{binding.STATE}", 0)
+        for verb in ("Get", "Set", "Free")
+    ]
+    return structures.Member(instance.address, step, functions.get(WORK, 0), 0.0, 0, 0, *states)
 
 
 def _instructions(
@@ -417,11 +458,13 @@ def _instructions(
             for index in range(a, b):
                 add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
         elif op is Op.STEP:
-            add(_Code.STEP2 if instances[a].binding.version == 2 else _Code.STEP3, a, a + 1)
+            codes = _WATCHED if instances[a].watched else _STEPS
+            add(codes[instances[a].binding.version], a, a + 1)
         elif op is Op.SET_DERIVATIVES:
             add(_Code.SET_DERIVATIVES, *told[a, b])
         elif op is Op.SUBSTEP:
-            found.append((_Code.SUBSTEP, a, 4 * b + instances[a].binding.version))
+            kind = 2 * instances[a].watched + (instances[a].binding.version == 3)
+            found.append((_Code.SUBSTEP, a, 4 * b + kind))
         elif op in (Op.SET, Op.GET):
             for index in range(*spans[op, a]):
                 code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3

@@ -62,8 +62,9 @@ static Call *call2(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     run->at = c;
     *status = ((Access2)c->function)(c->component, c->references, c->n_references, c->buffer);
+    if (!*status) continue;
     if (FAILED(*status)) return c;
-    c->warned |= *status;
+    c->warned = 1;
   }
   return 0;
 }
@@ -72,8 +73,9 @@ static Call *call3(Run *run, Call *c, const Call *end, int *status) {
   for (; c < end; c++) {
     run->at = c;
     *status = ((Access3)c->function)(c->component, c->references, c->n_references, c->buffer, c->n_values);
+    if (!*status) continue;
     if (FAILED(*status)) return c;
-    c->warned |= *status;
+    c->warned = 1;
   }
   return 0;
 }
@@ -92,7 +94,8 @@ static Call *call_converted(Run *run, Call *c, const Call *end, int set, int *st
 }
 
 /* A step that does not miss the end of the run by rounding, and never goes beyond. */
-static double bounded(const Run *run, double t, double h) {
+static inline double bounded(const Run *run, double t, double h) {
+  if (t < run->bounded) return h;
   if (t + h > run->end - ROUNDING * h)
     for (h = run->end - t; t + h > run->end;) h = nextafter(h, 0.0);
   return h;
@@ -111,28 +114,32 @@ static void undo_modes(Member *m, unsigned wanted) {
 static void undo_modes(Member *m, unsigned wanted) {}
 #endif
 
-static Member *step2(Run *run, Member *m, const Member *end, double t, double h, int *status) {
-  const unsigned modes = MODES();
+/* Inlined with `watched` known: reading the modes waits for all arithmetic under way, 7 ns a member, and
+   members that are known to leave them alone are spared it. */
+static inline Member *step2(Run *run, Member *m, const Member *end, double t, double h, int watched, int *status) {
+  const unsigned modes = watched ? MODES() : 0;
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step2)m->step)(m->component, t, h, 1);
-    if (MODES() != modes) undo_modes(m, modes);
+    *status = ((Step2)m->step)(m->component, t, h, run->final);
+    if (watched && MODES() != modes) undo_modes(m, modes);
+    if (!*status) continue;
     if (FAILED(*status)) return m;
-    m->warned |= *status;
+    m->warned = 1;
   }
   return 0;
 }
 
-static Member *step3(Run *run, Member *m, const Member *end, double t, double h, int *status) {
+static inline Member *step3(Run *run, Member *m, const Member *end, double t, double h, int watched, int *status) {
   bool event = false, stop = false, early = false;
-  const unsigned modes = MODES();
+  const unsigned modes = watched ? MODES() : 0;
   for (; m < end; m++) {
     run->at = m;
-    *status = ((Step3)m->step)(m->component, t, h, true, &event, &stop, &early, &m->reached);
-    if (MODES() != modes) undo_modes(m, modes);
+    *status = ((Step3)m->step)(m->component, t, h, run->final, &event, &stop, &early, &m->reached);
+    if (watched && MODES() != modes) undo_modes(m, modes);
+    if (!*status && !stop) continue;
     if (!FAILED(*status) && stop) *status = TERMINATED;
     if (FAILED(*status)) return m;
-    m->warned |= *status;
+    m->warned = 1;
   }
   return 0;
 }
@@ -239,7 +246,7 @@ static const Derivatives *set_derivatives(Run *run, const Derivatives *r, const 
 static Member *substep(Run *run, Member *m, int64_t code, int *status) {
   const double parts = (double)(code / PARTS / 4), part = (double)(code / 4 % PARTS);
   const double t = run->times[run->index] + part * run->step / parts, h = bounded(run, t, run->step / parts);
-  return code % 4 == 2 ? step2(run, m, m + 1, t, h, status) : step3(run, m, m + 1, t, h, status);
+  return code % 2 ? step3(run, m, m + 1, t, h, code & 2, status) : step2(run, m, m + 1, t, h, code & 2, status);
 }
 
 #include "newton.c"
@@ -249,7 +256,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
   const Instruction *const end = run->instructions + last;
   Call *const calls = run->calls, *call = 0;
   Member *const members = run->members, *member = 0;
-  const double now = run->times[run->index], size = bounded(run, now, run->step);
+  const double now = run->now, size = run->size;
   const Derivatives *refused = 0;
   for (const Instruction *in = run->instructions + first; in < end; in++) {
     int status = 0;
@@ -278,10 +285,16 @@ static int execute(Run *run, int64_t first, int64_t last) {
       call = call_converted(run, calls + in->first, calls + in->last, in->operation == CONVERT_SET, &status);
       break;
     case STEP2:
-      member = step2(run, members + in->first, members + in->last, now, size, &status);
+      member = step2(run, members + in->first, members + in->last, now, size, 0, &status);
       break;
     case STEP3:
-      member = step3(run, members + in->first, members + in->last, now, size, &status);
+      member = step3(run, members + in->first, members + in->last, now, size, 0, &status);
+      break;
+    case WATCHED2:
+      member = step2(run, members + in->first, members + in->last, now, size, 1, &status);
+      break;
+    case WATCHED3:
+      member = step3(run, members + in->first, members + in->last, now, size, 1, &status);
       break;
     case ENERGY:
       if (in->first == 1) add_energy(run, 1);
@@ -329,10 +342,44 @@ static int execute(Run *run, int64_t first, int64_t last) {
 /* Communication steps from run->index up to `last`; 0 or the status that ended it. */
 EXPORT int cosim_run(Run *run, int64_t last) {
   int status = 0;
-  for (; run->index < last; run->index++)
+  for (; run->index < last; run->index++) {
+    run->now = run->times[run->index];
+    run->size = bounded(run, run->now, run->step);
     if ((status = execute(run, 0, run->n_instructions))) break;
+  }
   run->at = 0;
   return status;
+}
+
+/* Instructions from first to before last, with steps of this size from this time on. */
+EXPORT int cosim_do(Run *run, int64_t first, int64_t last, double time, double size) {
+  run->now = time;
+  run->size = size;
+  const int status = execute(run, first, last);
+  run->at = 0;
+  return status;
+}
+
+/* Each member keeps its present state, returns to the one that it keeps, or forgets it. */
+EXPORT int cosim_states(Run *run, int what) {
+  for (int64_t i = 0; i < run->n_members; i++) {
+    Member *const m = run->members + i;
+    int status = 0;
+    run->at = m;
+    if (what == RESTORE) status = ((SetState)m->set_state)(m->component, m->state);
+    else if (m->state) status = ((KeepState)m->free_state)(m->component, &m->state);
+    if (what == SAVE && !FAILED(status)) {
+      m->state = 0;
+      status = ((KeepState)m->get_state)(m->component, &m->state);
+    }
+    if (FAILED(status)) {
+      run->failed_member = i;
+      return status;
+    }
+    if (status) m->warned = 1;
+  }
+  run->at = 0;
+  return 0;
 }
 
 /* Steps that the solvers of all members have made so far, as far as they count them. */

@@ -7,9 +7,10 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3 };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE };
+enum { SAVE, RESTORE, FORGET }; /* what `cosim_states` does */
 /* FMI knows 0 (ok), 1 (warning) and more that are errors; what it does not know is one, too. */
 #define FAILED(status) ((unsigned)(status) > 1)
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
@@ -33,6 +34,7 @@ typedef struct {
   double reached; /* the time at which an FMU of FMI 3 says that it stands */
   int64_t warned;
   int64_t modes;  /* whether a step has left the rounding of numbers changed; it was undone */
+  void *get_state, *set_state, *free_state, *state; /* functions, and the state that is kept */
 } Member;
 
 /* What one operation does: with calls, members, copies from first to before last. */
@@ -84,7 +86,8 @@ typedef struct {
   const Instruction *instructions;
   int64_t n_instructions, n_members;
   const double *times;
-  double step, end; /* the time at which the run ends */
+  double now, size; /* of the step under way */
+  double step, end, bounded; /* when the run ends; from when on steps may miss that by rounding */
   const double *external; /* rows per communication point */
   const int64_t *external_slot;
   int64_t n_external;
@@ -94,6 +97,7 @@ typedef struct {
   Term *terms;
   double *bond_energy, *bond_turnover;
   int64_t n_terms;
+  int64_t final;       /* steps are not taken back */
   int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
   int64_t index;       /* communication step under way */
   int64_t next_record; /* the next one to be kept */
@@ -113,5 +117,7 @@ typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
 typedef int (*SetDerivatives2)(void *, const uint32_t *, size_t, const int32_t *, const double *);
 typedef int64_t (*Work)(void *);
+typedef int (*KeepState)(void *, void **);
+typedef int (*SetState)(void *, void *);
 typedef int (*Step2)(void *, double, double, int);
 typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);

@@ -22,7 +22,7 @@ class Member(ct.Structure):
 
     _fields_ = (
         ("component", P), ("step", P), ("work", P), ("reached", D), ("warned", I64),
-        ("modes", I64),
+        ("modes", I64), ("get_state", P), ("set_state", P), ("free_state", P), ("state", P),
     )  # fmt: skip
 
 
@@ -79,11 +79,13 @@ class Run(ct.Structure):
 
     _fields_ = (
         ("members", P), ("calls", P), ("values", P), ("instructions", P),
-        ("n_instructions", I64), ("n_members", I64), ("times", P), ("step", D), ("end", D),
+        ("n_instructions", I64), ("n_members", I64), ("times", P), ("now", D),
+        ("size", D), ("step", D), ("end", D), ("bounded", D),
         ("external", P), ("external_slot", P), ("n_external", I64), ("copies", P),
         ("records", P),
         ("n_record", I64), ("every", I64), ("row", I64), ("rows", P), ("terms", P),
-        ("bond_energy", P), ("bond_turnover", P), ("n_terms", I64), ("carried", I64),
+        ("bond_energy", P), ("bond_turnover", P), ("n_terms", I64),
+        ("final", I64), ("carried", I64),
         ("index", I64), ("next_record", I64), ("loops", P), ("means", P), ("history", P),
         ("past", P), ("n_means", I64),
         ("average", P), ("slope", P), ("curve", P), ("derivatives", P),
