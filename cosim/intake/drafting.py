@@ -11,10 +11,11 @@ from ..errors import InputError
 from ..spec.units import conversion, parse
 from .draft import ColumnEntry, Draft, Entry
 from .files import clock_column, known_clock, readable
+from .grouping import plain
 from .guess import is_angle, turn_of
 from .inspect import ColumnReport
 from .matching import Column, Match, Matches
-from .runs import Part, Run, plain
+from .runs import Part, Run
 from .words import COMMAND, pieces, words
 
 LATE, SHARE = 1.0, 0.1

@@ -75,6 +75,35 @@ class Wishes:
     received: bool = False
 
 
+class Inspected:
+    """What is in files, each read once.
+
+    Args:
+        wishes: topics and clock.
+        told: is told which file is being read.
+    """
+
+    def __init__(self, wishes: Wishes, told: Callable[[str], None] = _silent) -> None:
+        self._wishes, self._told = wishes, told
+        self._found: dict[Path, FileReport] = {}
+
+    def __call__(self, path: Path) -> FileReport:
+        """What is in a file.
+
+        Raises:
+            ScenarioError: it cannot be read.
+        """
+        if path not in self._found:
+            self._told(f"reading {path}")
+            wishes = self._wishes
+            self._found[path] = inspect(path, wishes.topics, wishes.clock, wishes.received)
+        return self._found[path]
+
+    def columns(self, path: Path) -> frozenset[str]:
+        """Columns of a file without clocks."""
+        return self(path).column_names()
+
+
 @dataclass(frozen=True)
 class Imported:
     """What was written.
@@ -106,6 +135,7 @@ def import_logs(
     provider: Provider,
     ask: Asker | None = None,
     told: Callable[[str], None] = _silent,
+    inspected: Inspected | None = None,
 ) -> Imported:
     """Write a data set.
 
@@ -117,6 +147,7 @@ def import_logs(
         provider: where variants come from.
         ask: is asked for what is missing; an error lists it if not given.
         told: is told what is being done.
+        inspected: files that are read already.
 
     Raises:
         InputError: what is missing or does not fit, with the flag to give.
@@ -127,14 +158,11 @@ def import_logs(
         )
     file = _system(wishes.system)
     system = file.build(provider)
-    looked: dict[str, list[FileReport]] = {}
-    for name, paths in files.items():
-        for path in paths:
-            told(f"reading {path}")
-            looked.setdefault(name, []).append(
-                inspect(path, wishes.topics, wishes.clock, wishes.received)
-            )
-    runs = [Run(name, purposes[name], parts_of(name, found)) for name, found in looked.items()]
+    inspected = inspected or Inspected(wishes, told)
+    runs = [
+        Run(name, purposes[name], parts_of(name, [inspected(path) for path in paths]))
+        for name, paths in files.items()
+    ]
     check_alike(runs)
     variables = places_of(system)
     columns = columns_of(runs)

@@ -23,9 +23,10 @@ from cosim.errors import CosimError, InputError, UnknownNameError
 from cosim.files import read_toml
 from cosim.installation.builder import default_provider
 from cosim.intake.example import RADIUS, SYSTEM, TRACK, drive, write_csv
-from cosim.intake.importing import Imported, Wishes, import_logs
+from cosim.intake.grouping import grouped
+from cosim.intake.importing import Imported, Inspected, Wishes, import_logs
 from cosim.intake.matching import Column, Match, Place
-from cosim.intake.runs import grouped, purposes
+from cosim.intake.runs import purposes
 
 LATE = 0.23
 """[s] No multiple of the camera's or the commands' interval."""
@@ -43,9 +44,9 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def imported(
     logs: Path, out: Path, *maps: str, pattern: str = "*_*.csv", **more: object
 ) -> Imported:
-    files = grouped(sorted(logs.glob(pattern)), {})
     ask = more.pop("ask", None)
     wishes = Wishes(str(logs / "robot.toml"), maps, **more)  # type: ignore[arg-type]
+    files = grouped(sorted(logs.glob(pattern)), {}, Inspected(wishes).columns).runs
     chosen = purposes(list(files), [])
     return import_logs(files, chosen, wishes, out, default_provider(), ask)  # type: ignore[arg-type]
 
