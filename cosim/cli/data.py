@@ -205,6 +205,12 @@ def import_command(
     window: Annotated[
         float, typer.Option(help="Cut runs into pieces of this length [s], each with its start.")
     ] = 0.0,
+    late: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PART=SECONDS", help="How late the clock of a part is known to be [estimated]."
+        ),
+    ] = None,
     topics: Topics = None,
     received: Received = False,
     clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
@@ -216,7 +222,7 @@ def import_command(
     Example: `cosim data import a.csv b.csv --system motor_bench --out my_motor`
     """
     from ..installation.builder import default_provider
-    from ..intake.given import parameters_of, runs_of
+    from ..intake.given import late_of, parameters_of, runs_of
     from ..intake.grouping import grouped
     from ..intake.importing import Inspected, Wishes, import_logs
     from ..intake.runs import purposes
@@ -231,6 +237,7 @@ def import_command(
         clock,
         window,
         received,
+        late_of(late or []),
     )
     ask = _Terminal() if _somebody() else None
     with working(quiet=ask is not None) as told:

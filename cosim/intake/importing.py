@@ -64,6 +64,7 @@ class Wishes:
         clock: column of times, where it is not found.
         received: of bags, take the times of recording instead of the stamps in headers.
         window: [s] of the pieces that runs are cut into, 0 for whole runs.
+        late: [s] by which the clocks of parts are late, where that is known.
     """
 
     system: str
@@ -73,6 +74,7 @@ class Wishes:
     clock: str = ""
     window: float = 0.0
     received: bool = False
+    late: Mapping[str, float] = field(default_factory=dict)
 
 
 class Inspected:
@@ -168,7 +170,7 @@ def import_logs(
     columns = columns_of(runs)
     matches = _matched(columns, variables, wishes, ask)
     runs = _used(runs, matches)
-    plan = layout(runs, matches, wishes.window)
+    plan = layout(runs, matches, wishes.window, wishes.late)
     make_folder(folder)
     stored = {run.name: place(run, folder, plan.whole) for run in runs}
     said = _system_entry(file, folder, wishes.system)

@@ -143,14 +143,16 @@ def _variants(problem: Problem, changes: Iterable[dict[str, str]]) -> list[str]:
 
 
 def sorted_out(names: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Those of these variants that exist, and those whose effects do not fit together.
+    """Those of these variants that exist, and those whose effects do not fit, or not together.
 
-    One effect alone fits: it is a candidate.
+    A candidate alone fits. The unknown input does not at every balance: nothing can enter at a mass
+    centre.
     """
     found, impossible = [], []
     for name in names:
+        effects = [effect for effect, _ in parse_name(name).effects]
         try:
-            if len(parse_name(name).effects) > 1:
+            if len(effects) > 1 or PROBE in effects:
                 build_model(name)
         except ModelError:
             impossible.append(name)

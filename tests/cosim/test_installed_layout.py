@@ -13,6 +13,7 @@ import pytest
 
 from cosim.errors import CosimError, VariantError
 from cosim.installation.library import Library
+from sources.distribution.contents import sorted_out
 from sources.distribution.make import make, write_pack
 from tests.fmus import fmu
 
@@ -32,6 +33,12 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     make(folder, mappings=[MAPPING], plain=PLAIN)
     return folder
+
+
+def test_nothing_enters_at_a_mass_centre() -> None:
+    """A wheel of everything must not stop there: 5 of 2095 variants are such."""
+    load, body = (f"crawler.lab/track_contact+unknown_input@{at}" for at in ("load", "body"))
+    assert sorted_out([load, body]) == ([body], [load])
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from cosim.errors import CosimError, InputError, UnknownNameError
 from cosim.files import read_toml
 from cosim.installation.builder import default_provider
 from cosim.intake.example import RADIUS, SYSTEM, TRACK, drive, write_csv
+from cosim.intake.given import late_of
 from cosim.intake.grouping import grouped
 from cosim.intake.importing import Imported, Inspected, Wishes, import_logs
 from cosim.intake.matching import Column, Match, Place
@@ -232,6 +233,38 @@ def test_runs_must_have_the_same_parts(logs: Path, tmp_path: Path) -> None:
     chosen = {"a": "identification", "b": "validation"}
     with pytest.raises(InputError, match="run b has the parts one table, but run a has"):
         import_logs(files, chosen, Wishes(str(logs / "robot.toml")), tmp_path, default_provider())
+
+
+def test_a_clock_that_is_known_to_be_late_is_not_estimated(logs: Path, tmp_path: Path) -> None:
+    """What is left over is then a delay of the commands; held columns move, samples stay."""
+    imported(logs, tmp_path / "set", late={"pose": LATE}, parameters={"base.r": ()})
+    content = read_toml(tmp_path / "set" / "dataset.toml")
+    assert content["columns"]["left"]["late"] == -LATE and "late" not in content["columns"]["px"]
+    assert "clock of pose" not in [n["name"] for n in content.get("nuisance", ())]
+    imported(logs, tmp_path / "plain", parameters={"base.r": ()})
+    first = [
+        [run.get("samples", [1])[0] for run in read_toml(tmp_path / name / "dataset.toml")["run"]]
+        for name in ("set", "plain")
+    ]
+    pairs = zip(
+        read_problem(tmp_path / "set").runs, read_problem(tmp_path / "plain").runs, *first,
+        strict=True,
+    )  # fmt: skip
+    for run, other, begins, plain in pairs:
+        times = run.times[(run.times > 1.0) & (run.times < 8.0)]
+        earlier = times + (begins - plain) * 0.04 - LATE  # 25 Hz
+        for name in ("base.w_l", "base.w_r"):
+            moved, still = (r.inputs[name].at(t) for r, t in ((run, times), (other, earlier)))
+            assert np.mean(moved == still) > 0.98  # not where a value changes at that instant
+    with pytest.raises(UnknownNameError, match=r"--late pos: no part .* did you mean 'pose'"):
+        imported(logs, tmp_path / "other", late={"pos": LATE})
+
+
+def test_how_late_is_a_number() -> None:
+    assert late_of(["pose=0.3", "imu=-0.01"]) == {"pose": 0.3, "imu": -0.01}
+    for wrong in ("pose", "pose=x", "=1", "pose=nan"):
+        with pytest.raises(InputError, match=f"--late {wrong}: write --late PART=SECONDS"):
+            late_of([wrong])
 
 
 # -- the command -----------------------------------------------------------------------------------
