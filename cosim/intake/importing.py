@@ -366,7 +366,11 @@ def _refined(
     told("trying start values")
     add_starts(draft, problem(), late)
     told("trying which parameters the logs tell")
-    add_parameters(draft, problem(), wishes.parameters)
+    if kept := add_parameters(draft, problem(), wishes.parameters):
+        notes.append(
+            f"the logs do not tell {', '.join(kept)} apart from what is estimated: they keep the "
+            "system's values, and what is found is right as far as these are"
+        )
     return notes
 
 

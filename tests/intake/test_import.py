@@ -8,6 +8,7 @@ import pty
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -265,6 +266,34 @@ def test_how_late_is_a_number() -> None:
     for wrong in ("pose", "pose=x", "=1", "pose=nan"):
         with pytest.raises(InputError, match=f"--late {wrong}: write --late PART=SECONDS"):
             late_of([wrong])
+
+
+def test_what_the_logs_do_not_tell_apart_is_said(tmp_path: Path) -> None:
+    """Efficiency over inertia shows, and over friction: one of the three keeps its value."""
+    (tmp_path / "drive.toml").write_text(
+        'connections = ["gear.tau_b -> load.tau", "load.w -> gear.w_b"]\n'
+        '[instances]\ngear = "gearbox/ratio"\nload = "inertia/disc"\n'
+        "[parameters]\ngear.J_a = 0.0\ngear.ratio = 10.0\ngear.eta = 0.8\n"
+        "load.J = 0.1\nload.b = 0.05\n"
+    )
+    chance, w, lines = np.random.default_rng(1), 0.0, ["t_s,torque_Nm,speed_rad_s"]
+    for k in range(400):
+        torque = 0.1 if k // 80 % 2 else -0.05
+        lines.append(f"{0.02 * k:.2f},{torque},{w + chance.normal(0.0, 0.01):.5f}")
+        w += 0.02 * (8.0 * torque - 0.05 * w) / 0.1
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    wishes = Wishes(str(tmp_path / "drive.toml"), ["torque_Nm=gear.tau_a", "speed_rad_s=load.w"])
+    kept = "the logs do not tell gear.eta apart from what is estimated"
+
+    def notes(given: dict[str, tuple[float, ...]]) -> str:
+        asked = replace(wishes, parameters=given)
+        out = tmp_path / f"set_{len(given)}"
+        purpose = {"a": "identification"}
+        done = import_logs({"a": [tmp_path / "a.csv"]}, purpose, asked, out, default_provider())
+        return " ".join(done.notes)
+
+    assert kept in notes({})
+    assert kept not in notes({"load.b": ()})  # who says what is estimated knows
 
 
 # -- the command -----------------------------------------------------------------------------------
