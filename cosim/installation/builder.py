@@ -267,7 +267,8 @@ class Installed:
 
     def contained(self, effect: str) -> tuple[str, ...]:
         """Effects that the law of an effect becomes for some values of its parameters."""
-        return Builder().contained(effect)
+        found = self.library.contained(effect)
+        return found if found is not None else self._built(effect).contained(effect)
 
 
 def default_provider(told: Told | None = None) -> Provider:

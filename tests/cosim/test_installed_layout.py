@@ -114,6 +114,25 @@ def test_its_catalogue_is_listed_and_copied_without_casadi(site: Path, tmp_path:
     assert copied.read_bytes() == fmu("gearbox.lab_bench/ratio", fmi=3).read_bytes()
 
 
+def test_what_a_diagnosis_asks_is_known_without_casadi(site: Path, tmp_path: Path) -> None:
+    """Which effects fit, which contain others, which fidelities a variant is the limit of."""
+    asked = (
+        "from cosim.installation.builder import default_provider\n"
+        "provider, name = default_provider(), 'gearbox.lab_bench/ratio'\n"
+        "effects = sorted({effect for effect, _, _ in provider.candidates(name)})\n"
+        "contained = {effect: provider.contained(effect) for effect in effects}\n"
+        "print(json.dumps([provider.candidates(name), contained, provider.refinements(name)]))\n"
+    )
+    program = f"import json, sys\nsys.path.insert(0, {str(site)!r})\n"
+    answers = []
+    for blocked, at in (("casadi", tmp_path), ("", ROOT)):
+        head = program + f"sys.modules[{blocked!r}] = None\n" if blocked else "import json\n"
+        done = subprocess.run([sys.executable, "-c", head + asked], cwd=at, text=True, check=True,
+                              capture_output=True)  # fmt: skip
+        answers.append(json.loads(done.stdout))
+    assert answers[0] == answers[1] and any(answers[0][1].values())
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
