@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.calibrate.mapping import find_system
@@ -20,6 +21,7 @@ from cosim.diagnose.probes import batches
 from cosim.files import read_toml
 from cosim.installation import places
 from cosim.installation.examples import read_mapping
+from cosim.robots import create, templates
 from cosim.running.runner import prepare
 from cosim.scenario.scenario import scenario_files
 from cosim.spec.variant import parse_name
@@ -105,6 +107,22 @@ def declared(mapping: Path, provider: Provider) -> Problem:
     """The declared system of a mapping as a problem without data."""
     file = find_system(mapping, str(read_mapping(mapping).get("system", "")))
     return Problem(mapping.parent.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
+
+
+def of_templates(provider: Provider) -> list[Problem]:
+    """The systems of all templates that need no device, as problems without data.
+
+    Who begins with one has logs of a robot that no wheel knows.
+    """
+    found = []
+    with TemporaryDirectory() as folder:
+        for name in templates.names():
+            template = templates.read(name, {})
+            if template.inputs:  # an arm's come from its device
+                out = Path(folder) / name
+                create.from_template(name, out, template, provider, logs=False)
+                found.append(declared(out / "dataset.toml", provider))
+    return found
 
 
 def beside_foreign(provider: Provider) -> Problem:

@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from cosim.errors import CosimError, VariantError
+from cosim.installation.builder import default_provider
 from cosim.installation.library import Library
+from sources.distribution import contents
 from sources.distribution.contents import sorted_out
 from sources.distribution.make import make, write_pack
 from tests.fmus import fmu
@@ -39,6 +41,14 @@ def test_nothing_enters_at_a_mass_centre() -> None:
     """A wheel of everything must not stop there: 5 of 2095 variants are such."""
     load, body = (f"crawler.lab/track_contact+unknown_input@{at}" for at in ("load", "body"))
     assert sorted_out([load, body]) == ([body], [load])
+
+
+def test_a_wheel_serves_who_begins_with_a_template() -> None:
+    problems = {item.name: item for item in contents.of_templates(default_provider())}
+    assert {"diff_drive", "tricycle", "mecanum", "omni", "tracked", "motor"} < set(problems)
+    asked = contents.of_diagnosis(problems["diff_drive"])
+    assert "diff_drive/rolling+unknown_input@turn" in asked
+    assert sorted_out(asked) == (asked, [])
 
 
 @pytest.fixture(scope="module")
