@@ -143,6 +143,15 @@ def test_what_a_diagnosis_asks_is_known_without_casadi(site: Path, tmp_path: Pat
     assert answers[0] == answers[1] and any(answers[0][1].values())
 
 
+def test_a_system_is_composed_without_casadi(site: Path, tmp_path: Path) -> None:
+    """A component alone stands for its simplest fidelity, which the wheel's catalogue knows."""
+    code, _, err = call(
+        site, tmp_path, "new", "system", "own", "--from", "gearbox", blocked="casadi"
+    )
+    assert code == 0, err
+    assert 'gearbox = "gearbox/ratio"' in (tmp_path / "own" / "system.toml").read_text()
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
