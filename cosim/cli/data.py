@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,14 @@ if TYPE_CHECKING:
     from ..intake.importing import Imported
     from ..intake.inspect import ColumnReport, FileReport, TopicReport
     from ..intake.matching import Column, Match, Place
+
+
+class FilesAre(StrEnum):
+    """What files are that no `--run` names."""
+
+    RUNS = "runs"
+    PARTS = "parts"
+
 
 data_app = typer.Typer(help="Logs: what is in them, and how they map to a system.",
                        no_args_is_help=True)  # fmt: skip
@@ -173,6 +182,10 @@ def import_command(
         list[str] | None,
         typer.Option("--run", metavar="NAME=FILE,FILE", help="A run of these files."),
     ] = None,
+    files_are: Annotated[
+        FilesAre | None,
+        typer.Option(help="Each file is a run, or all are parts of one [by columns and names]."),
+    ] = None,
     validation: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="A run that is not fitted [the last of several]."),
@@ -192,6 +205,12 @@ def import_command(
     window: Annotated[
         float, typer.Option(help="Cut runs into pieces of this length [s], each with its start.")
     ] = 0.0,
+    late: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PART=SECONDS", help="How late the clock of a part is known to be [estimated]."
+        ),
+    ] = None,
     topics: Topics = None,
     received: Received = False,
     clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
@@ -203,18 +222,13 @@ def import_command(
     Example: `cosim data import a.csv b.csv --system motor_bench --out my_motor`
     """
     from ..installation.builder import default_provider
-    from ..intake.given import parameters_of, runs_of
-    from ..intake.importing import Wishes, import_logs
-    from ..intake.runs import grouped, purposes
+    from ..intake.given import late_of, parameters_of, runs_of
+    from ..intake.grouping import grouped
+    from ..intake.importing import Inspected, Wishes, import_logs
+    from ..intake.runs import purposes
 
     if not system:
         raise InputError(f"--system is missing; {_systems()}")
-    named = grouped(files or [], runs_of(runs or []))
-    chosen = purposes(list(named), validation or [])
-    if len(named) > 1 and not validation:
-        say(f"note: run {list(named)[-1]} is not fitted but judged (another with --validation)")
-    if len(named) == 1:
-        say("note: there is one run only, so nothing is left to judge what is fitted")
     wishes = Wishes(
         system,
         maps or (),
@@ -223,10 +237,22 @@ def import_command(
         clock,
         window,
         received,
+        late_of(late or []),
     )
     ask = _Terminal() if _somebody() else None
     with working(quiet=ask is not None) as told:
-        done = import_logs(named, chosen, wishes, out, default_provider(), ask, told)
+        inspected = Inspected(wishes, told)
+        group = grouped(
+            files or [],
+            runs_of(runs or []),
+            inspected.columns,
+            files_are.value if files_are else "",
+        )
+        named = group.runs
+        chosen = purposes(list(named), validation or [])
+        for note in _of_runs(list(named), group.said, not validation):
+            say(f"note: {note}")
+        done = import_logs(named, chosen, wishes, out, default_provider(), ask, told, inspected)
     for note in done.notes:
         say(f"note: {note}")
     if as_json:
@@ -240,6 +266,16 @@ def import_command(
             f"{done.folder / 'dataset.toml'} as said above, or import again with --map, and with "
             "--parameter NAME=VALUE where the system's values are those of another machine"
         )
+
+
+def _of_runs(names: Sequence[str], said: str, last: bool) -> list[str]:
+    """What was assumed of the runs."""
+    found = [said] if said else []
+    if len(names) == 1:
+        found.append("there is one run only, so nothing is left to judge what is fitted")
+    elif last:
+        found.append(f"run {names[-1]} is not fitted but judged (another with --validation)")
+    return found
 
 
 @contextmanager

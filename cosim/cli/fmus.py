@@ -13,7 +13,7 @@ import typer
 from ..errors import InputError, VariantError, listing
 from ..files import atomic, make_folder
 from ..installation import places
-from ..installation.builder import naming_errors, sources
+from ..installation.builder import carried, components, naming_errors, sources
 from ..installation.library import Library
 from .check import check_command
 from .output import AsJson, new_table, open_console, say
@@ -58,7 +58,7 @@ def fmus_list(
     Example: `cosim fmus list`, `cosim fmus list gearbox`, `cosim fmus list --filter backlash`
     """
     if not (component or every or containing or as_json):
-        _print_components(_components())
+        _print_components(components())
         return
     entries = [
         entry for entry in _variants(component, containing) if containing in entry["variant"]
@@ -66,7 +66,7 @@ def fmus_list(
     if component and not entries and not containing:
         raise VariantError(
             f"no variant of a component {component!r}; "
-            f"{listing((entry['component'] for entry in _components()), component)}"
+            f"{listing((entry['component'] for entry in components()), component)}"
         )
     if as_json:
         print_json(entries)
@@ -78,23 +78,8 @@ def fmus_list(
     open_console().print(table)
 
 
-def _library() -> Library | None:
-    """What an installed wheel carries; None in a checkout, and in a wheel without FMUs."""
-    found = None if places.in_checkout() else Library(places.root())
-    return found if found is not None and found.content else None
-
-
-def _components() -> list[dict[str, Any]]:
-    """The catalogue by component: as the wheel says, else from the sources."""
-    library = _library()
-    if library is not None:
-        return library.components()
-    found: list[dict[str, Any]] = sources("packaging.catalog").overview()
-    return found
-
-
 def _variants(component: str, containing: str) -> list[dict[str, Any]]:
-    library = _library()
+    library = carried()
     if library is not None:
         return [
             entry
@@ -140,7 +125,7 @@ def fmus_build(
     folder = out or (places.fmus() if places.in_checkout() else Path("fmus"))
     if kind is Kind.python and fmi == 3:
         raise InputError("python FMUs are FMI 2.0 only; drop --fmi 3 or --kind python")
-    if kind is Kind.native and platform is Platform.host and (library := _library()) is not None:
+    if kind is Kind.native and platform is Platform.host and (library := carried()) is not None:
         paths = _copied(library, variants or (), fmi, folder)
     else:
         paths = _compiled(variants or (), fmi, kind, platform, folder)

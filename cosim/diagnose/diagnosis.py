@@ -21,7 +21,7 @@ from .adding import made_of
 from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
-from .exchange import reconsidered, simplified
+from .exchange import elsewhere, reconsidered, simplified
 from .experiment import propose
 from .facts import Table
 from .foreign import Adapter, attached
@@ -196,6 +196,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
             search.memo.keep(current)
             if current.labels not in simple:
                 simplified(search, current, offered)
+                elsewhere(search, current, rounds)
                 simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)

@@ -24,7 +24,7 @@ from .late import LateFitter
 from .models import GATE, Fitted, compare, more_general
 from .probes import single
 from .rounds import Round
-from .signature import Signature, unscored
+from .signature import HIDDEN, Signature, unscored
 
 Vector = NDArray[np.float64]
 NEARLY = 0.8
@@ -125,6 +125,47 @@ def simplified(search: LateFitter, fitted: Fitted, known: Sequence[Candidate]) -
                     search.say(f"{candidate.label}, a special case: {gain:+.1f} nats on all runs")
             except CosimError as error:
                 search.say(f"{candidate.label} instead: {error}")
+
+
+def elsewhere(search: LateFitter, fitted: Fitted, rounds: Sequence[Round]) -> None:
+    """Fit a set with each of its laws where, beside it, the same law does nothing of its own.
+
+    A gain of one wheel is the inverse gain of the other one with another radius and track: beside
+    either, calibration absorbs the other. Rounds that lacked further effects took them for two. The
+    memo gets the fits, and the verdict decides.
+
+    Args:
+        search: fits and judges.
+        fitted: the set, thoroughly fitted.
+        rounds: that found it.
+    """
+    declared = search.memo.get(frozenset())
+    assert declared is not None
+    least = HOPEFUL * search.total(declared, fitted)
+    for effect in fitted.effects:
+        hidden = {
+            s.candidate: s
+            for stage in rounds if effect in stage.base.effects
+            for s in stage.signatures
+            if s.candidate.effect == effect.effect and s.candidate.instance == effect.instance
+            and s.candidate not in fitted.effects
+            and s.absorbed > HIDDEN and s.score.size > 0.0
+        }  # fmt: skip
+        rest = tuple(e for e in fitted.effects if e != effect)
+        present = replace(fitted, effects=(*rest, effect), signature=None)
+        for candidate, item in hidden.items():
+            if search.memo.get(frozenset([*(e.label for e in rest), candidate.label])) is not None:
+                continue
+            try:
+                less = composed(search.raw, fitted, rest)
+                trial = exchanged(search, present, unscored(item.probe), None, less, share=0.0)
+                if search.total(declared, trial) > least:
+                    trial = search.approached(trial, present, fitted)
+            except CosimError as error:
+                search.say(f"{candidate.label} instead: {error}")
+                continue
+            gain = search.gains(present, trial)[0]
+            search.say(f"{candidate.label}, the same elsewhere: {gain:+.1f} nats on all runs")
 
 
 def _wider(first: Fitted, second: Fitted) -> bool:

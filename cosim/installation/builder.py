@@ -42,6 +42,25 @@ def sources(module: str) -> ModuleType:
         ) from error
 
 
+def carried() -> Library | None:
+    """What an installed wheel carries; None in a checkout, and in a wheel without FMUs."""
+    found = None if places.in_checkout() else Library(places.root())
+    return found if found is not None and found.content else None
+
+
+def components() -> list[dict[str, Any]]:
+    """The catalogue by component, as the wheel says, else from the sources.
+
+    Raises:
+        UnbuiltError: there is neither.
+    """
+    library = carried()
+    if library is not None:
+        return library.components()
+    found: list[dict[str, Any]] = sources("packaging.catalog").overview()
+    return found
+
+
 @contextmanager
 def naming_errors() -> Iterator[None]:
     """Errors of the sources as ours: bad names and models are wrong input, the rest failed."""
@@ -267,7 +286,8 @@ class Installed:
 
     def contained(self, effect: str) -> tuple[str, ...]:
         """Effects that the law of an effect becomes for some values of its parameters."""
-        return Builder().contained(effect)
+        found = self.library.contained(effect)
+        return found if found is not None else self._built(effect).contained(effect)
 
 
 def default_provider(told: Told | None = None) -> Provider:

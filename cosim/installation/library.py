@@ -179,6 +179,11 @@ class Library:
         texts = self.content["effects"]
         return [(effect, port, texts[effect]) for effect, port in found]
 
+    def contained(self, effect: str) -> tuple[str, ...] | None:
+        """Effects that an effect's law becomes, None if the library does not know the effects."""
+        found = self.content.get("contained")
+        return None if found is None else tuple(found.get(effect, ()))
+
     def refinements(self, variant: str) -> list[dict[str, Any]] | None:
         """Fidelities of which a variant is the limit, None if the library does not know."""
         found = self.content.get("refinements", {}).get(str(parse_name(variant)))

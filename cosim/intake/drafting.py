@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, UnknownNameError, listing
 from ..spec.units import conversion, parse
 from .draft import ColumnEntry, Draft, Entry
 from .files import clock_column, known_clock, readable
+from .grouping import plain
 from .guess import is_angle, turn_of
 from .inspect import ColumnReport
 from .matching import Column, Match, Matches
-from .runs import Part, Run, plain
+from .runs import Part, Run
 from .words import COMMAND, pieces, words
 
 LATE, SHARE = 1.0, 0.1
@@ -38,6 +39,7 @@ class Layout:
         command: keys of the parts that hold inputs.
         late: [s] bound on the lateness of other clocks.
         window: [s] of the pieces that runs are cut into, 0 for whole runs.
+        lateness: [s] of clocks, where it is known, by key of the part.
     """
 
     whole: bool
@@ -45,6 +47,11 @@ class Layout:
     command: tuple[str, ...]
     late: float
     window: float = 0.0
+    lateness: Mapping[str, float] = field(default_factory=dict)
+
+    def behind(self, key: str) -> float:
+        """How late the clock of a part is against the main one [s], as far as it is known."""
+        return self.lateness.get(key, 0.0) - self.lateness.get(self.main, 0.0)
 
 
 def columns_of(runs: Sequence[Run]) -> list[Column]:
@@ -70,8 +77,29 @@ def _report(run: Run, key: str, name: str) -> ColumnReport | None:
     return next((c for c in columns if c.name == name), None)
 
 
-def layout(runs: Sequence[Run], matches: Matches, window: float = 0.0) -> Layout:
-    """How the parts are read: the clock of the part that measures most is the main one."""
+def layout(
+    runs: Sequence[Run],
+    matches: Matches,
+    window: float = 0.0,
+    lateness: Mapping[str, float] | None = None,
+) -> Layout:
+    """How the parts are read: the clock of the part that measures most is the main one.
+
+    Args:
+        runs: with the parts that are used.
+        matches: which columns they are for.
+        window: [s] of the pieces that runs are cut into, 0 for whole runs.
+        lateness: [s] of clocks, where it is known, by key of the part.
+
+    Raises:
+        UnknownNameError: the lateness of a part that is not used.
+    """
+    for key in lateness or {}:
+        if key not in runs[0].parts:
+            raise UnknownNameError(
+                f"--late {key}: no part of the runs is called so; "
+                f"{listing([k for k in runs[0].parts if k], key)}"
+            )
     count: dict[str, int] = {}
     for match in matches.channels.values():
         count[match.column.part] = count.get(match.column.part, 0) + 1
@@ -81,7 +109,7 @@ def layout(runs: Sequence[Run], matches: Matches, window: float = 0.0) -> Layout
     used = {m.column.part for m in (*matches.inputs.values(), *matches.channels.values())}
     whole = all(readable([run.parts[key] for key in used]) for run in runs)
     inputs = tuple(dict.fromkeys(m.column.part for m in matches.inputs.values()))
-    return Layout(whole, main, inputs, min(LATE, SHARE * shortest), window)
+    return Layout(whole, main, inputs, min(LATE, SHARE * shortest), window, dict(lateness or {}))
 
 
 def _rate(part: Part) -> float:
@@ -117,7 +145,8 @@ def draft_of(
     for variable, match in matches.channels.items():
         name = names[match.column.source]
         draft.channels[name] = _channel(variable, match, runs)
-        if plan.command and match.column.part not in plan.command:
+        known = match.column.part in plan.lateness
+        if plan.command and match.column.part not in plan.command and not known:
             late.setdefault(match.column.part, []).append(name)
     for key, channels in late.items():
         draft.nuisances.append(_clock_nuisance(key, channels, plan))
@@ -173,6 +202,10 @@ def _column(
         keys["time"] = f"{column.part}.{clock_column(part, plan.whole)}"
         if drives:
             keys["hold"] = True
+        if behind := plan.behind(column.part):
+            keys["late"] = _nice(behind / _unit_of_main(runs[0].parts[plan.main], plan))
+            remarks.append(f"Its clock is {abs(behind):g} s {'late' if behind > 0.0 else 'early'} "
+                           f"against that of {plan.main}, as given.")  # fmt: skip
     stated = part.report.topic.log.units.get(column.name) == unit.unit or (
         not plan.whole and unit.sure and "--map" not in unit.reason
     )
@@ -194,6 +227,13 @@ def _column(
             if finding.column == column.name and finding.kind in ("spikes", "saturated"):
                 remarks.append(f"Run {run.name}: {finding.text}.")
     return ColumnEntry(name, keys, " ".join(remarks))
+
+
+def _unit_of_main(part: Part, plan: Layout) -> float:
+    """[s] of a unit of the main clock, as the mapping reads it: seconds where it knows them."""
+    if not plan.whole or known_clock(part):
+        return 1.0
+    return parse(part.report.clock.unit.unit or "s").factor
 
 
 def _channel(variable: str, match: Match, runs: Sequence[Run]) -> Entry:
@@ -224,8 +264,8 @@ def _clock_nuisance(key: str, channels: Sequence[str], plan: Layout) -> Entry:
     text = (
         f"How late the clock of {key or 'the log'} is against that of {reference}: another "
         "computer, another driver, the time a camera takes. Estimated for all runs together. A "
-        "delay of all commands looks the same, and is in it: who knows how late the clock is takes "
-        "that off, and the rest is the delay."
+        "delay of all commands looks the same, and is in it: who knows how late the clock is "
+        f"imports with --late {key or 'PART'}=SECONDS, and the rest is named as a delay."
     )
     return Entry(
         {"name": f"clock of {key}", "unit": "s", "nominal": 0.0, "min": -plan.late,
@@ -258,7 +298,7 @@ def covered(run: Run, plan: Layout) -> tuple[int, int] | None:
     for key in plan.command:
         if key == plan.main:
             continue
-        own = _absolute(run.parts[key])
+        own = _absolute(run.parts[key]) - plan.behind(key)
         own = own[np.isfinite(own)]
         if not own.size or main.clock.epoch != run.parts[key].report.clock.epoch:
             continue

@@ -15,7 +15,8 @@ from ..files import atomic, make_folder, writing
 from ..spec.distribution import needed
 from ..spec.units import parse
 from .clock import Clock
-from .runs import Part, Run, plain
+from .grouping import plain
+from .runs import Part, Run
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -1,9 +1,10 @@
-"""What the command line says: `--map COLUMN=VARIABLE[:UNIT]`, `--parameter`, `--run`."""
+"""What the command line says: `--map COLUMN=VARIABLE[:UNIT]`, `--parameter`, `--run`, `--late`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
 from ..errors import InputError, UnitError, UnknownNameError, listing
@@ -100,6 +101,25 @@ def runs_of(given: Sequence[str]) -> dict[str, list[Path]]:
                 f"--run {text}: run {name!r} is there twice; give all its files at once"
             )
         found[name] = [Path(item) for item in files.split(",") if item]
+    return found
+
+
+def late_of(given: Sequence[str]) -> dict[str, float]:
+    """What `--late PART=SECONDS` says [s].
+
+    Raises:
+        InputError: it is not of that form.
+    """
+    found: dict[str, float] = {}
+    for text in given:
+        part, _, rest = text.partition("=")
+        number = _number(rest)
+        if not part or number is None or not isfinite(number):
+            raise InputError(
+                f"--late {text}: write --late PART=SECONDS, e.g. --late pose=0.3 for a camera "
+                "whose times are 0.3 s late"
+            )
+        found[part.strip()] = number
     return found
 
 

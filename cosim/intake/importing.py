@@ -64,6 +64,7 @@ class Wishes:
         clock: column of times, where it is not found.
         received: of bags, take the times of recording instead of the stamps in headers.
         window: [s] of the pieces that runs are cut into, 0 for whole runs.
+        late: [s] by which the clocks of parts are late, where that is known.
     """
 
     system: str
@@ -73,6 +74,36 @@ class Wishes:
     clock: str = ""
     window: float = 0.0
     received: bool = False
+    late: Mapping[str, float] = field(default_factory=dict)
+
+
+class Inspected:
+    """What is in files, each read once.
+
+    Args:
+        wishes: topics and clock.
+        told: is told which file is being read.
+    """
+
+    def __init__(self, wishes: Wishes, told: Callable[[str], None] = _silent) -> None:
+        self._wishes, self._told = wishes, told
+        self._found: dict[Path, FileReport] = {}
+
+    def __call__(self, path: Path) -> FileReport:
+        """What is in a file.
+
+        Raises:
+            ScenarioError: it cannot be read.
+        """
+        if path not in self._found:
+            self._told(f"reading {path}")
+            wishes = self._wishes
+            self._found[path] = inspect(path, wishes.topics, wishes.clock, wishes.received)
+        return self._found[path]
+
+    def columns(self, path: Path) -> frozenset[str]:
+        """Columns of a file without clocks."""
+        return self(path).column_names()
 
 
 @dataclass(frozen=True)
@@ -106,6 +137,7 @@ def import_logs(
     provider: Provider,
     ask: Asker | None = None,
     told: Callable[[str], None] = _silent,
+    inspected: Inspected | None = None,
 ) -> Imported:
     """Write a data set.
 
@@ -117,6 +149,7 @@ def import_logs(
         provider: where variants come from.
         ask: is asked for what is missing; an error lists it if not given.
         told: is told what is being done.
+        inspected: files that are read already.
 
     Raises:
         InputError: what is missing or does not fit, with the flag to give.
@@ -127,20 +160,17 @@ def import_logs(
         )
     file = _system(wishes.system)
     system = file.build(provider)
-    looked: dict[str, list[FileReport]] = {}
-    for name, paths in files.items():
-        for path in paths:
-            told(f"reading {path}")
-            looked.setdefault(name, []).append(
-                inspect(path, wishes.topics, wishes.clock, wishes.received)
-            )
-    runs = [Run(name, purposes[name], parts_of(name, found)) for name, found in looked.items()]
+    inspected = inspected or Inspected(wishes, told)
+    runs = [
+        Run(name, purposes[name], parts_of(name, [inspected(path) for path in paths]))
+        for name, paths in files.items()
+    ]
     check_alike(runs)
     variables = places_of(system)
     columns = columns_of(runs)
     matches = _matched(columns, variables, wishes, ask)
     runs = _used(runs, matches)
-    plan = layout(runs, matches, wishes.window)
+    plan = layout(runs, matches, wishes.window, wishes.late)
     make_folder(folder)
     stored = {run.name: place(run, folder, plan.whole) for run in runs}
     said = _system_entry(file, folder, wishes.system)
@@ -336,7 +366,11 @@ def _refined(
     told("trying start values")
     add_starts(draft, problem(), late)
     told("trying which parameters the logs tell")
-    add_parameters(draft, problem(), wishes.parameters)
+    if kept := add_parameters(draft, problem(), wishes.parameters):
+        notes.append(
+            f"the logs do not tell {', '.join(kept)} apart from what is estimated: they keep the "
+            "system's values, and what is found is right as far as these are"
+        )
     return notes
 
 

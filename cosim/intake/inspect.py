@@ -81,6 +81,14 @@ class FileReport:
     source: Source
     topics: tuple[TopicReport, ...]
 
+    def column_names(self) -> frozenset[str]:
+        """Columns of all topics but their clocks, with the topic where a file has topics."""
+        return frozenset(
+            column.name if self.source.plain else f"{topic.topic.name}.{column.name}"
+            for topic in self.topics
+            for column in topic.columns
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {

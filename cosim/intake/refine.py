@@ -314,26 +314,34 @@ def told(problem: Problem, tried: Sequence[Parameter]) -> list[str]:
     return [both.parameters[i].name for i in chosen]
 
 
-def add_parameters(draft: Draft, problem: Problem, given: Mapping[str, tuple[float, ...]]) -> None:
-    """Write the parameters that are estimated: those given, or those that the logs tell."""
+def add_parameters(
+    draft: Draft, problem: Problem, given: Mapping[str, tuple[float, ...]]
+) -> list[str]:
+    """Write the parameters that are estimated: those given, or those that the logs tell.
+
+    Returns:
+        Those that the logs do not tell apart from these.
+    """
     tried, zero = candidates(problem)
     if given:
         known = {p.name: p for p in tried}
         for name, numbers in given.items():
             draft.parameters.append(_entry(_stated(problem, name, numbers, known.get(name))))
-        return
+        return []
     built = [p for p in tried if any(word in p.name.lower().partition(".")[2] for word in BUILT)]
     free = [p for p in tried if p not in built]
     chosen = told(problem, free) if free else []
     draft.parameters += [_entry(p) for p in free if p.name in chosen]
+    kept = [p for p in free if p.name not in chosen]
     for what, names in (
         ("The logs do not tell these apart from the others, so they keep the system's values",
-         [f"{p.name} = {p.nominal:.6g} {p.unit}" for p in free if p.name not in chosen]),
+         [f"{p.name} = {p.nominal:.6g} {p.unit}" for p in kept]),
         ("Known from how the machine is built", [f"{p.name} = {p.nominal:.6g}" for p in built]),
         ("0 in the system, and left so; --parameter NAME=NOMINAL:MIN:MAX estimates one", zero),
     ):  # fmt: skip
         if names:
             draft.held.append(f"{what}: {', '.join(names)}.")
+    return [p.name for p in kept] if chosen else []
 
 
 def _stated(

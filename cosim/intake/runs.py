@@ -1,16 +1,14 @@
-"""Which files are a run together, and what its parts are called."""
+"""Runs of a data set to be: their purposes, and what their parts are called."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError, listing
+from .grouping import plain, without
 from .inspect import FileReport, TopicReport
-
-_PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @dataclass(frozen=True)
@@ -43,45 +41,6 @@ class Run:
     parts: Mapping[str, Part]
 
 
-def plain(name: str) -> str:
-    """A name that can be a key: letters, digits and underscores."""
-    return _PLAIN.sub("_", name).strip("_") or "log"
-
-
-def grouped(files: Sequence[Path], runs: Mapping[str, Sequence[Path]]) -> dict[str, list[Path]]:
-    """Files by run.
-
-    Files that no run names are a run each, or together where their names say so: with two and more
-    of each end, `a_cmd.csv a_pose.csv b_cmd.csv b_pose.csv` are the runs a and b.
-
-    Args:
-        files: without a run.
-        runs: files by the name of their run, as given.
-
-    Raises:
-        InputError: two runs of one name, or nothing at all.
-    """
-    found = {name: list(paths) for name, paths in runs.items()}
-    stems: dict[str, list[tuple[str, Path]]] = {}
-    for path in files:
-        begin, mark, end = re.fullmatch(r"(.*?)(?:([_-])([^_-]+))?", path.stem).groups()  # type: ignore[union-attr]
-        stems.setdefault(begin if mark else "", []).append((end or "", path))
-    ends = {tuple(sorted(end for end, _ in items)) for items in stems.values()}
-    together = len(ends) == 1 and "" not in stems and len(next(iter(ends))) > 1
-    for path in files:
-        name = plain(path.stem)
-        if together:
-            name = next(plain(b) for b, items in stems.items() if path in [p for _, p in items])
-        elif name in found:
-            raise InputError(
-                f"{path}: there is a run {name!r} already; name it with --run NAME=FILE"
-            )
-        found.setdefault(name, []).append(path)
-    if not found:
-        raise InputError("no files to import; name some, or give --run NAME=FILE,FILE")
-    return found
-
-
 def purposes(names: Sequence[str], validation: Sequence[str]) -> dict[str, str]:
     """Purpose of each run: the last of several validates, if none is named.
 
@@ -107,9 +66,7 @@ def parts_of(run: str, files: Sequence[FileReport]) -> dict[str, Part]:
         return {"": Part(file.source.path, file.source.plain, topic)}
     found: dict[str, Part] = {}
     for file, topic, name in items:
-        short = plain(name)
-        if file.source.plain:
-            short = plain(short.removeprefix(run).removesuffix(run))
+        short = without(name, run) if file.source.plain else plain(name)
         key = next(k for k in (short, *(f"{short}_{i}" for i in range(2, 999))) if k not in found)
         found[key] = Part(file.source.path, file.source.plain, topic)
     return found

@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import VariantError, listing
 from ..files import write_text
 from ..fmu.description import Description, Variable
-from ..installation.builder import sources
+from ..installation.builder import components
 from ..spec.variant import parse_name
 from ..system.provider import Provider
 from ..system.system import System
@@ -77,9 +77,7 @@ def _is_whole(reference: str) -> bool:
 
 def _simplest(component: str) -> str:
     """The simplest fidelity of a component, `component.device` taken as well."""
-    entries = {
-        entry["component"]: entry["fidelities"] for entry in sources("packaging.catalog").overview()
-    }
+    entries = {entry["component"]: entry["fidelities"] for entry in components()}
     short = component.partition(".")[0]
     if short not in entries:
         raise VariantError(f"--from: there is no component {short!r}; {listing(entries, short)}")

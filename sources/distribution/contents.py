@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.calibrate.mapping import find_system
@@ -20,6 +21,7 @@ from cosim.diagnose.probes import batches
 from cosim.files import read_toml
 from cosim.installation import places
 from cosim.installation.examples import read_mapping
+from cosim.robots import create, templates
 from cosim.running.runner import prepare
 from cosim.scenario.scenario import scenario_files
 from cosim.spec.variant import parse_name
@@ -107,6 +109,22 @@ def declared(mapping: Path, provider: Provider) -> Problem:
     return Problem(mapping.parent.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
 
 
+def of_templates(provider: Provider) -> list[Problem]:
+    """The systems of all templates that need no device, as problems without data.
+
+    Who begins with one has logs of a robot that no wheel knows.
+    """
+    found = []
+    with TemporaryDirectory() as folder:
+        for name in templates.names():
+            template = templates.read(name, {})
+            if template.inputs:  # an arm's come from its device
+                out = Path(folder) / name
+                create.from_template(name, out, template, provider, logs=False)
+                found.append(declared(out / "dataset.toml", provider))
+    return found
+
+
 def beside_foreign(provider: Provider) -> Problem:
     """What stands beside an FMU without sources: the bench of the example, and all adapters."""
     instances = {"motor": "bare_motor/winding", "rotor": "rotor/rigid"}
@@ -143,14 +161,16 @@ def _variants(problem: Problem, changes: Iterable[dict[str, str]]) -> list[str]:
 
 
 def sorted_out(names: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Those of these variants that exist, and those whose effects do not fit together.
+    """Those of these variants that exist, and those whose effects do not fit, or not together.
 
-    One effect alone fits: it is a candidate.
+    A candidate alone fits. The unknown input does not at every balance: nothing can enter at a mass
+    centre.
     """
     found, impossible = [], []
     for name in names:
+        effects = [effect for effect, _ in parse_name(name).effects]
         try:
-            if len(parse_name(name).effects) > 1:
+            if len(effects) > 1 or PROBE in effects:
                 build_model(name)
         except ModelError:
             impossible.append(name)

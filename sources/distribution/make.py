@@ -70,7 +70,7 @@ def make(
     plain = contents.plain(provider) if plain is None else list(plain)
     systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
     if mappings is None:
-        systems.append(contents.beside_foreign(provider))
+        systems += [*contents.of_templates(provider), contents.beside_foreign(provider)]
     asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
     fitting, impossible = contents.sorted_out(asked)
     extra = [name for name in fitting if name not in set(plain)]
@@ -158,6 +158,7 @@ def _catalogue(names: Sequence[str]) -> dict[str, Any]:
         "names": list(names),
         "variants": [catalog.describe(name) for name in names],
         "effects": {name: module.EFFECT.text for name, module in effects().items()},
+        "contained": {name: catalog.contained(name) for name in effects()},
         "candidates": {
             name: [(effect, port) for effect, port, _ in catalog.candidates(name)] for name in names
         },

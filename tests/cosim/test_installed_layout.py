@@ -12,7 +12,10 @@ from pathlib import Path
 import pytest
 
 from cosim.errors import CosimError, VariantError
+from cosim.installation.builder import default_provider
 from cosim.installation.library import Library
+from sources.distribution import contents
+from sources.distribution.contents import sorted_out
 from sources.distribution.make import make, write_pack
 from tests.fmus import fmu
 
@@ -32,6 +35,20 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     make(folder, mappings=[MAPPING], plain=PLAIN)
     return folder
+
+
+def test_nothing_enters_at_a_mass_centre() -> None:
+    """A wheel of everything must not stop there: 5 of 2095 variants are such."""
+    load, body = (f"crawler.lab/track_contact+unknown_input@{at}" for at in ("load", "body"))
+    assert sorted_out([load, body]) == ([body], [load])
+
+
+def test_a_wheel_serves_who_begins_with_a_template() -> None:
+    problems = {item.name: item for item in contents.of_templates(default_provider())}
+    assert {"diff_drive", "tricycle", "mecanum", "omni", "tracked", "motor"} < set(problems)
+    asked = contents.of_diagnosis(problems["diff_drive"])
+    assert "diff_drive/rolling+unknown_input@turn" in asked
+    assert sorted_out(asked) == (asked, [])
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +122,34 @@ def test_its_catalogue_is_listed_and_copied_without_casadi(site: Path, tmp_path:
     assert code == 0, err
     copied = tmp_path / "copied" / "fmi3" / "gearbox.lab_bench-ratio.fmu"
     assert copied.read_bytes() == fmu("gearbox.lab_bench/ratio", fmi=3).read_bytes()
+
+
+def test_what_a_diagnosis_asks_is_known_without_casadi(site: Path, tmp_path: Path) -> None:
+    """Which effects fit, which contain others, which fidelities a variant is the limit of."""
+    asked = (
+        "from cosim.installation.builder import default_provider\n"
+        "provider, name = default_provider(), 'gearbox.lab_bench/ratio'\n"
+        "effects = sorted({effect for effect, _, _ in provider.candidates(name)})\n"
+        "contained = {effect: provider.contained(effect) for effect in effects}\n"
+        "print(json.dumps([provider.candidates(name), contained, provider.refinements(name)]))\n"
+    )
+    program = f"import json, sys\nsys.path.insert(0, {str(site)!r})\n"
+    answers = []
+    for blocked, at in (("casadi", tmp_path), ("", ROOT)):
+        head = program + f"sys.modules[{blocked!r}] = None\n" if blocked else "import json\n"
+        done = subprocess.run([sys.executable, "-c", head + asked], cwd=at, text=True, check=True,
+                              capture_output=True)  # fmt: skip
+        answers.append(json.loads(done.stdout))
+    assert answers[0] == answers[1] and any(answers[0][1].values())
+
+
+def test_a_system_is_composed_without_casadi(site: Path, tmp_path: Path) -> None:
+    """A component alone stands for its simplest fidelity, which the wheel's catalogue knows."""
+    code, _, err = call(
+        site, tmp_path, "new", "system", "own", "--from", "gearbox", blocked="casadi"
+    )
+    assert code == 0, err
+    assert 'gearbox = "gearbox/ratio"' in (tmp_path / "own" / "system.toml").read_text()
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pty
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,11 @@ from cosim.errors import CosimError, InputError, UnknownNameError
 from cosim.files import read_toml
 from cosim.installation.builder import default_provider
 from cosim.intake.example import RADIUS, SYSTEM, TRACK, drive, write_csv
-from cosim.intake.importing import Imported, Wishes, import_logs
+from cosim.intake.given import late_of
+from cosim.intake.grouping import grouped
+from cosim.intake.importing import Imported, Inspected, Wishes, import_logs
 from cosim.intake.matching import Column, Match, Place
-from cosim.intake.runs import grouped, purposes
+from cosim.intake.runs import purposes
 
 LATE = 0.23
 """[s] No multiple of the camera's or the commands' interval."""
@@ -43,9 +46,9 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def imported(
     logs: Path, out: Path, *maps: str, pattern: str = "*_*.csv", **more: object
 ) -> Imported:
-    files = grouped(sorted(logs.glob(pattern)), {})
     ask = more.pop("ask", None)
     wishes = Wishes(str(logs / "robot.toml"), maps, **more)  # type: ignore[arg-type]
+    files = grouped(sorted(logs.glob(pattern)), {}, Inspected(wishes).columns).runs
     chosen = purposes(list(files), [])
     return import_logs(files, chosen, wishes, out, default_provider(), ask)  # type: ignore[arg-type]
 
@@ -231,6 +234,66 @@ def test_runs_must_have_the_same_parts(logs: Path, tmp_path: Path) -> None:
     chosen = {"a": "identification", "b": "validation"}
     with pytest.raises(InputError, match="run b has the parts one table, but run a has"):
         import_logs(files, chosen, Wishes(str(logs / "robot.toml")), tmp_path, default_provider())
+
+
+def test_a_clock_that_is_known_to_be_late_is_not_estimated(logs: Path, tmp_path: Path) -> None:
+    """What is left over is then a delay of the commands; held columns move, samples stay."""
+    imported(logs, tmp_path / "set", late={"pose": LATE}, parameters={"base.r": ()})
+    content = read_toml(tmp_path / "set" / "dataset.toml")
+    assert content["columns"]["left"]["late"] == -LATE and "late" not in content["columns"]["px"]
+    assert "clock of pose" not in [n["name"] for n in content.get("nuisance", ())]
+    imported(logs, tmp_path / "plain", parameters={"base.r": ()})
+    first = [
+        [run.get("samples", [1])[0] for run in read_toml(tmp_path / name / "dataset.toml")["run"]]
+        for name in ("set", "plain")
+    ]
+    pairs = zip(
+        read_problem(tmp_path / "set").runs, read_problem(tmp_path / "plain").runs, *first,
+        strict=True,
+    )  # fmt: skip
+    for run, other, begins, plain in pairs:
+        times = run.times[(run.times > 1.0) & (run.times < 8.0)]
+        earlier = times + (begins - plain) * 0.04 - LATE  # 25 Hz
+        for name in ("base.w_l", "base.w_r"):
+            moved, still = (r.inputs[name].at(t) for r, t in ((run, times), (other, earlier)))
+            assert np.mean(moved == still) > 0.98  # not where a value changes at that instant
+    with pytest.raises(UnknownNameError, match=r"--late pos: no part .* did you mean 'pose'"):
+        imported(logs, tmp_path / "other", late={"pos": LATE})
+
+
+def test_how_late_is_a_number() -> None:
+    assert late_of(["pose=0.3", "imu=-0.01"]) == {"pose": 0.3, "imu": -0.01}
+    for wrong in ("pose", "pose=x", "=1", "pose=nan"):
+        with pytest.raises(InputError, match=f"--late {wrong}: write --late PART=SECONDS"):
+            late_of([wrong])
+
+
+def test_what_the_logs_do_not_tell_apart_is_said(tmp_path: Path) -> None:
+    """Efficiency over inertia shows, and over friction: one of the three keeps its value."""
+    (tmp_path / "drive.toml").write_text(
+        'connections = ["gear.tau_b -> load.tau", "load.w -> gear.w_b"]\n'
+        '[instances]\ngear = "gearbox/ratio"\nload = "inertia/disc"\n'
+        "[parameters]\ngear.J_a = 0.0\ngear.ratio = 10.0\ngear.eta = 0.8\n"
+        "load.J = 0.1\nload.b = 0.05\n"
+    )
+    chance, w, lines = np.random.default_rng(1), 0.0, ["t_s,torque_Nm,speed_rad_s"]
+    for k in range(400):
+        torque = 0.1 if k // 80 % 2 else -0.05
+        lines.append(f"{0.02 * k:.2f},{torque},{w + chance.normal(0.0, 0.01):.5f}")
+        w += 0.02 * (8.0 * torque - 0.05 * w) / 0.1
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    wishes = Wishes(str(tmp_path / "drive.toml"), ["torque_Nm=gear.tau_a", "speed_rad_s=load.w"])
+    kept = "the logs do not tell gear.eta apart from what is estimated"
+
+    def notes(given: dict[str, tuple[float, ...]]) -> str:
+        asked = replace(wishes, parameters=given)
+        out = tmp_path / f"set_{len(given)}"
+        purpose = {"a": "identification"}
+        done = import_logs({"a": [tmp_path / "a.csv"]}, purpose, asked, out, default_provider())
+        return " ".join(done.notes)
+
+    assert kept in notes({})
+    assert kept not in notes({"load.b": ()})  # who says what is estimated knows
 
 
 # -- the command -----------------------------------------------------------------------------------

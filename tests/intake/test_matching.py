@@ -10,7 +10,7 @@ from cosim.errors import InputError, UnitError, UnknownNameError
 from cosim.intake.given import parameters_of, runs_of, take
 from cosim.intake.guess import Guess
 from cosim.intake.matching import Column, Matches, Place, guess
-from cosim.intake.runs import grouped, purposes
+from cosim.intake.runs import purposes
 from cosim.intake.words import words
 
 
@@ -127,18 +127,6 @@ def test_wrong_flags_are_named(given: str, error: type[Exception], said: str) ->
 def test_a_variable_is_one_column() -> None:
     with pytest.raises(InputError, match=r"motor\.w is a\.v already"):
         take(["a.v=motor.w:rpm", "b.v=motor.w:rpm"], COLUMNS, PLACES)
-
-
-def test_files_are_runs_alone_or_together() -> None:
-    files = [Path(f"{run}_{end}.csv") for run in ("arc", "eight") for end in ("cmd", "pose")]
-    assert grouped(files, {}) == {"arc": files[:2], "eight": files[2:]}
-    assert list(grouped(files[:3], {})) == ["arc_cmd", "arc_pose", "eight_cmd"]
-    assert list(grouped([Path("a.csv"), Path("b.csv")], {})) == ["a", "b"]
-    assert grouped([], {"one": files}) == {"one": files}
-    with pytest.raises(InputError, match="there is a run 'a' already"):
-        grouped([Path("a.csv"), Path("x/a.csv")], {})
-    with pytest.raises(InputError, match="no files to import"):
-        grouped([], {})
 
 
 def test_the_last_of_several_runs_validates() -> None:
