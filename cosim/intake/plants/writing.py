@@ -65,7 +65,7 @@ class Kind:
 # -- mobile manipulator ----------------------------------------------------------------------------
 
 TRUE_MACHINE = manipulator.Machine(
-    grip=0.60, sliding=0.44, ki_speed=11.0, kp_speed=1.75, rotor=1.5e-4
+    grip=0.52, sliding=0.40, ki_speed=4.5, kp_speed=1.1, rotor=1.5e-4
 )
 """What the logs are made with; the model's first guess is another."""
 PATHS = {
