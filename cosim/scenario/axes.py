@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..errors import listing
+
 _KEYS = {
     "label", "signals", "paths", "comparisons", "names", "unit", "minus", "after", "before",
     "error_unit",
@@ -79,6 +81,11 @@ def read_axes(entry: Mapping[str, Any]) -> Axes:
     )
 
 
+_FIGURE_KEYS = {
+    "name", "title", "runs", "together", "columns", "errors", "plots", "quantities",
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class FigureSpec:
     """A picture of one run, or of several together.
@@ -111,6 +118,11 @@ def read_figure(entry: Mapping[str, Any]) -> FigureSpec:
         ValueError: incomplete or contradictory.
     """
     name, columns = str(entry.get("name", "")), entry.get("columns", 1)
+    for key in entry:
+        if key not in _FIGURE_KEYS:
+            raise ValueError(
+                f"figure {name!r} has no key {key!r}; {listing(sorted(_FIGURE_KEYS), key)}"
+            )
     if not name or "/" in name:
         raise ValueError(f"a figure needs a name without slashes, not {name!r}")
     if bool(entry.get("plots")) == bool(entry.get("quantities")):
