@@ -72,18 +72,20 @@ def run_pictures(
             channel = problem.channels[index]
             measured = run.data[:, index]
             upper.plot(run.times, measured, label="measured", **STYLES["measured"])  # type: ignore[arg-type]
+            sizes = []
             for name, found in (("first guess", before), ("calibrated", after)):
                 rest = found[run.name][:, index] * channel.sigma
                 style: Any = STYLES[name]
                 upper.plot(run.times, measured - rest, label=name, **style)
-                size = math.sqrt(float(np.nanmean(rest**2)))
-                lower.plot(run.times, -rest, label=f"{size:.3g}", **style)
+                lower.plot(run.times, -rest, **style)
+                sizes.append(math.sqrt(float(np.nanmean(rest**2))))
             upper.set_ylabel(f"{channel.name} [{channel.unit}]")
             upper.tick_params(labelbottom=False)
             lower.set_ylabel("error")
             lower.set_xlabel("time [s]")
-            lower.legend(loc="upper right", fontsize="x-small", ncols=2, title_fontsize="x-small",
-                         title="RMS")  # fmt: skip
+            lower.set_title(
+                f"RMS {sizes[0]:.3g}, calibrated {sizes[1]:.3g}", fontsize="small", loc="right"
+            )
             for axis in (upper, lower):
                 axis.grid(True, alpha=0.3)
                 axis.margins(x=0.01)

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, ERRORS, PATHS = 4.4, 2.1, 1.1, 3.6
 """Of axes [inch]: width, heights of courses, of the errors below them, and of paths."""
+ALONE = 6.0
+"""Least width of a figure [inch]."""
+DOTS = 80
+"""Per inch: three columns are as wide as a page on a screen, in 100 kB."""
 
 
 Shown = Mapping[str, tuple[Axes, RunResult]]
@@ -51,7 +55,7 @@ def draw(number: int, results: Mapping[str, RunResult], title: str) -> Figure:
     for row, errors in zip(rows, below, strict=True):
         tall = any(item.paths for panel in row for item, _ in panel.values())
         heights += [PATHS if tall else HEIGHT, ERRORS] if errors else [PATHS if tall else HEIGHT]
-    size = (WIDTH * spec.columns, sum(heights) + 0.7)
+    size = (max(WIDTH * spec.columns, ALONE), sum(heights) + 0.7)
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.add_gridspec(len(heights), spec.columns, height_ratios=heights)
     place = 0
@@ -205,6 +209,6 @@ def _figures_of(
             title = own.title or " ".join([file.name, *(() if spec.together else part)]).strip()
             ending = "" if spec.together or not part[0] else f"_{part[0]}"
             path = out / f"{base}_{spec.name}{ending}.{suffix}"
-            save(draw(number, found, title), path)
+            save(draw(number, found, title), path, DOTS)
             written.append(path)
     return written

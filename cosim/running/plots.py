@@ -97,11 +97,11 @@ def _path_column(place: Any, count: int, height: float) -> list[MatplotlibAxes]:
     return axes
 
 
-def save(figure: Figure, path: Path | str | None) -> None:
-    """Write a picture; the suffix says how."""
+def save(figure: Figure, path: Path | str | None, dots: int = 120) -> None:
+    """Write a picture, `dots` per inch; the suffix says how."""
     if path is not None:
         with atomic(Path(path)) as temporary:
-            figure.savefig(temporary, dpi=120)
+            figure.savefig(temporary, dpi=dots)
 
 
 class _Scale:

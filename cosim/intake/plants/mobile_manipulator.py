@@ -439,7 +439,7 @@ def simulate(
         machine: what it is like.
         command: what it is asked for.
         arm: with moving joints.
-        pose: of the arm, where it does not move.
+        pose: of the arm at the start.
 
     Returns:
         Columns at the times of the command: x, y, phi of O [m, rad] from where it stood; v, w_z

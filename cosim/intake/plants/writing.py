@@ -119,7 +119,7 @@ def _base_runs() -> Iterator[tuple[str, str, dict[str, Vector]]]:
 def _arm_runs() -> Iterator[tuple[str, str, dict[str, Vector]]]:
     for name, (_, _, _, purpose) in PATHS.items():
         command = _path(name, swings=name.endswith("Y"))
-        found = manipulator.simulate(TRUE_MACHINE, command, arm=True)
+        found = manipulator.simulate(TRUE_MACHINE, command, arm=True, pose=command.joints[0])
         low_x, high_x, low_y, high_y = VOLUME
         x, y = found["tool_x"], found["tool_y"]
         outside = (x < low_x) | (x > high_x) | (y < low_y) | (y > high_y)
