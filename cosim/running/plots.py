@@ -174,7 +174,9 @@ def draw_paths(
         x, y = (scale(recording[name])[inside] for name in pair)
         name = item.names[number] if item.names else ", ".join(pair)
         name = f"{run} {name}".strip() if len(item.paths) > 1 or not run else run
-        (line,) = axis.plot(x, y, _LINES[number % 4], linewidth=1.2, label=name)
+        several = bool(run) and _reference(references, pair) is None  # they may cover each other
+        style = _LINES[(len(_labels(axis)) if several else number) % 4]
+        (line,) = axis.plot(x, y, style, linewidth=1.2, label=name)
         axis.plot(x[-1:], y[-1:], "o", color=line.get_color(), markersize=4)  # where it ends
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel(_label("x", unit))
