@@ -156,15 +156,15 @@ def _omni_runs() -> Iterator[tuple[str, str, dict[str, Vector]]]:
 
 KINDS = {
     "mir250": Kind(
-        "mir250_poses", "MiR250 with a locked arm on the paper's runs: poses and speeds.",
+        "mir250_poses", "Made by a plant of its own.",
         _base_runs,
     ),
     "mobile_manipulator": Kind(
         "mobile_manipulator_poses",
-        "MiR250 with a UR5e on the paper's six runs: poses of base and tool, speeds.", _arm_runs,
+        "Made by a plant of its own.", _arm_runs,
     ),
     "omni_base": Kind(
-        "omni_base_poses", "Omnidirectional base on given torques: poses and steering angles.",
+        "omni_base_poses", "Made by a plant of its own.",
         _omni_runs,
     ),
 }  # fmt: skip
