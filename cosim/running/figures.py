@@ -26,7 +26,7 @@ WIDTH, HEIGHT, ERRORS, PATHS = 4.4, 2.1, 1.1, 3.6
 """Of axes [inch]: width, heights of courses, of the errors below them, and of paths."""
 ALONE = 6.0
 """Least width of a figure [inch]."""
-DOTS = 80
+DOTS = 72
 """Per inch: three columns are as wide as a page on a screen, in 100 kB."""
 
 
