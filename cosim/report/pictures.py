@@ -59,6 +59,7 @@ def run_pictures(
         shown = [
             i for i in range(len(problem.channels)) if np.isfinite(run.data[:, i]).any()
         ]  # fmt: skip
+        times = run.times - run.lead  # of the log
         rows = math.ceil(len(shown) / COLUMNS)
         columns = min(len(shown), COLUMNS)
         figure = Figure(
@@ -71,13 +72,13 @@ def run_pictures(
             lower = figure.add_subplot(grid[2 * row + 1, column], sharex=upper)
             channel = problem.channels[index]
             measured = run.data[:, index]
-            upper.plot(run.times, measured, label="measured", **STYLES["measured"])  # type: ignore[arg-type]
+            upper.plot(times, measured, label="measured", **STYLES["measured"])  # type: ignore[arg-type]
             sizes = []
             for name, found in (("first guess", before), ("calibrated", after)):
                 rest = found[run.name][:, index] * channel.sigma
                 style: Any = STYLES[name]
-                upper.plot(run.times, measured - rest, label=name, **style)
-                lower.plot(run.times, -rest, **style)
+                upper.plot(times, measured - rest, label=name, **style)
+                lower.plot(times, -rest, **style)
                 sizes.append(math.sqrt(float(np.nanmean(rest**2))))
             upper.set_ylabel(f"{channel.name} [{channel.unit}]")
             upper.tick_params(labelbottom=False)
