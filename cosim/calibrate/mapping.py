@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from ..installation import builder, places
 from ..installation.examples import example_sets, named_mappings, read_mapping
 from ..system.provider import Provider
 from ..system.toml import SystemFile, read_system
+from ..system.variants import apply
 from .joining import Joined
 from .problem import Problem
 from .schema import check_mapping
@@ -152,8 +154,18 @@ def read_joined(
         for name in table.get("further", [])
     ]
     with _named(path, folder):
+        file = _arranged(file, table, provider)
         joined = Joined(path, table, data, only or {})
         return joined, joined.problem(file, provider).changed(further=further)
+
+
+def _arranged(file: SystemFile, table: Mapping[str, Any], provider: Provider) -> SystemFile:
+    """The system without what the logs stand for, in the variants that the mapping names."""
+    file = file.without(table.get("without", ()))
+    folder = file.path.parent
+    return replace(
+        file, instances=apply(file.instances, table.get("variants", {}), provider, folder)
+    )
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from ..reading.schema import (
     number,
     said,
     table,
+    table_of,
     text,
     texts,
 )
@@ -146,7 +147,7 @@ MAPPING: dict[str, Check] = {
     "step": positive, "algorithm": text, "options": table, "period": positive, "ticks": flag,
     "search_step": positive, "search": _table_of(SEARCH), "lead": at_least_zero,
     "time": text, "resample": positive, "gap": positive, "only": table,
-    "relative": list_of(list_of(text, 3)),
+    "relative": list_of(list_of(text, 3)), "variants": table_of(text), "without": texts,
     "parameters": constants, "sheet": targets_by_name, "fixed": targets_by_name,
     "starts": targets_by_name, "inputs": _tables(INPUT, (), text),
     "columns": _tables(COLUMN, ()), "channels": _tables(CHANNEL, ("signal",)),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -38,15 +38,23 @@ class Correlation:
         index: parameter -> correlation.
         limit: magnitude above which one of them is significant at 5 % over all.
         samples: parameter sets that could be simulated.
+        by_run: run -> the same for its residual alone.
     """
 
     index: Mapping[str, float]
     limit: float
     samples: int
+    by_run: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def correlation_index(
-    simulator: Simulator, theta: Vector, samples: int = 64, *, width: float = 0.5, seed: int = 0
+    simulator: Simulator,
+    theta: Vector,
+    samples: int = 64,
+    *,
+    width: float = 0.5,
+    seed: int = 0,
+    everywhere: bool = False,
 ) -> Correlation:
     """Correlate declared parameters with the residual over random parameter sets.
 
@@ -56,28 +64,49 @@ def correlation_index(
         samples: parameter sets.
         width: half width of the sets' range over the parameters' spans.
         seed: of the Latin hypercube.
+        everywhere: look at the validation runs, too, one by one.
     """
     problem = simulator.problem
     chosen = [i for i, p in enumerate(problem.parameters) if p.role != "nuisance" and not p.run]
     cube = qmc.LatinHypercube(len(chosen), rng=seed).random(samples) * 2.0 - 1.0
+    fitted = {run.name for run in problem.chosen("identification")}
+    purpose = None if everywhere else "identification"
     sets, costs = [], []
+    singly: dict[str, list[float]] = {run.name: [] for run in problem.chosen(purpose)}
     for row in cube:
         moved = theta.copy()
         moved[chosen] += width * row * problem.scale[chosen]
         moved = np.clip(moved, problem.lower, problem.upper)
         try:
-            residuals = simulator.residuals(moved)
+            residuals = simulator.residuals(moved, purpose)
         except FmuCallError:
             continue
-        squares = np.concatenate([r[np.isfinite(r)] for _, r in residuals]) ** 2
+        squares = {name: r[np.isfinite(r)] ** 2 for name, r in residuals}
         sets.append(moved[chosen])
-        costs.append(math.sqrt(float(np.mean(squares))))
+        costs.append(_root_mean([v for name, v in squares.items() if name in fitted]))
+        for name, values in squares.items():
+            singly[name].append(_root_mean([values]))
+    names = [problem.names[i] for i in chosen]
+    moved_sets = np.array(sets).reshape(len(sets), len(chosen))
+    return Correlation(
+        _correlated(names, moved_sets, costs),
+        significance_limit(len(sets), len(chosen)),
+        len(sets),
+        {run: _correlated(names, moved_sets, found) for run, found in singly.items()},
+    )
+
+
+def _root_mean(squares: list[Vector]) -> float:
+    return math.sqrt(float(np.mean(np.concatenate(squares))))
+
+
+def _correlated(names: list[str], sets: Vector, costs: list[float]) -> dict[str, float]:
+    """Parameter -> its correlation with the costs, 0 where either does not vary."""
     index = {}
-    for place, i in enumerate(chosen):
-        values = np.array([item[place] for item in sets])
+    for name, values in zip(names, sets.T, strict=True):
         varies = len(sets) > 2 and np.std(values) > 0.0 and np.std(costs) > 0.0
-        index[problem.names[i]] = float(np.corrcoef(values, costs)[0, 1]) if varies else 0.0
-    return Correlation(index, significance_limit(len(sets), len(chosen)), len(sets))
+        index[name] = float(np.corrcoef(values, costs)[0, 1]) if varies else 0.0
+    return index
 
 
 def local(estimate: Estimate) -> dict[str, float]:

@@ -31,6 +31,7 @@ from .calibrate import calibrate_command
 from .data import data_app
 from .diagnose import diagnose_command
 from .export import draw_command, export_command
+from .figures import figures_command
 from .fmus import fmus_app
 from .guard import applies, guarded
 from .linearize import linearize_command
@@ -66,6 +67,7 @@ app.command("monitor")(monitor_command)
 app.command("linearize")(linearize_command)
 app.command("export")(export_command)
 app.command("draw")(draw_command)
+app.command("figures")(figures_command)
 app.command("study")(study_command)
 app.command("twin")(twin_command)
 app.command("view")(view_command)

@@ -49,6 +49,10 @@ def calibrate_command(
     ] = 40,
     out: Annotated[Path | None, typer.Option(help="Folder for results [out/DATASET].")] = None,
     workers: Annotated[int | None, typer.Option(help="Threads [all cores].")] = None,
+    figures: Annotated[
+        bool,
+        typer.Option("--figures", help="Draw each run before and after, and its sensitivities."),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON value to stdout.")
     ] = False,
@@ -66,6 +70,7 @@ def calibrate_command(
     from ..calibrate.sensitivity import correlation_index, tornado
     from ..calibrate.simulator import Simulator
     from ..report.calibration import write_calibration_page
+    from ..report.pictures import first_guess, run_pictures, tornado_by_run
 
     started = time.perf_counter()
     with Display() as display:
@@ -81,7 +86,12 @@ def calibrate_command(
             estimate, exchange = calibrated(simulator)
             findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
             stage = "what the runs tell of each parameter"
-            correlation = correlation_index(simulator, estimate.theta, samples) if samples else None
+            correlation = (
+                correlation_index(simulator, estimate.theta, samples, everywhere=figures)
+                if samples
+                else None
+            )
+            guess = first_guess(estimate) if figures else {}
     if not exchange.small:
         typer.echo(f"warning: {exchange}", err=True)
     unused = validation_residuals(estimate)
@@ -94,6 +104,13 @@ def calibrate_command(
     content["files"] = [str(folder / "calibration.json"), str(page)]
     if correlation is not None:
         content["files"].append(str(tornado(correlation, folder / "tornado.png")))
+    if figures:
+        place = folder / "figures"
+        drawn = run_pictures(estimate, guess, dict(estimate.residuals) | dict(unused), place)
+        if correlation is not None:
+            drawn.append(tornado_by_run(correlation, place / "sensitivity.png"))
+        content["files"] += map(str, drawn)
+        _add_first_guess(content, problem, guess)
     text = json.dumps(content, indent=2)
     write_text(folder / "calibration.json", text + "\n")
     write_calibration_page(content, estimate, unused, page)
@@ -165,9 +182,24 @@ def calibration_table(
             "local": local(estimate),
             "correlation": dict(correlation.index) if correlation else {},
             "correlation_limit": correlation.limit if correlation else None,
+            "correlation_by_run": dict(correlation.by_run) if correlation else {},
         },
         "findings": [finding.to_dict() for finding in findings],
     }  # fmt: skip
+
+
+def _add_first_guess(
+    content: dict[str, Any], problem: Problem, guess: dict[str, NDArray[np.float64]]
+) -> None:
+    """Errors at the nominal values, by channel and purpose."""
+    from ..calibrate.estimate import channel_rms
+
+    for purpose in ("identification", "validation"):
+        chosen = [(run.name, guess[run.name]) for run in problem.chosen(purpose)]
+        found = channel_rms(problem, chosen) if chosen else {}
+        for c in problem.channels:
+            row = content["channels"][c.name].setdefault("first_guess", {})
+            row[purpose] = _scaled(found.get(c.name), c.sigma)
 
 
 def validation_residuals(estimate: Estimate) -> Residuals:
@@ -219,9 +251,13 @@ def _print(content: dict[str, Any]) -> None:
         console.print(text, soft_wrap=True)
     for text in content["not_separable"]:
         console.print(f"the runs do not tell apart: {text} (in spans)")
-    table = Table("channel", "unit", "noise", "identification", "validation")
+    purposes = ("identification", "validation")
+    guessed = any("first_guess" in item for item in content["channels"].values())
+    heads = [f"first guess, {purpose}" for purpose in purposes] if guessed else []
+    table = Table("channel", "unit", "noise", *heads, *purposes)
     for name, item in content["channels"].items():
-        cells = (item["identification"], item["validation"])
+        cells = [item[key] for key in purposes]
+        cells = [item["first_guess"][key] for key in purposes] + cells if guessed else cells
         table.add_row(
             name, item["unit"], f"{item['noise_rms']:.4g}",
             *("-" if value is None else f"{value:.4g}" for value in cells),

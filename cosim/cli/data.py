@@ -150,10 +150,15 @@ def clock_line(topic: TopicReport) -> str:
 @data_app.command("example")
 def example_command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="To write.")],
+    machine: Annotated[
+        str | None,
+        typer.Option(help="A machine of the papers: mir250, mobile_manipulator or omni_base."),
+    ] = None,
     fan: Annotated[
         bool,
         typer.Option("--fan", help="A motor with a fan, whose FMU is made of fan.py by pythonfmu."),
     ] = False,
+    seed: Annotated[int, typer.Option(help="Of the noise, with --machine.")] = 0,
 ) -> None:
     """Write the logs of an example robot, and a system for it: CSV files, and ROS 2 bags.
 
@@ -161,8 +166,13 @@ def example_command(
     """
     from ..intake import fan_example
     from ..intake.example import write
+    from ..intake.plants import writing
 
-    if fan:
+    if machine is not None and fan:
+        raise InputError("--machine and --fan are two examples; give one of them")
+    if machine is not None:
+        writing.write(machine, folder, seed=seed)
+    elif fan:
         fan_example.write(folder)
     elif not write(folder):
         say("note: without bags, which need the library rosbags: pip install rosbags")

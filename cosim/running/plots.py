@@ -67,17 +67,17 @@ def plot_run(
         columns = figure.subfigures(1, 2, width_ratios=(5.0, 8.0))
     if paths:
         for axis, item in zip(_path_column(columns[0], len(paths), height), paths, strict=True):
-            _draw_paths(axis, item, recording, tuple(references.values()))
+            draw_paths(axis, item, recording, tuple(references.values()))
     if courses:
         found = _column(columns[1], len(courses), len({(i.after, i.before) for i in courses}) == 1)
         for axis, item in zip(found, courses, strict=True):
             if item.comparisons:
-                _draw_comparisons(axis, item, comparisons)
+                draw_comparisons(axis, item, comparisons)
             else:
-                _draw_courses(axis, item, recording, tuple(references.values()))
+                draw_courses(axis, item, recording, tuple(references.values()))
         found[-1].set_xlabel("time [s]")
     figure.suptitle(title + (f" (stopped: {recording.error[:80]})" if recording.error else ""))
-    _write(figure, path)
+    save(figure, path)
     return figure
 
 
@@ -97,10 +97,11 @@ def _path_column(place: Any, count: int, height: float) -> list[MatplotlibAxes]:
     return axes
 
 
-def _write(figure: Figure, path: Path | str | None) -> None:
+def save(figure: Figure, path: Path | str | None, dots: int = 120) -> None:
+    """Write a picture, `dots` per inch; the suffix says how."""
     if path is not None:
         with atomic(Path(path)) as temporary:
-            figure.savefig(temporary, dpi=120)
+            figure.savefig(temporary, dpi=dots)
 
 
 class _Scale:
@@ -128,6 +129,10 @@ def _reference(references: Sequence[Reference], signals: tuple[str, ...]) -> Ref
     return next((item for item in references if item.signals == signals), None)
 
 
+def _labels(axis: MatplotlibAxes) -> list[str]:
+    return list(axis.get_legend_handles_labels()[1])
+
+
 def _finish(axis: MatplotlibAxes, *, beside: bool) -> None:
     axis.grid(True, alpha=0.3)
     count = len(axis.get_legend_handles_labels()[0])
@@ -137,9 +142,21 @@ def _finish(axis: MatplotlibAxes, *, beside: bool) -> None:
         axis.legend(loc="best", fontsize="small")
 
 
-def _draw_paths(
-    axis: MatplotlibAxes, item: Axes, recording: Recording, references: Sequence[Reference]
+def draw_paths(
+    axis: MatplotlibAxes,
+    item: Axes,
+    recording: Recording,
+    references: Sequence[Reference],
+    run: str = "",
 ) -> None:
+    """Draw paths over what they are compared with.
+
+    Args:
+        axis: where.
+        item: what.
+        recording, references: of the run.
+        run: name of the run, where several share the axes.
+    """
     inside = _window(item, recording.time)
     unit, seen = "", set()
     for pair in item.paths:
@@ -148,14 +165,18 @@ def _draw_paths(
             scale = _Scale(recording.units.get(pair[0], ""), item.unit)
             seen.add(reference.text)
             points = scale(convert_reference(recording, reference))[_window(item, reference.times)]
-            axis.plot(points[:, 0], points[:, 1], label=reference.text, **MEASURED)  # type: ignore[arg-type]
+            text = reference.text if reference.text not in _labels(axis) else None
+            axis.plot(points[:, 0], points[:, 1], label=text, **MEASURED)  # type: ignore[arg-type]
             axis.plot(points[-1:, 0], points[-1:, 1], "o", color="black", markersize=6)
     for number, pair in enumerate(item.paths):
         scale = _Scale(recording.units.get(pair[0], ""), item.unit)
         unit = scale.unit
         x, y = (scale(recording[name])[inside] for name in pair)
         name = item.names[number] if item.names else ", ".join(pair)
-        (line,) = axis.plot(x, y, _LINES[number % 4], linewidth=1.2, label=name)
+        name = f"{run} {name}".strip() if len(item.paths) > 1 or not run else run
+        several = bool(run) and _reference(references, pair) is None  # they may cover each other
+        style = _LINES[(len(_labels(axis)) if several else number) % 4]
+        (line,) = axis.plot(x, y, style, linewidth=1.2, label=name)
         axis.plot(x[-1:], y[-1:], "o", color=line.get_color(), markersize=4)  # where it ends
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel(_label("x", unit))
@@ -164,9 +185,14 @@ def _draw_paths(
     _finish(axis, beside=False)
 
 
-def _draw_courses(
-    axis: MatplotlibAxes, item: Axes, recording: Recording, references: Sequence[Reference]
+def draw_courses(
+    axis: MatplotlibAxes,
+    item: Axes,
+    recording: Recording,
+    references: Sequence[Reference],
+    run: str = "",
 ) -> None:
+    """Draw signals over time and over what they are compared with; arguments as of `draw_paths`."""
     inside = _window(item, recording.time)
     unit, line = item.unit, 0
     for number, signal in enumerate(item.signals):
@@ -181,12 +207,14 @@ def _draw_courses(
             if reference is not None and not item.minus:
                 drawn = _window(item, reference.times)
                 values = scale(convert_reference(recording, reference)[:, 0])
+                text = reference.text if reference.text not in _labels(axis) else None
                 axis.plot(
-                    reference.times[drawn], values[drawn], label=reference.text, **MEASURED  # type: ignore[arg-type]
+                    reference.times[drawn], values[drawn], label=text, **MEASURED  # type: ignore[arg-type]
                 )  # fmt: skip
             course = recording[element] - (recording[item.minus] if item.minus else 0.0)
             name = item.names[number] if item.names else signal
             name += element[len(signal) :] if len(names) > 1 else ""
+            name = f"{run} {name}".strip()
             axis.plot(
                 recording.time[inside],
                 scale(course)[inside],
@@ -200,9 +228,10 @@ def _draw_courses(
     _finish(axis, beside=True)
 
 
-def _draw_comparisons(
-    axis: MatplotlibAxes, item: Axes, comparisons: Mapping[str, Comparison]
+def draw_comparisons(
+    axis: MatplotlibAxes, item: Axes, comparisons: Mapping[str, Comparison], run: str = ""
 ) -> None:
+    """Draw how far signals are from what they are compared with; `run` as of `draw_paths`."""
     unit = item.unit
     for number, name in enumerate(item.comparisons):
         found = comparisons[name]
@@ -213,7 +242,7 @@ def _draw_comparisons(
             found.times[inside],
             scale(found.differences)[inside],
             linewidth=1.1,
-            label=item.names[number] if item.names else name,
+            label=f"{run} {item.names[number] if item.names else name}".strip(),
         )
     axis.set_ylabel(_label(item.label, unit))
     axis.margins(x=0.01)
@@ -266,5 +295,5 @@ def plot_overview(
         axis.grid(True, axis="y", alpha=0.3)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
     figure.suptitle(textwrap.fill(title, int(9.0 * figure.get_figwidth())))
-    _write(figure, path)
+    save(figure, path)
     return figure

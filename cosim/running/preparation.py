@@ -65,7 +65,8 @@ def recorded_signals(
 ) -> tuple[tuple[str, ...], list[str]]:
     """Signals to record, and notes on what a changed variant does not have."""
     needed = [name for item in scenario.references.values() for name in item.signals]
-    shown = [*(scenario.plot or ()), *(name for axes in scenario.plots for name in axes.needs)]
+    drawn = [*scenario.plots, *(axes for figure in scenario.figures for axes in figure.plots)]
+    shown = [*(scenario.plot or ()), *(name for axes in drawn for name in axes.needs)]
     everything = system.signals() if scenario.record is None else scenario.record
     notes = []
 

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..errors import listing
+
 _KEYS = {
     "label", "signals", "paths", "comparisons", "names", "unit", "minus", "after", "before",
+    "error_unit",
 }  # fmt: skip
 
 
@@ -24,6 +27,7 @@ class Axes:
         unit: to convert to, "" for the signals' own.
         minus: signal that is subtracted from all, "" for none.
         after, before: times between which it is drawn [s].
+        error_unit: of the errors below it, in a figure, "" for the signals' own.
     """
 
     label: str
@@ -35,6 +39,7 @@ class Axes:
     minus: str
     after: float
     before: float
+    error_unit: str = ""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -72,4 +77,65 @@ def read_axes(entry: Mapping[str, Any]) -> Axes:
         minus=str(entry.get("minus", "")),
         after=float(entry.get("after", float("-inf"))),
         before=float(entry.get("before", float("inf"))),
+        error_unit=str(entry.get("error_unit", "")),
+    )
+
+
+_FIGURE_KEYS = {
+    "name", "title", "runs", "together", "columns", "errors", "plots", "quantities",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FigureSpec:
+    """A picture of one run, or of several together.
+
+    Attributes:
+        name: part of the file's name.
+        title: above it, the scenario's name if "".
+        runs: that are drawn, () for all.
+        together: all of them in one picture, else one picture each.
+        columns: of axes beside each other.
+        errors: below axes whose signals are compared, how far they are off.
+        plots: its axes, row by row.
+        quantities: of checks, over the runs, instead of axes.
+    """
+
+    name: str
+    title: str
+    runs: tuple[str, ...]
+    together: bool
+    columns: int
+    errors: bool
+    plots: tuple[Axes, ...]
+    quantities: tuple[str, ...]
+
+
+def read_figure(entry: Mapping[str, Any]) -> FigureSpec:
+    """A figure from its table in a scenario.
+
+    Raises:
+        ValueError: incomplete or contradictory.
+    """
+    name, columns = str(entry.get("name", "")), entry.get("columns", 1)
+    for key in entry:
+        if key not in _FIGURE_KEYS:
+            raise ValueError(
+                f"figure {name!r} has no key {key!r}; {listing(sorted(_FIGURE_KEYS), key)}"
+            )
+    if not name or "/" in name:
+        raise ValueError(f"a figure needs a name without slashes, not {name!r}")
+    if bool(entry.get("plots")) == bool(entry.get("quantities")):
+        raise ValueError(f"figure {name!r}: give plots as in [[plots]], or quantities of checks")
+    if columns != int(columns) or columns < 1:
+        raise ValueError(f"figure {name!r}: columns is {columns}; give a whole number above 0")
+    return FigureSpec(
+        name=name,
+        title=str(entry.get("title", "")),
+        runs=tuple(map(str, entry.get("runs", ()))),
+        together=bool(entry.get("together", False)) or "quantities" in entry,
+        columns=int(columns),
+        errors=bool(entry.get("errors", False)),
+        plots=tuple(read_axes(item) for item in entry.get("plots", ())),
+        quantities=tuple(map(str, entry.get("quantities", ()))),
     )

@@ -22,7 +22,7 @@ from ..files import flatten, is_file, read_toml
 from ..installation import places
 from ..reading.limits import DATA
 from ..system.toml import SystemFile, read_system
-from .axes import Axes, read_axes
+from .axes import Axes, FigureSpec, read_axes, read_figure
 from .checks import CHECK_KEYS, Check, read_check
 from .run_table import fill, table_runs
 from .shape import check_inside, check_outside
@@ -30,7 +30,7 @@ from .shape import check_inside, check_outside
 KEYS = {
     "description", "question", "expected", "source", "system", "duration", "start", "step",
     "algorithm", "options", "tolerance", "variants", "parameters", "inputs", "record", "compare",
-    "checks", "runs", "table", "plot", "plots",
+    "checks", "runs", "table", "plot", "plots", "figures",
 }  # fmt: skip
 _SOURCE_KEYS = {"file", "data", "run", "column", "columns", "time", "unit", "constant", "times",
                 "values", "interpolation"}  # fmt: skip
@@ -59,6 +59,7 @@ class Scenario:
         checks: what must hold.
         plot: signals to plot, None for the compared ones, else all.
         plots: axes of the plot with labels, instead of `plot`.
+        figures: pictures that `cosim figures` makes.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Scenario:
     checks: tuple[Check, ...]
     plot: tuple[str, ...] | None
     plots: tuple[Axes, ...] = ()
+    figures: tuple[FigureSpec, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -273,18 +275,36 @@ class _Reader:
             checks=tuple(checks),
             plot=tuple(table["plot"]) if "plot" in table else None,
             plots=tuple(self.axes(entry) for entry in table.get("plots", [])),
+            figures=tuple(self.figure(entry) for entry in table.get("figures", [])),
             options=dict(table.get("options", {})),
         )
 
     def axes(self, entry: Any) -> Axes:
         try:
             axes = read_axes(entry)
-            for name in axes.comparisons:
-                if name not in self.table.get("compare", {}):
-                    raise ValueError(f"plot {axes.label!r}: there is no comparison {name!r}")
+            self.known(axes)
             return axes
         except ValueError as error:
             raise self.fail(str(error)) from error
+
+    def known(self, axes: Axes) -> None:
+        for name in axes.comparisons:
+            if name not in self.table.get("compare", {}):
+                raise ValueError(f"plot {axes.label!r}: there is no comparison {name!r}")
+
+    def figure(self, entry: Any) -> FigureSpec:
+        try:
+            found = read_figure(entry)
+            if not found.runs or self.run in found.runs:
+                for axes in found.plots:
+                    self.known(axes)
+        except ValueError as error:
+            raise self.fail(str(error)) from error
+        for run in found.runs:
+            if run not in self.file.runs:
+                raise self.fail(f"figure {found.name!r}: {listing(self.file.runs, run)} as run, "
+                                f"not {run!r}")  # fmt: skip
+        return found
 
     def optional(self, table: Mapping[str, Any], key: str) -> float | None:
         return float(table[key]) if key in table else None

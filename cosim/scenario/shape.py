@@ -25,6 +25,7 @@ _LIST: Check = list_of(anything)
 OUTSIDE: dict[str, Check] = {
     "variants": table, "parameters": table, "inputs": table, "compare": table, "record": table,
     "options": table, "checks": list_of(table), "plots": list_of(table), "plot": _LIST,
+    "figures": list_of(table),
     "table": table, "runs": table_of(table),
 }  # fmt: skip
 """Before rows of a table are filled in, which may stand for texts and numbers."""
@@ -54,6 +55,11 @@ _CHECK: dict[str, Check] = {
 _AXES: dict[str, Check] = {
     "label": said, "signals": texts, "paths": list_of(list_of(text, 2)), "comparisons": texts,
     "names": list_of(said), "unit": said, "minus": text, "after": floating, "before": floating,
+    "error_unit": said,
+}  # fmt: skip
+_FIGURE: dict[str, Check] = {
+    "name": text, "title": said, "runs": texts, "together": flag, "columns": number,
+    "errors": flag, "plots": list_of(keyed(_AXES)), "quantities": texts,
 }  # fmt: skip
 INSIDE: dict[str, Check] = {
     "description": said, "question": said, "expected": said, "source": said, "system": path,
@@ -64,6 +70,7 @@ INSIDE: dict[str, Check] = {
     ),
     "compare": table_of(table), "record": keyed({"signals": texts, "period": number}),
     "checks": list_of(keyed(_CHECK)), "plots": list_of(keyed(_AXES)), "plot": texts,
+    "figures": list_of(keyed(_FIGURE)),
 }  # fmt: skip
 """Of one run, rows filled in."""
 TABLE: dict[str, Check] = {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..errors import ScenarioError, within
+from ..errors import ScenarioError, UnknownNameError, listing, within
 from ..files import flatten, read_toml
 from ..reading.schema import Check, anything, keyed, list_of, table, text
 from .provider import Provider
@@ -73,6 +73,29 @@ class SystemFile:
         for name, value in given.items():
             system.set(name, value)
         return system
+
+    def without(self, names: Iterable[str]) -> SystemFile:
+        """The system without some instances, their connections and values; inputs are open then.
+
+        Raises:
+            UnknownNameError: no such instance.
+        """
+        gone = set(names)
+        for name in sorted(gone - set(self.instances)):
+            raise UnknownNameError(
+                f"{self.path}: there is no instance {name!r} to leave out; "
+                f"{listing(self.instances, name)}"
+            )
+
+        def stays(full: str) -> bool:
+            return full.partition(".")[0] not in gone
+
+        return replace(
+            self,
+            instances={name: of for name, of in self.instances.items() if name not in gone},
+            parameters={name: value for name, value in self.parameters.items() if stays(name)},
+            connections=tuple(w for w in self.connections if stays(w.source) and stays(w.target)),
+        )
 
 
 _KINDS: dict[str, Check] = {

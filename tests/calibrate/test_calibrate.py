@@ -149,6 +149,7 @@ def test_sensitivity(noisy, truth) -> None:
     problem = noisy(3).only(["sines"])
     correlation = correlation_index(simulator(problem), truth, 60, width=0.3)
     assert correlation.samples == 60
+    assert correlation.by_run == {"sines": correlation.index}
     # the digital twin paper's 20 sets: 0.444 for one parameter
     assert significance_limit(20, 1) == pytest.approx(0.444, abs=5e-4)
     assert all(-1.0 <= value <= 1.0 for value in correlation.index.values())

@@ -69,14 +69,16 @@ def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: 
     A model that lacks something may turn the other way in one run: a base that pivots about another
     wheel comes back on another side, and a pose in world axes follows the model mirrored. Only what
     the model gets right everywhere else (to `FORETOLD` of its power, in the median) can be said to
-    be turned round here by the log and not by the machine.
+    be turned round here by the log and not by the machine; and turned back it must be as right.
     """
 
-    def off(run: MeasuredRun, column: int) -> float:
+    def off(run: MeasuredRun, column: int, side: float = 1.0) -> float:
         measured, simulated = _centred(problem, models, column, column, run)
         power = float(measured @ measured)
-        return float(np.sum((measured - simulated) ** 2)) / power if power > 0.0 else 0.0
+        return float(np.sum((measured - side * simulated) ** 2)) / power if power > 0.0 else 0.0
 
+    if off(problem.run(name), index, -1.0) >= FORETOLD:
+        return False
     here = [off(run, index) for run in problem.runs if run.name != name]
     others = [off(problem.run(name), i) for i in range(len(problem.channels)) if i != index]
     return all(not found or float(np.median(found)) < FORETOLD for found in (here, others))
