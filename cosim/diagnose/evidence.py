@@ -73,8 +73,8 @@ class Evidence:
         Args:
             most: laws in a set.
         """
-        level = [self.solved([m]) for m in range(len(self.directions))]
-        level = sorted(filter(None, level), key=lambda c: -c.gain)
+        alone = [self.solved([m]) for m in range(len(self.directions))]
+        level = sorted((c for c in alone if c is not None), key=lambda c: -c.gain)
         found = [self._distinct(level)]
         for size in range(2, most + 1):
             grown: dict[tuple[int, ...], Chosen] = {}

@@ -24,7 +24,7 @@ from .choices import APART
 from .directions import Direction, Responses
 from .evidence import Chosen, Evidence
 from .fitter import AGAIN, ITERATIONS, QUICKLY
-from .following import Followed, follow
+from .following import FALLS, Followed, follow
 from .localise import Place
 from .models import GATE, OPEN, Fitted, compare
 from .search import Search
@@ -137,16 +137,16 @@ def _total(search: Search, declared: Fitted, fitted: Fitted) -> float:
 
 def _followed(search: Search, declared: Fitted, theta: Vector, places: Sequence[Place]) -> Followed:
     """The declared model along the log, by efforts at as few places as follow it."""
-    best: Followed | None = None
-    for count in range(1, len(places) + 1):
-        found = follow(declared.simulator, theta, search.fitting, places[:count])
-        names = ", ".join(place.label for place in places[:count])
-        search.say(f"moved along the log by efforts at {names}: {found.left:.3g} of the noise left")
-        if best is None or found.left < best.left:
-            best = found
+    kept = [places[0]]
+    best = follow(declared.simulator, theta, search.fitting, kept)
+    for place in places[1:]:
         if best.left < OPEN:
             break
-    assert best is not None
+        found = follow(declared.simulator, theta, search.fitting, [*kept, place])
+        if found.left < FALLS * best.left:
+            best, kept = found, [*kept, place]
+    names = ", ".join(place.label for place in kept)
+    search.say(f"moved along the log by efforts at {names}: {best.left:.3g} times the noise left")
     return best
 
 
