@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..calibrate.differences import jacobian
 from ..calibrate.known import STEP
 from ..calibrate.problem import Problem
-from ..errors import FmuCallError
+from ..errors import CosimError, UnbuiltError
 from .candidates import Candidate
 from .choices import choices
 from .following import Followed
@@ -107,14 +107,22 @@ class Responses:
         return [d for group in groups for d in group]
 
     def _shapes(self, probe: Probe) -> list[Direction]:
-        offered = choices(probe, self.simulator, self.followed.theta, self.stack, self.wanted)
         found: list[Direction] = []
+        theta = self.followed.theta
+        try:
+            offered = choices(probe, self.simulator, theta, self.stack, self.wanted)
+        except UnbuiltError:
+            raise
+        except CosimError:
+            offered = []
         for fixed in ({}, *offered):
             size = found[-1].size if found else FIRST * probe.strength.span
             try:
                 one = self._direction(probe, fixed, size)
-            except FmuCallError:
-                continue  # that shape cannot be simulated
+            except UnbuiltError:
+                raise
+            except CosimError:  # that shape cannot be simulated, or its fidelity takes no effort
+                continue
             if one is not None:
                 found.append(one)
         return found

@@ -26,6 +26,9 @@ WIDTH, NEXT = 40, 8
 ALONE = 1e-4
 """A direction of which less than this share is left by the others of a set adds nothing of its own:
 responses are exact to about one in a hundred, in squares."""
+SORTED, ALIKE = 60, 0.02
+"""Sets of a size that are sorted into families, and the share of what they explain by which members
+of one may differ: what first orders leave open."""
 RIDGE = 1e-9
 """On the unit diagonal of G, so that equal directions can be solved for."""
 
@@ -102,6 +105,33 @@ class Evidence:
                 return None
             parts.append(part)
         return Chosen(tuple(members), tuple(parts), gain)
+
+    def families(self, level: Sequence[Chosen]) -> list[list[Chosen]]:
+        """Sets that do nearly the same to the model values, the simplest first in each.
+
+        Friction may be Coulomb's, or a bristle's, on either side of a gearbox: one of them shows
+        whether the others are worth a fit.
+        """
+        found: list[list[Chosen]] = []
+        for chosen in level[:SORTED]:
+            near = (f for f in found if self._apart(chosen, f[0]) < ALIKE * chosen.gain)
+            family = next(near, None)
+            if family is None:
+                found.append([chosen])
+            else:
+                family.append(chosen)
+        return [sorted(family, key=self._parameters) for family in found]
+
+    def _parameters(self, chosen: Chosen) -> int:
+        return sum(self.directions[m].probe.own for m in chosen.members)
+
+    def _apart(self, first: Chosen, second: Chosen) -> float:
+        """Half the squared distance between what two sets do [nats]."""
+        factors = np.zeros(self._b.size)
+        for sign, chosen in ((1.0, first), (-1.0, second)):
+            for m, values in zip(chosen.members, chosen.values, strict=True):
+                factors[self._place[m]] += sign * values * self._size[self._place[m]]
+        return 0.5 * float(factors @ self._gram @ factors)
 
     def _larger(self, chosen: Chosen) -> list[Chosen]:
         """A set with one law more, the best ones."""

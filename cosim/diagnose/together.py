@@ -23,7 +23,7 @@ from .candidates import candidates, new_parameters
 from .choices import APART
 from .directions import Direction, Responses
 from .evidence import Chosen, Evidence
-from .fitter import AGAIN, ITERATIONS, QUICKLY
+from .fitter import AGAIN, QUICKLY
 from .following import FALLS, Followed, follow
 from .localise import Place
 from .models import GATE, OPEN, Fitted, compare
@@ -32,9 +32,10 @@ from .secant import patience
 from .signature import unscored
 
 Vector = NDArray[np.float64]
-FITS = (2, 4, 4, 3)
-"""Sets of one law, of two, ... that are fitted: first orders leave errors of a per cent, within
-which a law and what is nearly it (friction, friction that falls with speed) change places."""
+FITS, VARIANTS = (2, 4, 4, 3), 6
+"""Families of sets of one law, of two, ... whose simplest member is fitted, and other members of
+the best family that are: first orders leave errors of a per cent, within which a law and what is
+nearly it (friction, friction that falls with speed) change places."""
 TURNS = 2
 """Times that sets are proposed, the second time with the parameters of the best set."""
 PLACES = 3
@@ -43,7 +44,8 @@ BEYOND = 0.02
 """Share of what a model leaves beyond noise that a better set must take from it."""
 
 
-ROUGHLY = Effort("near", "draft", ITERATIONS, QUICKLY)
+ROUGHLY = Effort("near", "draft", share=QUICKLY)
+"""From values that are near until little is gained: one that ends early looks like a wrong set."""
 SHAPED = 2
 """Sets of a size whose other parameters are fitted, the best ones."""
 
@@ -157,16 +159,26 @@ def _fitted(
     evidence = Evidence(directions, responses.wanted)
     found: list[Draft] = []
     for few, level in zip(FITS, evidence.sets(len(FITS)), strict=True):
-        now = []
-        for chosen in level[:few]:
-            members = [directions[m] for m in chosen.members]
-            one = _fit(search, declared, responses, members, chosen)
+        families = evidence.families(level)[:few]
+        best: tuple[Draft, list[Chosen]] | None = None
+        now: list[Draft] = []
+        for first, *others in families:
+            one = _fit(search, declared, responses, directions, first)
+            if one is not None:
+                now.append(one)
+                if best is None or _total(search, declared, one.fitted) > _total(
+                    search, declared, best[0].fitted
+                ):
+                    best = one, others
+        if best is None or not _better(search, declared, best[0], found):
+            found += now
+            continue
+        for chosen in best[1][:VARIANTS]:
+            one = _fit(search, declared, responses, directions, chosen)
             if one is not None:
                 now.append(one)
         now.sort(key=lambda d: -_total(search, declared, d.fitted))
-        if now and _better(search, declared, now[0], found):
-            now[:SHAPED] = [_shaped(search, declared, one) for one in now[:SHAPED]]
-        found += now
+        found += [_shaped(search, declared, one) for one in now[:SHAPED]] + now[SHAPED:]
         if any(not search.lacking(d.fitted) for d in found):
             break
     return found
@@ -182,10 +194,11 @@ def _fit(
     search: Search,
     declared: Fitted,
     responses: Responses,
-    members: Sequence[Direction],
+    directions: Sequence[Direction],
     chosen: Chosen,
 ) -> Draft | None:
     """A set fitted from the values that it has along the log's motion."""
+    members = [directions[m] for m in chosen.members]
     name = ", ".join(d.candidate.label for d in members)
     problem = declared.problem
     values: dict[str, float] = {}
@@ -209,7 +222,9 @@ def _fit(
         problem = problem.hold(held)
         simulator = declared.simulator.of(problem).limited(patience(declared.simulator))
         shift = responses.absorber.change(left) * declared.problem.scale
-        starts = [_start(problem, responses.followed.theta + f * shift, values) for f in (1.0, 0.0)]
+        theta = responses.followed.theta
+        points = (theta + shift, theta, declared.problem.nominal)
+        starts = [_start(problem, point, values) for point in points]
         costs = [search.cost(simulator, theta) for theta in starts]
         begin = starts[int(np.argmin(costs))]
         result = search.judged(fit(simulator, begin, effort=ROUGHLY))
