@@ -2,7 +2,7 @@
 
 Where a model is far from the data, what a law does to it says nothing of what the law does to the
 machine: friction acts on another speed, an unbalance at another angle. So efforts u(t) are added at
-a few balances that make the model follow what was measured,
+a few balances, chosen one after another, that make the model follow what was measured,
 
     minimize |y - f(u)|^2 + |W^-1 u|^2 / s^2,    u piecewise linear in time, W a random walk,
 
@@ -23,23 +23,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.parts import MeasuredRun
+from ..calibrate.problem import Problem
 from ..calibrate.reach import apart
 from ..calibrate.simulator import Simulator
 from ..data.signals import Signal, Table
-from ..errors import FmuCallError
+from ..errors import FmuCallError, VariantError
 from .linear import SampleStack
-from .localise import SIZES, Place
+from .localise import SIZES
 from .models import OPEN
 from .secant import model_values
 
 Vector = NDArray[np.float64]
 EFFORT = "applied_effort"
-KNOTS = (17, 33, 65, 129)
+KNOTS = (17, 33, 65)
 """Of an effort over a run, each time twice as dense, until the model follows."""
 STEPS, FALLS = 3, 0.7
 """Gauss-Newton steps with the same knots at most; one that leaves more than this share of the mean
@@ -49,6 +51,8 @@ SHARES = (1.0, 0.5, 0.25, 0.125)
 CHANGE, TRIALS = 3.0, 8
 """Largest change by one knot, over the noise, at which responses are taken: far above what solvers
 round, far below what the model is off. Found within a factor of 3, in so many trials at most."""
+PLACES = 3
+"""Where efforts enter at most: each costs as many simulations again."""
 SIDE = 0.02
 """Share of the efforts by which they are changed to see what they do together."""
 MOST = 6000
@@ -62,6 +66,7 @@ class Followed:
     Attributes:
         simulator: of it, efforts among the inputs of its runs.
         theta: its parameters.
+        places: where efforts enter.
         model: model values over sigma.
         wanted: what missing laws do to the model values over sigma, to first order.
         left: mean square over the noise's that the efforts leave.
@@ -69,26 +74,37 @@ class Followed:
 
     simulator: Simulator
     theta: Vector
+    places: tuple[str, ...]
     model: Vector
     wanted: Vector
     left: float
 
 
 def follow(
-    simulator: Simulator, theta: Vector, stack: SampleStack, places: Sequence[Place]
+    simulator: Simulator,
+    theta: Vector,
+    stack: SampleStack,
+    first: tuple[str, str],
+    among: Sequence[tuple[str, str]],
 ) -> Followed:
-    """Move a model along some runs by efforts at some places.
+    """Move a model along some runs by efforts at as few balances as that takes.
 
     Args:
         simulator: of the model.
         theta: its parameters.
         stack: of the runs.
-        places: where efforts enter.
+        first: instance and port of a balance where an effort enters in any case.
+        among: others where efforts may enter.
 
     Raises:
         CosimError: it cannot be simulated.
     """
-    bench = _Bench(simulator, theta, places)
+    rows = dict(simulator.residuals(theta, stack.names))
+    name = max(stack.names, key=lambda n: float(np.nanmean(rows[n] ** 2)))
+    every = _Bench(simulator, theta, _inputs(simulator.problem, [first, *among]))
+    kept = every.chosen(every.simulator.problem.run(name))
+    every.simulator.close()
+    bench = _Bench(simulator, theta, kept)
     problem = bench.simulator.problem
     efforts = bench.simulator.spread(bench.followed, [problem.run(n) for n in stack.names])
     runs, wanted, left = [], [], []
@@ -101,15 +117,45 @@ def follow(
     bench.simulator.close()
     moved = simulator.of(problem.changed(runs=runs))
     return Followed(
-        moved, theta, model_values(moved, theta, stack), np.concatenate(wanted),
+        moved, theta, tuple(".".join(place[:2]) for place in kept),
+        model_values(moved, theta, stack), np.concatenate(wanted),
         float(np.mean(np.concatenate(left) ** 2)),
     )  # fmt: skip
+
+
+def _inputs(problem: Problem, among: Sequence[tuple[str, str]]) -> list[Input]:
+    """Inputs of efforts at all elements of the balances that can take any."""
+    found: list[Input] = []
+    for instance, port in dict.fromkeys(among):
+        try:
+            probed = problem.with_effects({instance: f"+{EFFORT}@{port}"})
+            variables = probed.system().members[instance].description.variables
+        except VariantError:
+            continue  # a mass centre or the direction of gravity
+        own = f"{port}.{EFFORT}.u"
+        for variable in variables.values():
+            if variable.name == own or variable.name.startswith(f"{own}["):
+                found += [Input(instance, port, element) for element in variable.elements()]
+    return found
+
+
+class Input(NamedTuple):
+    """Where an effort enters.
+
+    Attributes:
+        instance, port: balance.
+        name: of the FMU's input.
+    """
+
+    instance: str
+    port: str
+    name: str
 
 
 class _Bench:
     """Simulates runs of a model with efforts at some places."""
 
-    def __init__(self, simulator: Simulator, theta: Vector, places: Sequence[Place]) -> None:
+    def __init__(self, simulator: Simulator, theta: Vector, places: Sequence[Input]) -> None:
         problem = simulator.problem
         ports = list(dict.fromkeys((place.instance, place.port) for place in places))
         changes: dict[str, str] = {}
@@ -117,20 +163,44 @@ class _Bench:
             changes[instance] = changes.get(instance, "") + f"+{EFFORT}@{port}"
         problem = problem.with_effects(changes)
         problem = problem.hold({f"{i}.{port}.{EFFORT}.g": 1.0 for i, port in ports})
-        self.names = [
-            f"{place.instance}.{place.port}.{EFFORT}.u"
-            + (f"[{place.element}]" if place.element else "")
-            for place in places
-        ]
-        none = {
-            f"{instance}.{name}": _effort(np.zeros(2), (0.0, 1.0))
-            for instance in changes
-            for name in problem.system().members[instance].description.variables
-            if f"{instance}.{name}" in self.names
-        }
+        self.plain, self.places = simulator, list(places)
+        self.names = [f"{place.instance}.{place.name}" for place in places]
+        none = dict.fromkeys(self.names, _effort(np.zeros(2), (0.0, 1.0)))
         runs = [replace(run, inputs={**run.inputs, **none}) for run in problem.runs]
         self.simulator = simulator.of(problem.changed(runs=runs))
         self.theta = theta
+
+    def chosen(self, run: MeasuredRun) -> list[Input]:
+        """Places at which efforts make the model follow a run.
+
+        After the first one, which one comes next is told by first orders around the motion so far.
+        """
+        u = np.zeros((len(self.names), KNOTS[0]))
+        (residual,) = self.residuals(run, [u])
+        kept: list[int] = []
+        while len(kept) < PLACES and float(np.mean(residual**2)) > OPEN:
+            rest: dict[float, int] = {} if kept else {0.0: 0}
+            responses = self._responses(run, u, residual, KNOTS[0]) if kept else []
+            for place in range(len(responses)):
+                if place not in kept:
+                    some = [*kept, place]
+                    columns = np.hstack([responses[k] for k in some])
+                    step = _step(columns, residual, np.zeros((len(some), KNOTS[0])))
+                    left = residual - columns @ step.ravel()
+                    rest.setdefault(float(left @ left), place)
+            if not rest:
+                break
+            some = [*kept, rest[min(rest)]]
+            bench = _Bench(self.plain, self.theta, [self.places[k] for k in some])
+            efforts = bench.followed(bench.simulator.problem.run(run.name))
+            (after,) = bench.residuals(bench.simulator.problem.run(run.name), [efforts])
+            bench.simulator.close()
+            if kept and float(after @ after) > FALLS * float(residual @ residual):
+                break
+            kept, residual = some, after
+            u = np.zeros((len(self.names), efforts.shape[1]))
+            u[kept] = efforts
+        return [self.places[k] for k in kept]
 
     def inputs(self, run: MeasuredRun, u: Vector) -> dict[str, Signal]:
         """Efforts (places, knots) as inputs of a run."""
@@ -160,7 +230,8 @@ class _Bench:
                 made += u.size
                 if before < OPEN or made > MOST:
                     return u
-                step = _step(self._responses(run, u, residual), residual, u)
+                responses = np.hstack(self._responses(run, u, residual, count))
+                step = _step(responses, residual, u)
                 for share in SHARES:
                     try:
                         (found,) = self.residuals(run, [u + share * step])
@@ -175,18 +246,20 @@ class _Bench:
                 return u  # what is left is not the motion: a sensor's error, say
         return u
 
-    def _responses(self, run: MeasuredRun, u: Vector, residual: Vector) -> Vector:
-        """Derivatives of the model values to each knot of each place."""
-        columns: list[Vector] = []
+    def _responses(self, run: MeasuredRun, u: Vector, residual: Vector, count: int) -> list[Vector]:
+        """Derivatives of the model values to each of so many knots of each place."""
+        found = []
         for place in range(u.shape[0]):
             size = self._size(run, u, place, residual)
             moved = []
-            for knot in range(u.shape[1]):
+            for knot in range(count):
+                hat = _refined(size * np.eye(1, count, knot), u.shape[1])
                 other = u.copy()
-                other[place, knot] += size
+                other[place] += hat[0]
                 moved.append(other)
-            columns += [(residual - found) / size for found in self.residuals(run, moved)]
-        return np.column_stack(columns)
+            columns = [(residual - row) / size for row in self.residuals(run, moved)]
+            found.append(np.column_stack(columns))
+        return found
 
     def _size(self, run: MeasuredRun, u: Vector, place: int, residual: Vector) -> float:
         """Of a change of one knot that shows and is small."""

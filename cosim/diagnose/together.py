@@ -19,14 +19,14 @@ from ..calibrate.deferred import corrected
 from ..calibrate.fit import DRAFT, Effort, fit
 from ..calibrate.problem import Problem
 from ..errors import CosimError, UnbuiltError
-from .candidates import candidates, new_parameters
+from .candidates import balances, candidates, new_parameters
 from .choices import APART
 from .directions import Direction, Responses
 from .evidence import Chosen, Evidence
 from .fitter import AGAIN, QUICKLY
-from .following import FALLS, Followed, follow
+from .following import follow
 from .localise import Place
-from .models import GATE, OPEN, Fitted, compare
+from .models import GATE, Fitted, compare
 from .search import Search
 from .secant import patience
 from .signature import unscored
@@ -38,16 +38,14 @@ the best family that are: first orders leave errors of a per cent, within which 
 nearly it (friction, friction that falls with speed) change places."""
 TURNS = 2
 """Times that sets are proposed, the second time with the parameters of the best set."""
-PLACES = 3
-"""Places at which efforts enter at most, the most evident ones first."""
 BEYOND = 0.02
 """Share of what a model leaves beyond noise that a better set must take from it."""
 
 
 ROUGHLY = Effort("near", "draft", share=QUICKLY)
 """From values that are near until little is gained: one that ends early looks like a wrong set."""
-SHAPED = 2
-"""Sets of a size whose other parameters are fitted, the best ones."""
+SHAPED = 1
+"""Sets of a size whose other parameters are fitted, the best one."""
 
 
 @dataclass(frozen=True)
@@ -80,17 +78,20 @@ def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitte
     Args:
         search: the data, and fits so far; gets those that are made here.
         current: the best model of the rounds.
-        located: where free efforts explain most.
+        located: where a free force explains most, first.
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
-    places = [place for place in located if place.evidence > 0.0]
+    among = sorted(balances(declared.problem))
+    places = [(p.instance, p.port) for p in located if p.evidence > 0.0]
     if not places or search.raw.late:
         return current
     best, theta = current, declared.estimate.theta
     for _ in range(TURNS):
         try:
-            followed = _followed(search, declared, theta, places[:PLACES])
+            followed = follow(declared.simulator, theta, search.fitting, places[0], among)
+            names = ", ".join(followed.places)
+            search.say(f"along the log by efforts at {names}: mean square {followed.left:.3g}")
             responses = Responses(followed, search.fitting)
             known = search.offered(candidates(declared.problem))
             directions = responses.of(known)
@@ -103,10 +104,11 @@ def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitte
         draft = max(found, key=lambda d: _total(search, declared, d.fitted), default=None)
         if draft is None:
             break
-        gained = _total(search, declared, draft.fitted) - _total(search, declared, best)
+        settled = _settled(search, declared, draft)
+        gained = _total(search, declared, settled) - _total(search, declared, best)
         if gained <= max(GATE, BEYOND * (best.estimate.robust - 0.5 * best.estimate.count)):
             break
-        best = _settled(search, declared, draft)
+        best = settled
         search.say(f"together: {', '.join(sorted(best.labels))}")
         if not search.lacking(best):
             break
@@ -135,21 +137,6 @@ def _settled(search: Search, declared: Fitted, draft: Draft) -> Fitted:
 
 def _total(search: Search, declared: Fitted, fitted: Fitted) -> float:
     return search.gains(declared, fitted)[0] if fitted is not declared else 0.0
-
-
-def _followed(search: Search, declared: Fitted, theta: Vector, places: Sequence[Place]) -> Followed:
-    """The declared model along the log, by efforts at as few places as follow it."""
-    kept = [places[0]]
-    best = follow(declared.simulator, theta, search.fitting, kept)
-    for place in places[1:]:
-        if best.left < OPEN:
-            break
-        found = follow(declared.simulator, theta, search.fitting, [*kept, place])
-        if found.left < FALLS * best.left:
-            best, kept = found, [*kept, place]
-    names = ", ".join(place.label for place in kept)
-    search.say(f"moved along the log by efforts at {names}: {best.left:.3g} times the noise left")
-    return best
 
 
 def _fitted(

@@ -18,7 +18,6 @@ from cosim.diagnose.candidates import candidates
 from cosim.diagnose.directions import Direction, Responses
 from cosim.diagnose.evidence import Chosen, Evidence
 from cosim.diagnose.following import follow
-from cosim.diagnose.localise import Place
 from cosim.diagnose.search import Search
 from tests.diagnose import disc
 from tests.diagnose.test_left_out import LAWS
@@ -47,8 +46,7 @@ def moved(tmp_path_factory: pytest.TempPathFactory) -> Moved:
     problem = read_problem(disc.write(tmp_path_factory.mktemp("both"), LAWS["both"]))
     search = Search(Simulator(problem))
     base = search.calibrated()
-    place = Place("load", "flange", "", "N.m")
-    followed = follow(base.simulator, base.estimate.theta, search.fitting, [place])
+    followed = follow(base.simulator, base.estimate.theta, search.fitting, ("load", "flange"), [])
     responses = Responses(followed, search.fitting)
     residual = search.fit_data - base.fit
     directions = responses.of(candidates(search.declared))
@@ -82,9 +80,8 @@ def test_what_calibration_absorbs_is_wanted_of_no_law(tmp_path: Path) -> None:
     """The negative twin: a disc that lacks nothing, whose parameters are only nominal so far."""
     problem = read_problem(disc.write(tmp_path / "none", LAWS["none"]))
     search = Search(Simulator(problem))
-    place = Place("load", "flange", "", "N.m")
     base = search.calibrated()
-    followed = follow(base.simulator, problem.nominal, search.fitting, [place])
+    followed = follow(base.simulator, problem.nominal, search.fitting, ("load", "flange"), [])
     responses = Responses(followed, search.fitting)
     whole = float(followed.wanted @ followed.wanted)
     # what the step adds to the model is that of the calibrated point
