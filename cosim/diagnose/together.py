@@ -4,7 +4,7 @@ Rounds add one effect after another, and each is judged by a model that lacks th
 ends far from the noise, the model is moved along the log (`following`), the laws of the catalogue
 are asked there what they would do (`directions`), and the sets that explain most together
 (`evidence`) are fitted from the values that they have there, without efforts. Then once more from
-the parameters that the best of them ended with.
+the parameters that the best of them ended with, if it is better than what rounds have found.
 """
 
 from __future__ import annotations
@@ -37,11 +37,9 @@ FITS, VARIANTS = (2, 4, 4, 3), 6
 the best family that are: first orders leave errors of a per cent, within which a law and what is
 nearly it (friction, friction that falls with speed) change places."""
 TURNS = 2
-"""Times that sets are proposed, the second time with the parameters of the best set."""
+"""Times that sets are proposed, the second time with the parameters of a better set."""
 BEYOND = 0.02
 """Share of what a model leaves beyond noise that a better set must take from it."""
-
-
 ROUGHLY = Effort("near", "draft", share=QUICKLY)
 """From values that are near until little is gained: one that ends early looks like a wrong set."""
 SHAPED = 1
@@ -86,8 +84,9 @@ def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitte
     places = [(p.instance, p.port) for p in located if p.evidence > 0.0]
     if not places or search.raw.late:
         return current
-    best, theta = current, declared.estimate.theta
+    best = current
     for _ in range(TURNS):
+        theta = _declared(declared, best)
         try:
             followed = follow(declared.simulator, theta, search.fitting, places[0], among)
             names = ", ".join(followed.places)
@@ -104,15 +103,13 @@ def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitte
         draft = max(found, key=lambda d: _total(search, declared, d.fitted), default=None)
         if draft is None:
             break
-        settled = _settled(search, declared, draft)
+        settled, before = _settled(search, declared, draft), best
         gained = _total(search, declared, settled) - _total(search, declared, best)
-        if gained <= max(GATE, BEYOND * (best.estimate.robust - 0.5 * best.estimate.count)):
+        if gained > max(GATE, BEYOND * (best.estimate.robust - 0.5 * best.estimate.count)):
+            best = settled
+            search.say(f"together: {', '.join(sorted(best.labels))}")
+        if best is before or not search.lacking(best):
             break
-        best = settled
-        search.say(f"together: {', '.join(sorted(best.labels))}")
-        if not search.lacking(best):
-            break
-        theta = np.array([best.estimate.values[name] for name in declared.problem.names])
     return best
 
 
@@ -133,6 +130,12 @@ def _settled(search: Search, declared: Fitted, draft: Draft) -> Fitted:
         wanted = compare(search.check_data, fitted.check, found.fitted.check, search.checking)
         fitted = found.fitted if wanted.passed else fitted
     return search.sharpened(fitted, declared)
+
+
+def _declared(declared: Fitted, fitted: Fitted) -> Vector:
+    """Values that the declared parameters have in a model."""
+    values = {**declared.estimate.values, **fitted.estimate.values}
+    return np.array([values[name] for name in declared.problem.names])
 
 
 def _total(search: Search, declared: Fitted, fitted: Fitted) -> float:
