@@ -80,6 +80,10 @@ class EffectModel:
         named = {item.name: item for item in quantities} | symbols
         return Symbols({symbol: self.parameter(item) for symbol, item in named.items()})
 
+    def input(self, quantity: Quantity) -> SX:
+        """Declare an input of the FMU that the effect reads."""
+        return self._model.input(quantity)
+
     def state(self, quantity: Quantity) -> SX:
         """Declare a continuous state of the effect."""
         return self._model.state(quantity)

@@ -37,6 +37,7 @@ from .result import PURPOSES, Diagnosis
 from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of
+from .together import together
 from .unstable import ends
 from .verdict import above, decide, proposal
 from .whiteness import WhitenessTest, whiteness_tests
@@ -125,6 +126,7 @@ def _searched(
     search.note(base)
     current = base
     winners: list[Round] = []
+    proposed = asked is not None
     for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         try:
@@ -153,6 +155,11 @@ def _searched(
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
+        if stage.open and not proposed:
+            proposed, found = True, _together(result, current)
+            if found is not current and not search.lacking(found):
+                current = found
+                break
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
             current = reconsidered(search, shortened, winners)
@@ -160,6 +167,8 @@ def _searched(
         current = shortened
     else:
         current = reconsidered(search, current, winners)
+    if not proposed and any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
+        current = _together(result, current)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     _judged(result, search, current)
@@ -180,6 +189,18 @@ def _searched(
         result.files += leave_system(problem, adapters, made, out, result.warnings)
     result.wall = time.perf_counter() - begun
     return result
+
+
+def _together(result: Diagnosis, current: Fitted) -> Fitted:
+    """The best set of effects by evidence along the log's motion, or the given model."""
+    search = result.search
+    assert search is not None
+    try:
+        return together(search, current, result.located)
+    except UnbuiltError as error:
+        result.warnings.append(f"sets of effects were not compared along the log: {error}")
+        search.say(result.warnings[-1])
+        return current
 
 
 def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:

@@ -398,11 +398,17 @@ def exchanged(
         values[item.probe.second] = item.second
     if known is not None:
         values = {n: v for n, v in known.estimate.values.items() if n in names}
+    held: dict[str, float] = {}
     if fitted.effects[-1].place == item.candidate.place:  # the same quantities
         old, new = fitted.effects[-1].prefix, item.candidate.prefix
         mine = {n.removeprefix(old): v for n, v in fitted.estimate.values.items()}
         values |= {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
-    fixed = {p.name: item.fixed.get(p.name, p.nominal) for p in others if p.name not in values}
+        mine = {n.removeprefix(old): v for n, v in fitted.problem.constants.items()}
+        held = {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
+    fixed = {
+        p.name: item.fixed.get(p.name, held.get(p.name, p.nominal))
+        for p in others if p.name not in values
+    }  # fmt: skip
     whole = whole.with_parameters(
         [replace(p, span=abs(values[p.name]) or p.span) if p.strength and p.name in values else p
          for p in whole.parameters]

@@ -85,7 +85,7 @@ class Search(LateFitter):
                 f"{problem.file.path}: no effect {name!r} of the catalogue fits this system; "
                 f"{listing(sorted(names), name)}"
             )
-        self.known = self._offered(self.known)
+        self.known = self.offered(self.known)
         self.rounds: list[Round] = []
         self._builder = ThreadPoolExecutor(1)
 
@@ -102,9 +102,9 @@ class Search(LateFitter):
             self._build(self.declared, _changes(self.known, self.declared))
             return
         with suppress(UnbuiltError):  # the round that asks for them says so
-            self._build(problem, _changes(self._offered(candidates(problem)), problem))
+            self._build(problem, _changes(self.offered(candidates(problem)), problem))
 
-    def _offered(self, known: list[Candidate]) -> list[Candidate]:
+    def offered(self, known: list[Candidate]) -> list[Candidate]:
         """Those that are not left out."""
         return [c for c in known if c.effect not in self.withheld]
 
@@ -193,7 +193,7 @@ class Search(LateFitter):
         simulation of all runs.
         """
         if base.effects and self.whole:  # what was added may have balances of its own
-            self.known = self._offered(candidates(base.problem))
+            self.known = self.offered(candidates(base.problem))
         present = {item.label for item in base.effects}
         chosen = [c for c in self.known if c.label not in present]
         stack = self.telling(base)
