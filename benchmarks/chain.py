@@ -86,17 +86,9 @@ int run(const Slave *s, double *u, double *y, const int64_t *source, const int64
 """
 
 
-def build_chain(fmi: int, motor: str, out: Path) -> Any:
-    """Four drives: motor, gearbox, disc; each motor follows the speed of the disc before it."""
-    from cosim import System
-    from sources.packaging.build import build
-
-    class Built:
-        def path(self, variant: str) -> Path:
-            return build(variant, out=out, fmi=fmi)  # type: ignore[arg-type]
-
-    system = System("chain", Built(), "four drives, each following the one before")
-    for k in range(1, DRIVES + 1):
+def add_drives(system: Any, count: int, motor: str) -> None:
+    """Add drives to a system: motor, gearbox, disc; each motor follows the disc before it."""
+    for k in range(1, count + 1):
         system.add(f"motor{k}", f"dc_motor/{motor}", {"w_ref": 20.0})
         system.add(f"gearbox{k}", "gearbox/ratio")
         system.add(f"load{k}", "inertia/disc")
@@ -107,6 +99,19 @@ def build_chain(fmi: int, motor: str, out: Path) -> Any:
         system.connect(f"load{k}.w", f"gearbox{k}.w_b")
         if k > 1:
             system.connect(f"load{k - 1}.w", f"motor{k}.w_ref")
+
+
+def build_chain(fmi: int, motor: str, out: Path) -> Any:
+    """Four drives: motor, gearbox, disc; each motor follows the speed of the disc before it."""
+    from cosim import System
+    from sources.packaging.build import build
+
+    class Built:
+        def path(self, variant: str) -> Path:
+            return build(variant, out=out, fmi=fmi)  # type: ignore[arg-type]
+
+    system = System("chain", Built(), "four drives, each following the one before")
+    add_drives(system, DRIVES, motor)
     return system
 
 

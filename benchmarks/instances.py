@@ -17,6 +17,7 @@ from typing import TypeVar
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.chain import add_drives
 from cosim import Master, System
 from cosim.installation.builder import default_provider
 from cosim.master.session import Session
@@ -33,17 +34,7 @@ ROUNDS = 3
 def chain(count: int) -> System:
     """A system of so many FMUs."""
     system = System("chain", default_provider())
-    for k in range(1, count // 3 + 1):
-        system.add(f"motor{k}", "dc_motor/ideal", {"w_ref": 20.0})
-        system.add(f"gearbox{k}", "gearbox/ratio")
-        system.add(f"load{k}", "inertia/disc")
-        system.connect(f"motor{k}.tau", f"gearbox{k}.tau_a")
-        system.connect(f"gearbox{k}.w_a", f"motor{k}.w")
-        system.connect(f"gearbox{k}.tau_b", f"load{k}.tau")
-        system.connect(f"gearbox{k}.J_b", f"load{k}.J_added")
-        system.connect(f"load{k}.w", f"gearbox{k}.w_b")
-        if k > 1:
-            system.connect(f"load{k - 1}.w", f"motor{k}.w_ref")
+    add_drives(system, count // 3, "ideal")
     return system
 
 
