@@ -198,7 +198,8 @@ def mapping_keys() -> str:
         told = max(_meanings(), key=lambda known: len(set(known) & set(keys)))
         if 2 * len(set(told) & set(keys)) < len(keys):  # a table of other things
             told = {}
-        rows = [f"| `{k}` | {_kind(check)} | {told.get(k, '')} |" for k, check in keys.items()]
+        said = {k: re.sub(r"\]\((?=[\w.]+\.md)", "](../", text) for k, text in told.items()}
+        rows = [f"| `{k}` | {_kind(check)} | {said.get(k, '')} |" for k, check in keys.items()]
         parts += [f"## {title}", "\n".join(["| key | value | meaning |", "|---|---|---|", *rows])]
     return "\n\n".join(parts) + "\n"
 

@@ -22,7 +22,7 @@ from .choices import choices
 from .following import Followed
 from .linear import ABSORBED, Absorber, SampleStack
 from .probes import Batch, Probe, batches
-from .secant import SECONDS, model_values, patience
+from .secant import RUNAWAY, SECONDS, model_values, patience
 
 Vector = NDArray[np.float64]
 SMALL, LARGE, AIM, TRIALS = 0.5, 10.0, 3.0, 7
@@ -155,4 +155,6 @@ class Responses:
             theta[problem.index(name)] = value
         simulator = self.simulator.of(problem).limited(patience(self.simulator))
         found = model_values(simulator, theta, self.stack)
+        if not np.max(np.abs(found), initial=0.0) < RUNAWAY:
+            raise CosimError(f"{problem.name}: with {dict(values)} the simulation runs away")
         return np.asarray(found - self.followed.model)

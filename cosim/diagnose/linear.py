@@ -17,6 +17,7 @@ from ..calibrate.loss import WINDOW, concentrated, trust
 from ..calibrate.normal import BLOCK, block_length
 from ..calibrate.parts import MeasuredRun, Sensitivity
 from ..calibrate.problem import Problem
+from ..errors import CosimError
 
 Vector = NDArray[np.float64]
 ABSORBED = 1e-3
@@ -163,12 +164,25 @@ class Absorber:
     def rest(self, vector: Vector) -> Vector:
         """What is left of a vector."""
         share = self._share(vector).astype(np.float32)
-        return np.asarray(vector - self._basis @ share, dtype=np.float64)
+        return np.asarray(vector - _product(self._basis, share), dtype=np.float64)
 
     def _share(self, vector: Vector) -> Vector:
         size = float(np.max(np.abs(vector), initial=0.0)) or 1.0  # squares must fit float32
-        share = (vector / size).astype(np.float32) @ self._basis
+        share = _product((vector / size).astype(np.float32), self._basis)
         return np.asarray(share * size, dtype=np.float64)
+
+
+def _product(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Product of arrays, which must be finite.
+
+    Flags of the processor are not asked: kernels of BLAS may compute with what lies beyond an array
+    and leave it out of the result (numpy issue 24067), which warns of nothing, now and then.
+    """
+    with np.errstate(invalid="ignore"):
+        found: NDArray[np.float32] = np.asarray(first @ second)
+    if not np.all(np.isfinite(found)):
+        raise CosimError("values of a model, or their derivatives, are not finite")
+    return found
 
 
 @dataclass(frozen=True)

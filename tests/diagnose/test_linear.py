@@ -13,6 +13,7 @@ from cosim.diagnose.linear import Absorber, SampleStack, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
 from cosim.diagnose.search import Search
 from cosim.diagnose.whiteness import CALIBRATED, whiteness_tests
+from cosim.errors import CosimError
 
 RATE, SECONDS = 100, 40
 
@@ -130,6 +131,15 @@ def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
     # rounding of the float32 basis
     assert held.rest(first) == pytest.approx(across, abs=1e-4)
     assert held.change(first)[0] == 0.0
+
+
+def test_values_that_are_not_finite_are_refused_when_something_is_absorbed() -> None:
+    columns = np.eye(4, 2) * 10.0
+    problem: Any = SimpleNamespace(names=("a", "b"), parameters=[SimpleNamespace(prior=0.0)] * 2)
+    absorber = Absorber(columns, problem)
+    assert absorber.rest(np.ones(4)) == pytest.approx([0.0, 0.0, 1.0, 1.0])
+    with pytest.raises(CosimError, match="not finite"):
+        absorber.rest(np.array([np.nan, 0.0, 1.0, 1.0]))
 
 
 def test_windows_that_are_far_off_count_by_their_logarithm() -> None:
