@@ -22,7 +22,7 @@ from ..errors import CosimError, UnbuiltError
 from .candidates import balances, candidates, new_parameters
 from .choices import APART
 from .directions import Direction, Responses
-from .evidence import Chosen, Evidence
+from .evidence import ALIKE, Chosen, Evidence
 from .fitter import AGAIN, QUICKLY
 from .following import follow
 from .localise import Place
@@ -42,11 +42,9 @@ BEYOND = 0.02
 """Share of what a model leaves beyond noise that a better set must take from it."""
 ROUGHLY = Effort("near", "draft", share=QUICKLY)
 """From values that are near until little is gained: one that ends early looks like a wrong set."""
-SHAPED = 1
-"""Sets of a size whose other parameters are fitted, the best one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Draft:
     """A fit of a set.
 
@@ -168,7 +166,12 @@ def _fitted(
             if one is not None:
                 now.append(one)
         now.sort(key=lambda d: -_total(search, declared, d.fitted))
-        found += [_shaped(search, declared, one) for one in now[:SHAPED]] + now[SHAPED:]
+        least = (1.0 - ALIKE) * _total(search, declared, now[0].fitted)
+        near = [d for d in now if _total(search, declared, d.fitted) > least]
+        simplest = min(near, key=lambda d: len(d.whole.parameters))
+        for one in now:  # how sharply a law sticks may be what another has parameters for
+            better = one in (now[0], simplest)
+            found.append(_shaped(search, declared, one) if better else one)
         if any(not search.lacking(d.fitted) for d in found):
             break
     return found
