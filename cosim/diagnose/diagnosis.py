@@ -126,7 +126,7 @@ def _searched(
     search.note(base)
     current = base
     winners: list[Round] = []
-    proposed = asked is not None
+    proposed, whole = asked is not None, None
     for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         try:
@@ -158,8 +158,9 @@ def _searched(
         if stage.open and not proposed:
             proposed, found = True, _together(result, current)
             if found is not current and not search.lacking(found):
-                current = found
-                break
+                whole = found
+        if whole is not None and len(whole.effects) <= len(current.effects) + 1:
+            break  # else rounds may do with fewer laws
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
             current = reconsidered(search, shortened, winners)
@@ -167,6 +168,8 @@ def _searched(
         current = shortened
     else:
         current = reconsidered(search, current, winners)
+    if whole is not None and (search.lacking(current) or search.gains(current, whole)[0] > 0.0):
+        current = whole
     if not proposed and any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
         current = _together(result, current)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far

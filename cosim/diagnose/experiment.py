@@ -111,7 +111,8 @@ def _left(fitted: Fitted, run: MeasuredRun, stack: SampleStack, change: Vector) 
     for item, (_, residual) in zip(
         fitted.estimate.jacobian, fitted.estimate.residuals, strict=True
     ):
-        part = (item.values * problem.scale[item.columns])[np.isfinite(residual)]
+        # what a late clock moves out of a run tells nothing of any parameter
+        part = np.nan_to_num(item.values * problem.scale[item.columns])[np.isfinite(residual)]
         known[np.ix_(item.columns, item.columns)] += part.T @ part
     for i, p in enumerate(problem.parameters):
         if p.run:  # the next run starts elsewhere

@@ -67,7 +67,9 @@ def decide(table: Table) -> Verdict:
 def proposal(table: Table) -> int | None:
     """The best set of those that unused runs want and whose laws are all there and missed.
 
-    A law whose other parameters show nothing gives way to its special case.
+    A law whose other parameters show nothing gives way to its special case, and several laws to
+    fewer that the data do not tell from them: two sensors that are late by as much are one late
+    command.
     """
     able = [i for i, model in enumerate(table.models) if not doubts(table, model)]
     if not able:
@@ -76,6 +78,10 @@ def proposal(table: Table) -> int | None:
     while (simple := _special(table, best, able)) is not None:
         best = simple
     alike = [i for i in able if i == best or not _apart(table, best, i)]
+    fewest = min(alike, key=lambda i: (len(table.models[i].laws), -table.models[i].score))
+    if len(table.models[fewest].laws) < len(table.models[best].laws):
+        best = fewest
+        alike = [i for i in able if i == best or not _apart(table, best, i)]
     one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
     return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
 

@@ -323,6 +323,17 @@ def test_two_laws_that_the_data_do_not_tell_apart_are_confounded() -> None:
     assert decide(table(FAR, *rivals)).kind == "effect_found"
 
 
+def test_fewer_laws_that_do_the_same_are_named() -> None:
+    """Two sensors that are late by as much as a command is."""
+    late = law("delay", "motor.shaft"), law("delay", "gearbox.flange_a")
+    sets = model(law(), *late, gain=4.0), model(law(), law("first_order_lag", "motor.shaft"))
+    found = decide(table(FAR, *sets, alike=((1, 2),)))
+    assert found.kind == "effect_found"
+    assert [x.effect for x in found.laws] == ["coulomb", "first_order_lag"]
+    # told apart by the data, all three are there
+    assert len(decide(table(FAR, *sets)).laws) == 3
+
+
 def test_the_same_law_elsewhere_is_another_place_and_no_rival() -> None:
     rivals = (model(law(), gain=1.0), model(law(place="gearbox.flange_a")))
     found = decide(table(FAR, *rivals, alike=((1, 2),)))
