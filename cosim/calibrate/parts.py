@@ -88,6 +88,11 @@ class Parameter:
         """Size of a typical change."""
         return self.span or self.maximum - self.minimum
 
+    @property
+    def absent(self) -> float:
+        """Value of a strength with which its effect does nothing."""
+        return self.minimum if self.inverse else 0.0
+
 
 @dataclass(frozen=True)
 class Channel:

@@ -56,11 +56,6 @@ class Direction:
         """Which."""
         return self.probe.candidate
 
-    @property
-    def absent(self) -> float:
-        """Strength with which it does nothing."""
-        return self.probe.strength.minimum if self.probe.strength.inverse else 0.0
-
     def parameters(self, values: Vector) -> dict[str, float]:
         """Parameter -> value for factors on its columns, within bounds."""
         p, mix = self.probe.strength, self.probe.mix
@@ -72,7 +67,7 @@ class Direction:
             low, high = self.probe.reach
             share = float(values[1] / values[0]) if values[0] else 0.0
             found[self.probe.second] = float(np.clip(share, low, high))
-        found[p.name] = float(np.clip(self.absent + strength, p.minimum, p.maximum))
+        found[p.name] = float(np.clip(p.absent + strength, p.minimum, p.maximum))
         return found
 
 
@@ -130,17 +125,16 @@ class Responses:
     def _direction(self, probe: Probe, fixed: Mapping[str, float], size: float) -> Direction | None:
         """None if it shows nothing, or nothing that calibration cannot absorb."""
         p, (first, *others) = probe.strength, SECONDS[probe.mix]
-        absent = p.minimum if p.inverse else 0.0
         for _ in range(TRIALS):
-            size = min(size, p.maximum - absent)
-            change = self._at(probe.problem, probe.values(absent + size, first, fixed))
+            size = min(size, p.maximum - p.absent)
+            change = self._at(probe.problem, probe.values(p.absent + size, first, fixed))
             largest = self.stack.largest(change)
-            if SMALL < largest < LARGE or (largest < SMALL and absent + size >= p.maximum):
+            if SMALL < largest < LARGE or (largest < SMALL and p.absent + size >= p.maximum):
                 break
             size *= float(np.clip(AIM / max(largest, 1e-12), 1e-3, 1e3))
         changes = [change]
         for second in others:
-            other = self._at(probe.problem, probe.values(absent + size, second, fixed))
+            other = self._at(probe.problem, probe.values(p.absent + size, second, fixed))
             changes.append((other - change) / second if probe.mix == "shift" else other)
         whole = np.column_stack(changes) / size
         rest = np.column_stack([self.absorber.rest(column) for column in whole.T])

@@ -22,7 +22,8 @@ from .directions import Direction
 
 Vector = NDArray[np.float64]
 WIDTH, NEXT = 40, 8
-"""Sets of a size that are made larger, and by how many laws each. All single laws are."""
+"""Sets of a size that are made larger, and by how many laws each, found among four times as many,
+of which some would have to be negative. All single laws are. This takes seconds, fits minutes."""
 ALONE = 1e-4
 """A direction of which less than this share is left by the others of a set adds nothing of its own:
 responses are exact to about one in a hundred, in squares."""

@@ -55,8 +55,6 @@ PLACES = 3
 """Where efforts enter at most: each costs as many simulations again."""
 SIDE = 0.02
 """Share of the efforts by which they are changed to see what they do together."""
-MOST = 6000
-"""Simulations of a run that its efforts may take; what follows worse by then is worth less."""
 
 
 @dataclass(frozen=True)
@@ -171,36 +169,45 @@ class _Bench:
         self.theta = theta
 
     def chosen(self, run: MeasuredRun) -> list[Input]:
-        """Places at which efforts make the model follow a run.
+        """Places at which efforts make the model follow a run, the first one at the first balance.
 
-        After the first one, which one comes next is told by first orders around the motion so far.
+        Which one comes next is told by first orders around the motion so far.
         """
         u = np.zeros((len(self.names), KNOTS[0]))
         (residual,) = self.residuals(run, [u])
         kept: list[int] = []
-        while len(kept) < PLACES and float(np.mean(residual**2)) > OPEN:
-            rest: dict[float, int] = {} if kept else {0.0: 0}
-            responses = self._responses(run, u, residual, KNOTS[0]) if kept else []
-            for place in range(len(responses)):
-                if place not in kept:
-                    some = [*kept, place]
-                    columns = np.hstack([responses[k] for k in some])
-                    step = _step(columns, residual, np.zeros((len(some), KNOTS[0])))
-                    left = residual - columns @ step.ravel()
-                    rest.setdefault(float(left @ left), place)
-            if not rest:
-                break
-            some = [*kept, rest[min(rest)]]
+        offered = [k for k, p in enumerate(self.places) if p[:2] == self.places[0][:2]]
+        while offered and len(kept) < PLACES and float(np.mean(residual**2)) > OPEN:
+            some = [*kept, self._next(run, u, residual, kept, offered)]
             bench = _Bench(self.plain, self.theta, [self.places[k] for k in some])
-            efforts = bench.followed(bench.simulator.problem.run(run.name))
-            (after,) = bench.residuals(bench.simulator.problem.run(run.name), [efforts])
+            same = bench.simulator.problem.run(run.name)
+            efforts = bench.followed(same)
+            (after,) = bench.residuals(same, [efforts])
             bench.simulator.close()
             if kept and float(after @ after) > FALLS * float(residual @ residual):
                 break
             kept, residual = some, after
             u = np.zeros((len(self.names), efforts.shape[1]))
             u[kept] = efforts
+            offered = [k for k in range(len(self.names)) if k not in kept]
         return [self.places[k] for k in kept]
+
+    def _next(
+        self, run: MeasuredRun, u: Vector, residual: Vector, kept: list[int], offered: list[int]
+    ) -> int:
+        """The place at which an effort brings the model nearest, beside those that are kept."""
+        if len(offered) == 1:
+            return offered[0]
+        responses = self._responses(run, u, residual, KNOTS[0])
+
+        def left(place: int) -> float:
+            some = [*kept, place]
+            columns = np.hstack([responses[k] for k in some])
+            step = _step(columns, residual, np.zeros((len(some), KNOTS[0])))
+            rest = residual - columns @ step.ravel()
+            return float(rest @ rest)
+
+        return min(offered, key=left)
 
     def inputs(self, run: MeasuredRun, u: Vector) -> dict[str, Signal]:
         """Efforts (places, knots) as inputs of a run."""
@@ -222,13 +229,11 @@ class _Bench:
         """Efforts with which the model follows a run."""
         u = np.zeros((len(self.names), KNOTS[0]))
         (residual,) = self.residuals(run, [u])
-        made = 0
         for count in KNOTS:
             u, coarse = _refined(u, count), float(np.mean(residual**2))
             for _ in range(STEPS):
                 before = float(np.mean(residual**2))
-                made += u.size
-                if before < OPEN or made > MOST:
+                if before < OPEN:
                     return u
                 responses = np.hstack(self._responses(run, u, residual, count))
                 step = _step(responses, residual, u)

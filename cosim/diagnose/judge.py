@@ -107,7 +107,7 @@ class Judge:
         return Law(
             candidate.effect, candidate.instance, candidate.port,
             strength.name.removeprefix(prefix), values, candidate.text,
-            strength.minimum if strength.inverse else 0.0, len(names), candidate.contains, twins,
+            strength.absent, len(names), candidate.contains, twins,
             p_value,
             None if less is None else self.better(less, fitted),
         )  # fmt: skip

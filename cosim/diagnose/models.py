@@ -141,7 +141,7 @@ def is_open(estimate: Estimate) -> bool:
 def absent(fitted: Fitted, effect: Candidate) -> dict[str, float]:
     """Values of an effect's parameters with which it does nothing."""
     return {
-        p.name: (p.minimum if p.inverse else 0.0) if p.strength else value
+        p.name: p.absent if p.strength else value
         for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True)
         if p.name.startswith(effect.prefix)
     }

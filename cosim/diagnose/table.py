@@ -148,7 +148,7 @@ def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:
         )  # fmt: skip
         law = Law(
             item.candidate.effect, item.candidate.instance, item.candidate.port, size.name, (size,),
-            item.candidate.text, p.minimum if p.inverse else 0.0, max(item.probe.own, 1),
+            item.candidate.text, p.absent, max(item.probe.own, 1),
             item.candidate.contains, item.same,
             rounds[0].corrected.get(item.candidate.label),
         )  # fmt: skip
