@@ -46,6 +46,7 @@ class Component:
         source: paper and section, or book.
         energy: False for blocks that only carry signals (they have no energy balance).
         like: component with the same balances; effects are catalogued of that one only.
+        devices_of: component whose shipped parameter files are this one's too.
         relay: whether it passes values on within an instant: masters that hold values over a step
             fetch its outputs anew, so that a signal through it is no later than one without it.
     """
@@ -57,6 +58,7 @@ class Component:
     source: str = ""
     energy: bool = True
     like: str = ""
+    devices_of: str = ""
     relay: bool = False
 
 

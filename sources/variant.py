@@ -128,7 +128,9 @@ def effects() -> dict[str, ModuleType]:
 
 def shipped_devices(component: str) -> dict[str, Path]:
     """Parameter files of a component that come with cosim, by device name."""
-    return {path.stem: path for path in sorted((_ROOT / component / "parameters").glob("*.toml"))}
+    declared = components().get(component)
+    owner = (declared.devices_of if declared else "") or component
+    return {path.stem: path for path in sorted((_ROOT / owner / "parameters").glob("*.toml"))}
 
 
 def devices(component: str) -> dict[str, Path]:
