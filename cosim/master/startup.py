@@ -8,8 +8,9 @@ outputs:
     y(-h) = 3 y(0) - 3 y(h) + y(2 h),   y(-2 h) = 6 y(0) - 8 y(h) + 3 y(2 h)
     y(-3 h) = 10 y(0) - 15 y(h) + 6 y(2 h)
 
-The second trial begins with the past from the first. Runs of a single step, and systems with an FMU
-that cannot return to a saved state, start with held inputs.
+The second trial begins with the past from the first. Algorithms that repeat steps need no past. Runs
+of a single step, and systems with an FMU that cannot return to a saved state, start with held
+inputs.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def find_past(run: Interpreter) -> None:
     """
     means = run.plan.means
     able = all(item.description.can("canGetAndSetFMUState") for item in run.instances)
-    if not means or not able or run.times.size < 3:
+    if not means or not able or run.times.size < 3 or run.plan.stepper is not None:
         return
     step = decoded(run.plan.step)
     sources = [mean.source for mean in means]

@@ -7,8 +7,14 @@ point as long as it contracts, else Newton's method with a Jacobian by differenc
 which is kept from step to step. Held signals (integers, booleans, discrete ones) are those of t_k.
 Needs FMUs that can return to a saved state.
 
+With interpolation = 1 the inputs of FMUs that can follow (FMI 2's canInterpolateInputs) go in a line
+from L y_k to L y_{k+1} within the step, of the same mean. A contact that follows its velocity within
+the step, as a stiff one does, then ends with the slip that it has and not with half of the step's
+change of velocity beside; its own solver sees no jumps.
+
 Options:
     tolerance: relative change of exchanged values at which a step counts as settled.
+    interpolation: 0: inputs are held at their mean; 1: they move from begin to end where they can.
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (iteration); Busch, Continuous
 approximation techniques for co-simulation methods, 2016.
@@ -23,10 +29,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FmuCallError
+from ...errors import FmuCallError, ValueRangeError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
-from ..extrapolation import smooth
+from ..extrapolation import means, set_derivatives, smooth
 from ..interpreter import Interpreter
 from ..kernel.programs import Programs
 from ..newton import Newton
@@ -37,26 +43,43 @@ from ..rollback import Checkpoint
 Vector = NDArray[np.float64]
 FIXED_POINT = 12
 """Repetitions before Newton's method takes over."""
-FRESH, STEP = 0, 1
-"""Programs: connected values brought up to date, and a step with that."""
+FRESH, STEP, ENDS = 0, 1, 2
+"""Programs: connected values brought up to date; a step with that, without if inputs move; and then
+outputs for given inputs at its end."""
 
 
 def compile_plan(
-    system: System, external: Sequence[str], observed: Sequence[str], *, tolerance: float = 1e-8
+    system: System,
+    external: Sequence[str],
+    observed: Sequence[str],
+    *,
+    tolerance: float = 1e-8,
+    interpolation: int = 0,
 ) -> Plan:
     """Compile a system."""
     refuse_without_states(system, "iterated")
+    if interpolation not in (0, 1) or isinstance(interpolation, bool):
+        raise ValueRangeError(f"interpolation of order {interpolation!r}: must be 0 or 1")
     layout = lay_out(system, external, observed)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=False)
+    lines, spans = means(system, layout, interpolation)
+    everyone = range(len(layout.instances))
+    step: list[tuple[int, ...]] = []
+    for index in everyone:
+        step += [(Op.SET, index), *set_derivatives(lines, spans, index)]
+    step += [(Op.STEP, index) for index in everyone]
+    if not interpolation:
+        step += [*[(Op.GET, index) for index in everyone], *fresh]
     return Plan(
         "iterated",
         layout,
         initial_sweep(system, layout),
-        operations([(Op.EXTERNAL,), *fresh, (Op.RECORD,)]),
+        operations(step),
         final_operations(fresh),
         tuple(loop for _, loop in loops),
         operations(fresh),
+        tuple(lines),
         stepper=partial(
             Iterated, tolerance=positive("tolerance", tolerance), smooth=smooth(system, layout)
         ),
@@ -79,10 +102,16 @@ class Iterated:
         self.sources = np.unique(run.layout.copy_source[smooth])
         self.newton = Newton(self.sources.size, tolerance)
         everyone = range(len(run.instances))
-        whole = operations([(op, a) for op in (Op.SET, Op.STEP, Op.GET) for a in everyone])
-        fresh = run.plan.solving
-        self.programs = Programs(run, fresh, np.concatenate([whole, fresh]))
+        ends = operations([(op, index) for op in (Op.SET, Op.GET) for index in everyone])
+        self.programs = Programs(run, run.plan.solving, run.plan.step, ends)
+        lines = [mean for mean in run.plan.means if mean.moving]
+        self.line = np.array([run.plan.means.index(mean) for mean in lines], dtype=np.int64)
+        self.line_source = np.array([mean.source for mean in lines], dtype=np.int64)
+        self.line_target = np.array([mean.target for mean in lines], dtype=np.int64)
+        self.line_gain = np.array([mean.gain for mean in lines])
+        self.line_offset = np.array([mean.offset for mean in lines])
         self.held = np.zeros(0)
+        self.change = np.zeros(self.sources.size)
         self.repetitions = 0
 
     def advance(self, last: int) -> None:
@@ -98,14 +127,16 @@ class Iterated:
     def restart(self) -> None:
         """Forget what earlier steps were like."""
         self.newton.valid[0] = 0
+        self.change[:] = 0.0
 
-    def save(self) -> tuple[Vector, int, int]:
-        """The Jacobian that is kept from step to step, and how many steps there were."""
-        return self.newton.inverse.copy(), int(self.newton.valid[0]), self.repetitions
+    def save(self) -> tuple[Vector, Vector, int, int]:
+        """Jacobian and changes that are kept from step to step, and how many steps there were."""
+        kept = self.newton.inverse.copy(), self.change.copy()
+        return *kept, int(self.newton.valid[0]), self.repetitions
 
-    def restore(self, memory: tuple[Vector, int, int]) -> None:
+    def restore(self, memory: tuple[Vector, Vector, int, int]) -> None:
         """Return to them."""
-        self.newton.inverse[:], self.newton.valid[0], self.repetitions = memory
+        self.newton.inverse[:], self.change[:], self.newton.valid[0], self.repetitions = memory
 
     def steps(self) -> int:
         """Steps of the whole system that were made, repeated ones too."""
@@ -120,11 +151,12 @@ class Iterated:
         """One communication step."""
         run = self.run
         begin = run.values.copy()
+        guess = (begin[self.sources] + self.change).tolist()
         with self.programs.saved() as before:
-            end = begin[self.sources].tolist()
+            end = list(guess)
             settled = not self.newton.valid[0] and self.fixed_point(before, begin, end)
             if not settled:
-                end = begin[self.sources].tolist()
+                end = list(guess)
                 settled = self.newton.solve(lambda z: self.attempt(before, begin, z), end)
             if not settled:
                 raise FmuCallError(
@@ -132,6 +164,8 @@ class Iterated:
                     "settle, neither by repetition nor by Newton's method; take a smaller "
                     "communication step"
                 )
+        if run.plan.means:
+            self.change = np.array(end) - begin[self.sources]
         run.account(self.held[run.layout.bond_input - self.input_slots.start])
 
     @property
@@ -169,6 +203,19 @@ class Iterated:
         )
         self.held = values[self.input_slots].copy()
         time = run.instants[run.index]
-        self.programs.do(STEP, time, run.size(time, run.step))
+        size = run.size(time, run.step)
+        if run.plan.means:
+            values[self.sources] = end
+            first, last = begin[self.line_source], values[self.line_source]
+            values[self.line_target] = first * self.line_gain + self.line_offset
+            run.derivatives.slope[self.line] = (last - first) * (self.line_gain / size)
+        self.programs.do(STEP, time, size)
+        if run.plan.means:
+            # outputs of the inputs' end values as they are assumed: a stiff contact turns what is
+            # left between those and the new ones into large forces, on which nothing converges
+            values[layout.copy_target] = (
+                values[layout.copy_source] * layout.copy_gain + layout.copy_offset
+            )
+            self.programs.do(ENDS, time + size)
         found: list[float] = values[self.sources].tolist()
         return found
