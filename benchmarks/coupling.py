@@ -12,7 +12,8 @@ The reference is the monolithic solution: the variants' equations composed, outp
 direct feedthrough, solved with SciPy's Radau at a relative tolerance of 1e-9. Runs of a scenario
 are long; there it is the system's own solution at 50 us, and the first line says how far that is
 from the monolithic one over the first two seconds (over the whole run with --whole, which takes a
-minute for some runs and hours for others).
+minute for some runs and hours for others). `mir250_parts`, the base in parts, is compared with the
+packed base: with `mobile_base/planar` in `mir250`, which has the same equations.
 """
 
 from __future__ import annotations
@@ -78,6 +79,8 @@ class Case:
         steps: communication steps [s].
         long: the reference is the system's own solution.
         checked: time over which that is compared with the monolithic one [s].
+        packed: case that stands for this one where it is solved as one or with a fine step, None:
+            itself; its columns are this one's.
 
     Errors are taken at the communication points of the longest step.
     """
@@ -90,6 +93,7 @@ class Case:
     steps: tuple[float, ...] = (2e-3, 1e-3, 5e-4, 2.5e-4)
     long: bool = False
     checked: float = 2.0
+    packed: Case | None = None
 
     @property
     def raster(self) -> float:
@@ -105,10 +109,18 @@ ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("gauss_seidel", {"extrapolation": 2}),
     ("iterated", {}),
 )
+PARTS_ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("gauss_seidel", {}),
+    ("jacobi", {"extrapolation": 1}),
+    ("gauss_seidel", {"extrapolation": 1}),
+    ("gauss_seidel", {"extrapolation": 2}),
+    ("iterated", {"interpolation": 1, "tolerance": 1e-5}),
+)
 RUNS = tuple(
     ["ur5_bench/UR5e"]
     + [f"mir250/{run}" for run in ("IN1", "IN2", "CN1", "CN2")]
     + [f"mobile_manipulator/{run}" for run in ("IN1", "IN2", "CN1", "CN2", "IY", "CY")]
+    + [f"mir250_parts/CN1+{law}" for law in ("stick_slip", "brush", "creep")]
     + [f"omni_base/{run}" for run in ("open", "closed", "closed_scrub", "eight")]
     + [f"crawler/SET{n}_1" for n in range(1, 6)]
 )
@@ -127,12 +139,13 @@ def motor_bench() -> Case:
     return Case(system, 0.5, columns, {"motor.w_ref": 40.0})
 
 
-def of_scenario(name: str) -> Case:
-    """A run of a scenario as it is."""
+def of_scenario(name: str, variants: Mapping[str, str] | None = None) -> Case:
+    """A run of a scenario as it is, but for these variants."""
     file, run = scenarios.find(name, None)
     item = file.scenario(run)
     provider = default_provider()
-    instances = apply(item.system.instances, item.variants, provider, item.folder)
+    changes = {**item.variants, **(variants or {})}
+    instances = apply(item.system.instances, changes, provider, item.folder)
     system = replace(item.system, instances=instances, parameters={}).build(provider)
     for key, value in {**item.system.parameters, **item.parameters}.items():
         system.set(key, value)
@@ -146,10 +159,27 @@ def of_scenario(name: str) -> Case:
     )
 
 
+def in_parts(name: str) -> Case:
+    """A run of `mir250_parts` with a friction law, e.g. `mir250_parts/CN1+brush`."""
+    run, _, law = name.partition("+")
+    caster = "creep" if law == "creep" else "swivel"
+    case = of_scenario(run, {"wheel_contact": law, "caster": caster})
+    document = read_system(ROOT / "scenarios" / "systems" / "mir250.toml")
+    base = f"mobile_base/planar[wheel_contact={law},caster={caster}]"
+    path = case.system.members["path"]
+    instances = {**document.instances, "base": base, "path": path.reference}
+    system = unsampled(replace(document, instances=instances).build(default_provider()))
+    for key, value in path.parameters.items():
+        system.set(f"path.{key}", value)
+    inputs = {f"base.{key.partition('.')[2]}": value for key, value in case.inputs.items()}
+    packed = replace(case, system=system, columns=columns_of(system), inputs=inputs)
+    return replace(case, packed=packed, steps=(2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4))
+
+
 def columns_of(system: System) -> tuple[Column, ...]:
     """What is compared, by the components that the system has."""
     columns: list[Column] = []
-    names = ("base", "constant", "law", "skid", "contact")  # the last four are crawlers
+    names = ("base", "body", "constant", "law", "skid", "contact")  # the last four are crawlers
     poses = [pose(system, name) for name in names if name in system.members]
     if poses:
         positions = tuple(signal for x, y, _ in poses for signal in (x, y))
@@ -209,9 +239,17 @@ def constants(system: System, inputs: Mapping[str, Driver]) -> dict[str, float]:
     return found
 
 
-def reference(case: Case, signals: list[str]) -> tuple[Vector, str]:
+def signals_of(case: Case) -> list[str]:
+    """What is compared."""
+    return [signal for column in case.columns for signal in column.signals]
+
+
+def reference(case: Case) -> tuple[Vector, str]:
     """Signals on the raster, and how they were found."""
-    begin = time.process_time()
+    if case.packed is not None:
+        values, text = reference(replace(case.packed, steps=case.steps))
+        return values, text.replace("its own", "the packed base's")
+    begin, signals = time.process_time(), signals_of(case)
     raster = case.raster
     times = raster * np.arange(round(case.duration / raster) + 1, dtype=np.float64)
     if not case.long:
@@ -255,16 +293,16 @@ def run(
 
 def table(name: str, case: Case, quick: bool = False) -> None:
     """Print the table of a case."""
-    signals = [signal for column in case.columns for signal in column.signals]
-    exact, how = reference(case, signals)
+    signals = signals_of(case)
+    exact, how = reference(case)
     print(f"\n{name}, {case.duration:g} s, against {how}")
     head = "".join(f"{column.title:>16s}" for column in case.columns)
     print(f"  {'algorithm':<28s}{'step':>8s}{head}{'order':>7s}{'energy':>10s}{'x real':>8s}")
     losses = [f"{n}.P_loss" for n, m in case.system.members.items()
               if "P_loss" in m.description.variables]  # fmt: skip
-    for algorithm, options in ALGORITHMS:
-        if algorithm == "iterated" and (quick or case.long):  # runs in Python: minutes
-            continue
+    for algorithm, options in ALGORITHMS if case.packed is None else PARTS_ALGORITHMS:
+        if algorithm == "iterated" and (quick or (case.long and case.packed is None)):
+            continue  # runs in Python: minutes
         last: tuple[float, Vector] | None = None
         for step in case.steps:
             label = algorithm + "".join(f" {k} {v}" for k, v in options.items())
@@ -302,7 +340,8 @@ def main() -> None:
     parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
     arguments = parser.parse_args()
     for name in arguments.cases or ("motor_bench", *RUNS):
-        case = motor_bench() if name == "motor_bench" else of_scenario(name)
+        case = motor_bench() if name == "motor_bench" else None
+        case = case or (in_parts if name.startswith("mir250_parts") else of_scenario)(name)
         if arguments.steps:
             case = replace(case, steps=tuple(arguments.steps))
         if arguments.whole:

@@ -23,6 +23,8 @@ FIDELITIES = [
     "mobile_base/six_dof[wheel_contact=brush]",
     "mobile_base.lab/sprung[wheel_contact=creep,caster=creep]",
     "mobile_base/sprung",
+    "base_body/planar",
+    "base_body.lab/planar",
 ]
 ON_WHEELS = [
     "bearing_drag",
@@ -42,6 +44,8 @@ EFFECTS = [
     *(f"caster/creep+{name}@swivel" for name in ("coulomb", "stribeck", "bristle")),
     *(f"mobile_base/planar+{name}" for name in (*ON_BODIES, "load_shift", "wheel_runout")),
     *(f"mobile_base/six_dof+{name}" for name in (*ON_BODIES, "load_shift", "wheel_runout")),
+    "base_body/planar+payload",
+    "base_body/planar+load_shift+cable_force",
     "mobile_base/sprung+payload",
     "mobile_base/sprung+floor_slope",
     "mobile_base/planar+pivot_torque@caster.floor+pivot_torque@drive_wheel.floor",
