@@ -111,7 +111,6 @@ ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 PARTS_ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("gauss_seidel", {}),
-    ("jacobi", {"extrapolation": 1}),
     ("gauss_seidel", {"extrapolation": 1}),
     ("gauss_seidel", {"extrapolation": 2}),
     ("iterated", {"interpolation": 1, "tolerance": 1e-5}),

@@ -8,9 +8,8 @@ outputs:
     y(-h) = 3 y(0) - 3 y(h) + y(2 h),   y(-2 h) = 6 y(0) - 8 y(h) + 3 y(2 h)
     y(-3 h) = 10 y(0) - 15 y(h) + 6 y(2 h)
 
-The second trial begins with the past from the first. Algorithms that repeat steps need no past. Runs
-of a single step, and systems with an FMU that cannot return to a saved state, start with held
-inputs.
+The second trial begins with the past from the first. Runs of a single step, and systems with an FMU
+that cannot return to a saved state, start with held inputs; algorithms that repeat steps need none.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ class Mount:
 
 
 def _mount(name: str, text: str, caster: bool) -> Mount:
-    def of(short: str, unit: str, meaning: str, **more: int) -> Quantity:
-        return Quantity(f"{name}_{short}", unit, f"{text}: {meaning}", **more)
+    def of(short: str, unit: str, meaning: str, size: int = 0) -> Quantity:
+        return Quantity(f"{name}_{short}", unit, f"{text}: {meaning}", size=size)
 
     f_x = of("f_x", "N", "force on the body, body x axis")
     f_y = of("f_y", "N", "force on the body, body y axis")

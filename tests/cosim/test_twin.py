@@ -34,6 +34,7 @@ ALGORITHMS = [
     ("jacobi", {}, "python"),
     ("gauss_seidel", {}, "c"),
     ("iterated", {}, "auto"),
+    ("iterated", {"interpolation": 1}, "auto"),
 ]
 
 

@@ -60,6 +60,7 @@ def reference() -> np.ndarray:
         ("gauss_seidel", {"extrapolation": 1}, 2.0),
         ("gauss_seidel", {"extrapolation": 2}, 2.0),
         ("iterated", {}, 2.0),
+        ("iterated", {"interpolation": 1}, 2.0),
     ],
 )
 def test_order_of_the_motor_bench(provider, reference, algorithm, options, order) -> None:
@@ -81,9 +82,12 @@ def test_extrapolation_is_the_same_bits_in_both_executors(provider, algorithm, o
     assert runs[0].bond_energy == runs[1].bond_energy
 
 
-@pytest.mark.parametrize("algorithm", ["iterated", "adaptive"])
-def test_repeated_steps_are_the_same_bits_in_both_executors(provider, algorithm) -> None:
-    runs = [run(provider, algorithm, 1e-3, executor) for executor in ("python", "c")]
+@pytest.mark.parametrize(
+    ("algorithm", "options"),
+    [("iterated", {}), ("iterated", {"interpolation": 1}), ("adaptive", {})],
+)
+def test_repeated_steps_are_the_same_bits_in_both_executors(provider, algorithm, options) -> None:
+    runs = [run(provider, algorithm, 1e-3, executor, **options) for executor in ("python", "c")]
     np.testing.assert_array_equal(runs[0].values, runs[1].values)
     assert runs[0].bond_energy == runs[1].bond_energy
     steps = [recording.provenance["fmu_steps"] for recording in runs]
@@ -133,6 +137,9 @@ def test_newton_goes_on_where_repetition_diverges(provider) -> None:
     found = Master(stiff(provider), "iterated", 1e-3).run(0.02, record=["load.w"])["load.w"]
     # trapezoidal rule of w' = -10 000 w: factor (1 - 5) / (1 + 5) per step; solved to 1e-8
     np.testing.assert_allclose(found, (-2.0 / 3.0) ** np.arange(21), atol=1e-7)
+    # inputs that move in a line: the same mean
+    line = Master(stiff(provider), "iterated", 1e-3, options={"interpolation": 1})
+    np.testing.assert_allclose(line.run(0.02, record=["load.w"])["load.w"], found, atol=1e-7)
     # the explicit exchange multiplies by 1 - 10 per step
     plain = Master(stiff(provider), "jacobi", 1e-3).run(0.02, record=["load.w"])["load.w"]
     assert np.abs(plain[-1]) > 1e6
@@ -155,6 +162,7 @@ def test_wrong_options_are_refused(provider) -> None:
         ("jacobi", {"substeps": {"motr": 2}}, UnknownNameError, "did you mean 'motor'"),
         ("jacobi", {"substeps": {"motor": 0}}, ValueRangeError, "not a number from 1"),
         ("iterated", {"tolerance": 0.0}, ValueRangeError, "must be a positive number"),
+        ("iterated", {"interpolation": 2}, ValueRangeError, "of order 2: must be 0 or 1"),
     ]:
         with pytest.raises(error, match=message):
             run(provider, algorithm, 1e-3, **options)
@@ -196,8 +204,9 @@ def test_step_control_gives_up_with_the_recording(provider, monkeypatch) -> None
 def test_iterated_runs_repeat_bit_for_bit(provider) -> None:
     from cosim.master.session import Session
 
-    for algorithm in ("iterated", "adaptive"):
-        master = Master(drive(provider), algorithm, 1e-3)
+    line = {"interpolation": 1}
+    for algorithm, options in (("iterated", {}), ("iterated", line), ("adaptive", {})):
+        master = Master(drive(provider), algorithm, 1e-3, options=options)
         fresh = master.run(0.02, inputs=INPUTS, record=SIGNALS).values
         with Session(master, 0.02, inputs=INPUTS, record=SIGNALS) as session:
             for _ in range(2):

@@ -115,13 +115,19 @@ def test_claimed_states_that_fail_are_told(tmp_path: Path, provider) -> None:
 
 
 @pytest.mark.parametrize("executor", ["python", "c"])
-def test_refused_derivatives_are_told(tmp_path: Path, provider, executor: str) -> None:
-    path = build_faulty(tmp_path, canInterpolateInputs="true", canGetAndSetFMUstate="false")
+@pytest.mark.parametrize(
+    ("algorithm", "options"),
+    [("jacobi", {"extrapolation": 1}), ("iterated", {"interpolation": 1})],
+)
+def test_refused_derivatives_are_told(
+    tmp_path: Path, provider, executor: str, algorithm: str, options: dict[str, int]
+) -> None:
+    path = build_faulty(tmp_path, keeps=True, canInterpolateInputs="true")
     system = System("pair", provider)
     system.add("first", str(path))
     system.add("second", str(path))
     system.connect("first.y", "second.u")
-    master = Master(system, "jacobi", 0.1, options={"extrapolation": 1}, executor=executor)
+    master = Master(system, algorithm, 0.1, options=options, executor=executor)
     text = r"second \(faulty\): setting derivatives of u .*failed with status 'error'"
     with pytest.raises(StepError, match=text):
         master.run(1.0)

@@ -110,6 +110,8 @@ class Programs:
         instance.time = time + size if op is Op.GET else time
         if op is Op.STEP:
             return instance.failed_step(size, status, kernel.reached())
+        if op is Op.SET_DERIVATIVES:
+            return instance.failed_derivatives(part, status)
         if status == UNFIT:
             return run.inputs[run.instances.index(instance)].unfit(part)
         return instance.failed_access(op is Op.GET, part, status)
