@@ -51,18 +51,22 @@ def caster(number: int, name: str, x: str, y: str) -> list[dict[str, Any]]:
     ]
 
 
-BODY_SHAPES = [
-    box(0.8, 0.58, 0.2, (0, 0, f"0.20-{RADIUS}"), BODY, 0.55),
-    box(0.802, 0.582, 0.03, (0, 0, f"0.16-{RADIUS}"), ACCENT),
-    box(0.05, 0.3, 0.02, (0.38, 0, f"0.31-{RADIUS}"), ACCENT),
-    box(0.46, 0.42, "mount_z-0.30", (0, 0, f"0.5*(mount_z+0.30)-{RADIUS}"), "#c9d2dc", 0.8),
-    cylinder(0.09, 0.02, "z", ("mount_x", "mount_y", f"mount_z-{RADIUS}"), DARK),
-]
+def body_shapes(radius: str) -> list[dict[str, Any]]:
+    """Body, cabinet and mount about O, which is `radius` above the floor."""
+    return [
+        box(0.8, 0.58, 0.2, (0, 0, f"0.20-{radius}"), BODY, 0.55),
+        box(0.802, 0.582, 0.03, (0, 0, f"0.16-{radius}"), ACCENT),
+        box(0.05, 0.3, 0.02, (0.38, 0, f"0.31-{radius}"), ACCENT),
+        box(0.46, 0.42, "mount_z-0.30", (0, 0, f"0.5*(mount_z+0.30)-{radius}"), "#c9d2dc", 0.8),
+        cylinder(0.09, 0.02, "z", ("mount_x", "mount_y", f"mount_z-{radius}"), DARK),
+    ]
+
+
 SCENE = [
     node(
         "body",
         [move("x", "y", "z"), turn("z", "phi"), turn("y", "pitch"), turn("x", "roll")],
-        BODY_SHAPES,
+        body_shapes(RADIUS),
         trail=True,
     ),
     *(item for number, one in enumerate(DRIVES, 1) for item in drive(number, *one)),
