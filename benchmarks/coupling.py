@@ -293,44 +293,73 @@ def run(
 
 def table(name: str, case: Case, quick: bool = False) -> None:
     """Print the table of a case."""
-    signals = signals_of(case)
     exact, how = reference(case)
     print(f"\n{name}, {case.duration:g} s, against {how}")
+    algorithms = ALGORITHMS if case.packed is None else PARTS_ALGORITHMS
+    width = max(28, *(len(_called(*item)) for item in algorithms))
     head = "".join(f"{column.title:>16s}" for column in case.columns)
-    print(f"  {'algorithm':<28s}{'step':>8s}{head}{'order':>7s}{'energy':>10s}{'x real':>8s}")
-    losses = [f"{n}.P_loss" for n, m in case.system.members.items()
-              if "P_loss" in m.description.variables]  # fmt: skip
-    for algorithm, options in ALGORITHMS if case.packed is None else PARTS_ALGORITHMS:
+    print(f"  {'algorithm':<{width}s}{'step':>8s}{head}{'order':>7s}{'energy':>10s}{'x real':>8s}")
+    if case.packed is not None:
+        print("  the packed base:")
+        packed = replace(case.packed, duration=case.duration, steps=case.steps)
+        _line(packed, exact, "gauss_seidel", {"extrapolation": 2}, 1e-3, width, None)
+        print("  in parts:")
+    for algorithm, options in algorithms:
         if algorithm == "iterated" and (quick or (case.long and case.packed is None)):
-            continue  # runs in Python: minutes
+            continue  # decides in Python: minutes
         last: tuple[float, Vector] | None = None
         # what is repeated costs most where it is needed least
         steps = case.steps[:3] if case.packed and algorithm == "iterated" else case.steps
         for step in steps:
-            label = algorithm + "".join(f" {k} {v}" for k, v in options.items())
-            own = case.usual == (algorithm, options, step)
-            label = ("> " if own else "  ") + f"{label:<28s}{step * 1e3:>6g}ms"
-            try:
-                found, cost = run(case, algorithm, options, step, [*signals, *losses])
-            except CosimError as error:
-                print(f"{label}  {str(error).splitlines()[0][:90]}")
-                last = None
-                continue
-            apart = errors(case, signals, found.values[:, : len(signals)], exact)
-            lost = float(np.sum(np.trapezoid(found.values[:, len(signals) :], found.time, axis=0)))
-            energy = sum(found.bond_energy.values()) / lost if lost else np.nan
-            order = "-"
-            if last is not None:
-                slope = np.log(last[1] / apart) / np.log(last[0] / step)
-                order = f"{float(np.mean(slope)):.1f}"
-            columns = "".join(
-                f"{e:>15.2e}{'*' if e < column.allowed else ' '}"
-                for e, column in zip(apart, case.columns, strict=True)
-            )
-            speed = case.duration / cost
-            print(f"{label}{columns}{order:>7s}{energy:>10.1e}{speed:>8.0f}", flush=True)
-            last = (step, apart)
+            last = _line(case, exact, algorithm, options, step, width, last)
     print("* below one tenth of the sensor's noise")
+
+
+def _called(algorithm: str, options: Mapping[str, Any]) -> str:
+    return algorithm + "".join(f" {k} {v:g}" for k, v in options.items())
+
+
+def _line(
+    case: Case,
+    exact: Vector,
+    algorithm: str,
+    options: Mapping[str, Any],
+    step: float,
+    width: int,
+    last: tuple[float, Vector] | None,
+) -> tuple[float, Vector] | None:
+    """Print the line of an algorithm and step; the step and its errors, None if it did not run.
+
+    Args:
+        case, exact: what is run, and what it is compared with.
+        algorithm, options, step: of the run.
+        width: of the algorithm's column.
+        last: step and errors of the line before, for the order.
+    """
+    signals = signals_of(case)
+    losses = [f"{n}.P_loss" for n, m in case.system.members.items()
+              if "P_loss" in m.description.variables]  # fmt: skip
+    own = case.usual == (algorithm, options, step)
+    label = f"{'>' if own else ' '} {_called(algorithm, options):<{width}s}{step * 1e3:>6g}ms"
+    try:
+        found, cost = run(case, algorithm, options, step, [*signals, *losses])
+    except CosimError as error:
+        print(f"{label}  {str(error).splitlines()[0][:90]}")
+        return None
+    apart = errors(case, signals, found.values[:, : len(signals)], exact)
+    lost = float(np.sum(np.trapezoid(found.values[:, len(signals) :], found.time, axis=0)))
+    energy = sum(found.bond_energy.values()) / lost if lost else np.nan
+    order = "-"
+    if last is not None:
+        slope = np.log(last[1] / apart) / np.log(last[0] / step)
+        order = f"{float(np.mean(slope)):.1f}"
+    columns = "".join(
+        f"{e:>15.2e}{'*' if e < column.allowed else ' '}"
+        for e, column in zip(apart, case.columns, strict=True)
+    )
+    speed = case.duration / cost
+    print(f"{label}{columns}{order:>7s}{energy:>10.1e}{speed:>8.0f}", flush=True)
+    return step, apart
 
 
 def main() -> None:
