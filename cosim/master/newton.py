@@ -79,11 +79,10 @@ class Newton:
 
     def newton_step(self, rest: list[float], z: list[float]) -> tuple[float, list[float]]:
         """The change of z and its relative size."""
-        total = np.zeros(self.n)
         with np.errstate(all="ignore"):
-            # column by column: each sum is made in the order of its row, as in compiled code
-            for column, item in zip(self.inverse.T.copy(), rest, strict=True):
-                total += column * item
+            # each sum is made in the order of its row and begins with 0, as in compiled code
+            sums = np.add.accumulate(self.inverse * np.array(rest), axis=1)
+            total = sums[:, -1] + 0.0 if self.n else np.zeros(0)
             relatives = np.abs(total) / np.fmax(1.0, np.abs(z))
         size = 0.0
         for relative in relatives.tolist():
