@@ -113,7 +113,7 @@ PARTS_ALGORITHMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("gauss_seidel", {}),
     ("gauss_seidel", {"extrapolation": 1}),
     ("gauss_seidel", {"extrapolation": 2}),
-    ("iterated", {"interpolation": 1, "tolerance": 1e-5}),
+    ("iterated", {"interpolation": 1, "tolerance": 1e-4}),
 )
 RUNS = tuple(
     ["ur5_bench/UR5e"]
