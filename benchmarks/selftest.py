@@ -202,10 +202,10 @@ def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[
         if number < arguments.done:
             continue
         seed = 1000 * arguments.seed + number
-        one = made(rig, item, factor, seed)
+        one = made(rig, item, factor, seed, wide=arguments.wide)
         while extreme(one):
             factor *= 0.1
-            one = made(rig, item, factor, seed)
+            one = made(rig, item, factor, seed, wide=arguments.wide)
         effect = "none" if item is None else item.effect
         size = shown(one.problem, one.parameters, one.change)
         result = diagnose(one.problem, workers=arguments.workers)
