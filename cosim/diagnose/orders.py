@@ -61,7 +61,7 @@ def spectrum(
         [_power(np.interp(time - lag, time, angle), residual) for lag in LAGS]
         for time, angle, residual in zip(times, angles, residuals, strict=True)
     ]
-    return np.max(np.array(lags), axis=1)
+    return np.asarray(np.max(np.array(lags), axis=1))
 
 
 def _power(angle: Vector, residual: Vector) -> Vector:

@@ -134,7 +134,7 @@ class Search(LateFitter):
         if raw.late and typical(r for _, r in first.residuals) > OFF:
             raw = self.count_in_full()
         self.evaluations += first.evaluations
-        if self.whole:
+        if self.known:
             shafts = geared(first.simulator, first.theta, _changes(self.known, self.declared))
             raw = self.taken(raw.changed(shafts=shafts))
             whole = first.problem.changed(shafts=shafts)
