@@ -51,6 +51,7 @@ def geared(
     stated = _stated(problem)
     runs = [run for run in problem.chosen("identification") if set(stated) & set(run.starts)]
     found: dict[str, tuple[str, float]] = {}
+    asked: set[str] = set()
     if not runs:
         return found
     for change in changes:
@@ -59,7 +60,8 @@ def geared(
         except UnbuiltError:
             continue  # the round that asks for these effects says so
         own = {shaft(name): name for name in angles(problem, changed)}
-        wanted = {place: name for place, name in own.items() if place not in found}
+        wanted = {place: name for place, name in own.items() if place not in asked}
+        asked |= set(wanted)
         if not wanted:
             continue
         point = changed.nominal
@@ -92,13 +94,15 @@ def angles(before: Problem, after: Problem) -> Iterator[str]:
 
 def _stated(problem: Problem) -> list[str]:
     """Angles of which runs say where they begin."""
-    names = dict.fromkeys(name for run in problem.runs for name in run.starts)
-    found = []
-    for name in names:
-        _, variables = problem.plain().variables(name)
-        if all(variable.symbol == ANGLE for variable in variables):
-            found.append(name)
-    return found
+    known = {
+        f"{name}.{element}"
+        for name, member in problem.plain().members.items()
+        for variable in member.description.variables.values()
+        if variable.symbol == ANGLE
+        for element in variable.elements()
+    }
+    # runs may state what only an effect has, such as for how long a drive has been on
+    return [n for n in dict.fromkeys(n for run in problem.runs for n in run.starts) if n in known]
 
 
 def _gear(name: str, angle: list[Vector], other: list[Vector]) -> Gear:
