@@ -20,6 +20,8 @@ from cosim.diagnose.candidates import Candidate, candidates, new_parameters
 Vector = NDArray[np.float64]
 INSIDE = 0.2
 """Share of a parameter's range, on both sides, from which no truth is drawn."""
+CYCLES = 200.0
+"""Most cycles per turn that are drawn: slots, teeth and poles times two rarely are more."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,9 @@ def individual(problem: Problem, random: np.random.Generator) -> Vector:
     return theta
 
 
-def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int) -> Made:
+def made(
+    problem: Problem, candidate: Candidate | None, factor: float, seed: int, *, wide: bool = False
+) -> Made:
     """Simulate one individual of a rig.
 
     Args:
@@ -69,6 +73,8 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         candidate: undeclared effect, None for none.
         factor: its size over a typical one.
         seed: of parameters and noise.
+        wide: the effect's time constants and whole numbers of cycles are log-uniform over their
+            range, not at their usual value.
     """
     random = np.random.default_rng(seed)
     theta = individual(problem, random)
@@ -86,6 +92,11 @@ def made(problem: Problem, candidate: Candidate | None, factor: float, seed: int
         for p in real.parameters:
             if p.hints.mix == "turn":
                 point[real.index(p.name)] = random.uniform(-np.pi, np.pi)
+            elif wide and p.hints.decades:
+                point[real.index(p.name)] = np.exp(random.uniform(*np.log(p.hints.decades)))
+            elif wide and p.hints.cycles:
+                most = min(CYCLES, p.maximum)
+                point[real.index(p.name)] = round(np.exp(random.uniform(0.0, np.log(most))))
         other = simulator.of(real)
         values = {run.name: other.simulate(point, run) for run in real.runs}
         other.close()

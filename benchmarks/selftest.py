@@ -3,6 +3,7 @@
     python -m benchmarks.selftest --repeats 3 --out out/selftest
     python -m benchmarks.selftest --wide --repeats 4 --out out/wide
     python -m benchmarks.selftest --pairs 20 --repeats 0 --clean 0 --out out/pairs
+    python -m benchmarks.selftest --wide --withheld --clean 0 --out out/withheld
     python -m benchmarks.selftest --example DATASET --out out/mirror
 
 Every effect is put into rigs with other parameters and sizes; some of the data sets have none.
@@ -10,7 +11,10 @@ Prints the confusion matrix, false alarms and the coverage of the 95 % intervals
 a table. An effect is hidden if what calibration cannot absorb of it stays below the least size that
 the diagnosis names; being quiet about it is right. With `--example` the data come from our own
 FMUs, for any rig that has a mapping. Of two effects in one bench, all that the data show must be
-named, and nothing else.
+named, and nothing else. With `--withheld` the catalogue lacks what the data have: another name is
+wrong, unless its law leaves the noise in runs that were not used.
+
+Each set's row is kept in `--out` as soon as it is there; the same command goes on after them.
 """
 
 from __future__ import annotations
@@ -38,6 +42,7 @@ from cosim.diagnose import diagnose
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import Diagnosis
 from cosim.diagnose.linear import MATERIAL, Absorber, SampleStack
+from cosim.files import atomic
 
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
@@ -134,8 +139,11 @@ def judged(
             low, high = last["ci95"]
             covered[name] = bool(low <= truth[name] <= high)
             away[name] = round((last["value"] - truth[name]) / max(0.5 * (high - low), 1e-300), 3)
+    left = [channel["after"].get("validation") for channel in table["channels"].values()]
+    over = [c["noise_rms"] for c in table["channels"].values()]
     return {
         "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
+        "left": round(max(a / b for a, b in zip(left, over, strict=True) if a is not None), 3),
         "right": bool(named) and bool(set(names) & {named[0], *same}),
         "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
         "half_intervals_off": away,
@@ -164,11 +172,17 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
     places = write_sets(folder, chosen, SHEET, arguments.seed, arguments.seconds)
     alone = [part for bench in chosen for part in parts(bench)]
     effects = iter(changes(alone, arguments.seed, arguments.seconds))
-    for bench, place in zip(chosen, places, strict=True):
-        problem = read_problem(place)
+    for number, (bench, place) in enumerate(zip(chosen, places, strict=True)):
         both = [next(effects), next(effects)]
+        if number < arguments.done:
+            continue
+        problem = read_problem(place)
         size = shown(problem, bench.parameters, both[0])
-        result = diagnose(problem, workers=arguments.workers)
+        without: set[str] = set()
+        if arguments.withheld:
+            known = {candidate.effect for candidate in catalogue(problem)}
+            without = known & {n for p in parts(bench) for n in EFFECTS[p.effect][1]}
+        result = diagnose(problem, workers=arguments.workers, without=without)
         row = judged(result, bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters)
         row["shape"] = bench.shape
         if bench.second != "none":
@@ -185,11 +199,13 @@ def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[
     for repeat in range(arguments.repeats):
         jobs += [(item, (1.0, 2.0, 0.5)[repeat % 3]) for item in catalogue(rig)]
     for number, (item, factor) in enumerate(jobs):
+        if number < arguments.done:
+            continue
         seed = 1000 * arguments.seed + number
-        one = made(rig, item, factor, seed)
+        one = made(rig, item, factor, seed, wide=arguments.wide)
         while extreme(one):
             factor *= 0.1
-            one = made(rig, item, factor, seed)
+            one = made(rig, item, factor, seed, wide=arguments.wide)
         effect = "none" if item is None else item.effect
         size = shown(one.problem, one.parameters, one.change)
         result = diagnose(one.problem, workers=arguments.workers)
@@ -251,13 +267,18 @@ def main() -> None:
     parser.add_argument(
         "--wide", action="store_true", help="shapes of laws over their whole range, ripples too"
     )
+    parser.add_argument(
+        "--withheld", action="store_true", help="without the laws that the data have"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/selftest"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    rows = []
+    kept = arguments.out / "selftest.json"
+    rows = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
+    arguments.done = len(rows)
     with tempfile.TemporaryDirectory() as folder:
         if arguments.example is None:
             found = independent(arguments, Path(folder))
@@ -266,9 +287,8 @@ def main() -> None:
         for row in found:
             rows.append(row)
             print(json.dumps(row), file=sys.stderr, flush=True)
-            (arguments.out / "selftest.json").write_text(
-                json.dumps(rows, indent=1), encoding="utf-8"
-            )
+            with atomic(kept) as place:
+                place.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     table = summary(rows)
     (arguments.out / "selftest.md").write_text(table, encoding="utf-8")
     print(table)

@@ -133,6 +133,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
     values, vectors = np.linalg.eigh(normal.matrix)
+    values = np.maximum(values, 0.0)  # beside 1e17 of the best known one, rounding is below -12
     turned = vectors
     if confirm:
         seen, turned = confirmed(run, values, vectors)

@@ -49,6 +49,7 @@ class Problem:
         far: whether all residuals count in full, since nearly all are large (see `unstable`).
         further: give runs of the data set that need another system; read when they are asked for.
         source: where the data come from, for their checks.
+        shafts: angle of an effect (see `shaft`) -> what it is in proportion with, and the ratio.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Problem:
     far: bool = False
     further: Sequence[Callable[[], Problem]] = ()
     source: Source = NO_SOURCE
+    shafts: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("parameters", "channels", "runs", "relative", "late", "further"):
@@ -321,4 +323,29 @@ class Problem:
                             hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                         )
                     )  # fmt: skip
-        return changed.changed(parameters=[*self.parameters, *added])
+        return changed.changed(
+            parameters=[*self.parameters, *added], runs=[changed.standing(run) for run in self.runs]
+        )
+
+    def standing(self, run: MeasuredRun) -> MeasuredRun:
+        """The run with where the shafts of effects stand when it begins, as `shafts` says."""
+        if not self.shafts:
+            return run
+        starts = dict(run.starts)
+        for name, member in self.plain().members.items():
+            for variable in member.description.variables.values():
+                if f"der({variable.name})" not in member.description.variables:
+                    continue
+                for element in variable.elements():
+                    other, ratio = self.shafts.get(shaft(f"{name}.{element}"), ("", 0.0))
+                    if other in run.starts:
+                        starts[f"{name}.{element}"] = ratio * run.starts[other]
+        return run if len(starts) == len(run.starts) else replace(run, starts=starts)
+
+
+def shaft(name: str) -> str:
+    """What an effect's angle is called apart from the effect: `load.flange.cogging.theta` is
+    `load.flange.theta`, for all effects there integrate one shaft's speed.
+    """
+    place, _, leaf = name.rpartition(".")
+    return f"{place.rpartition('.')[0]}.{leaf}"

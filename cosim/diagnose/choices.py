@@ -28,7 +28,11 @@ one: 0.96 at f = sqrt(APART), the worst between two tries, which hides 8 % of wh
 
 
 def choices(
-    probe: Probe, simulator: Simulator, theta: Vector, stack: SampleStack, residual: Vector
+    probe: Probe,
+    simulator: Simulator,
+    theta: Vector,
+    stack: SampleStack,
+    seen: tuple[SampleStack, Vector],
 ) -> list[dict[str, float]]:
     """Values of a candidate's parameters to try, by name.
 
@@ -37,13 +41,14 @@ def choices(
         simulator: of the system without it.
         theta: its parameters.
         stack: of the runs that are looked at.
-        residual: over the noise, what calibration absorbs taken away.
+        seen: runs whose residual over the noise tells how often something repeats; the more, the
+            better, since an order shows where its shaft turns slowly enough.
     """
     found = []
     for p in probe.others:
         found += [{p.name: value} for value in (*p.hints.tries, *sizes(p))]
         if p.hints.cycles:
-            found += [{p.name: n} for n in _orders(probe, p, simulator, theta, stack, residual)]
+            found += [{p.name: n} for n in _orders(probe, p, simulator, theta, *seen)]
     visits = [(p.name, p.hints.visits) for p in probe.others if p.hints.visits]
     if visits:
         names, variables = zip(*visits, strict=True)

@@ -39,7 +39,7 @@ from .search import ROUNDS, Search
 from .table import candidates_of, table_of
 from .together import together
 from .unstable import ends
-from .verdict import above, decide, proposal
+from .verdict import above, decide, proposal, unasked
 from .whiteness import WhitenessTest, whiteness_tests
 
 TURNS = 4
@@ -224,6 +224,15 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
                 simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)
+        fewer = [] if place is None else unasked(result.table, place)
+        for labels in [result.table.models[i].labels for i in fewer]:
+            known = search.memo.get(labels)
+            assert known is not None
+            search.say(f"do fewer laws do as well? {', '.join(sorted(labels))}")
+            search.examined(known, candidates_of(rounds))
+        if fewer:
+            result.table = table_of(search, rounds, forces, ended)
+            place = proposal(result.table)
         if place is None:
             break
         best = result.table.models[place]

@@ -105,7 +105,7 @@ class Responses:
         found: list[Direction] = []
         theta = self.followed.theta
         try:
-            offered = choices(probe, self.simulator, theta, self.stack, self.wanted)
+            offered = choices(probe, self.simulator, theta, self.stack, (self.stack, self.wanted))
         except UnbuiltError:
             raise
         except CosimError:

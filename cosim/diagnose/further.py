@@ -109,8 +109,10 @@ def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:
     for p, value in zip(fitted.problem.parameters, fitted.estimate.theta.tolist(), strict=True):
         if not p.run:
             values |= p.set(value)
-    return problem.changed(
+    changed = problem.changed(
         model=model,
         constants={**problem.constants, **values},
         parameters=[p for p in problem.parameters if p.run],
+        shafts=fitted.problem.shafts,
     )
+    return changed.changed(runs=[changed.standing(run) for run in changed.runs])

@@ -114,9 +114,12 @@ class Judge:
 
     def count_in_full(self, full: bool = True) -> Problem:
         """Let residuals count in full though runs may turn unstable, or not again."""
-        self.raw = self.raw.changed(far=full)
-        self.fitting.problem = self.checking.problem = self.raw
-        return self.raw
+        return self.taken(self.raw.changed(far=full))
+
+    def taken(self, raw: Problem) -> Problem:
+        """Let models be judged as this problem says from now on."""
+        self.raw = self.fitting.problem = self.checking.problem = raw
+        return raw
 
     def recounted(self, fitted: Fitted, base: Fitted | None = None) -> Fitted:
         """A fitted model whose residuals count as they do now.

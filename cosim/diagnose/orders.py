@@ -2,13 +2,17 @@
 
 A force that repeats n times per turn goes through the system to every channel at n times the
 shaft's speed, however it is weakened and delayed on its way. Over stretches of a few turns, on
-which the speed hardly changes, with a window w against leakage,
+which the speed hardly changes, with a window w against leakage, a parabola over time taken away
+from residual r and wave exp(-i n theta(t - d)) alike, and R_n what a wave leaves,
 
-    P(n) = max over lags d of sum over stretches and channels of
-           |sum_k w_k r_k exp(-i n theta(t_k - d))|^2 / sum_k w_k^2
+    g = M/2 ln(|w r|^2 / |w R_n|^2),    P(n) = max over lags d of
+        sum over stretches and channels of  ln(1 + exp(g) / M)
 
-is large at the true n and, for noise of unit size, about the number of stretches elsewhere. No
-model of the system between the shaft and the channels is needed, and no list of usual orders.
+where g is what the wave gains in log likelihood beside noise of unknown size, for M independent
+samples. What a stretch holds besides does not count, be it ever so large, nor does a shaft at rest.
+A wave shows where speed and loops let it, so each stretch and channel may have it or not, at even
+odds; that it has one costs two parameters, ln M (Schwarz). No model of the system between the shaft
+and the channels is needed, and no list of usual orders.
 
 Source: order tracking, Fyfe and Munck, Mech. Syst. Signal Process. 11(2), 1997.
 """
@@ -30,6 +34,11 @@ TURNS = 2.0
 changes, and with it how late the force arrives."""
 LEAST = 8
 """Samples in a stretch below which a window leaves nothing to tell orders apart."""
+SLOW = 2
+"""Degree of what is slow: drift and one bend of a stretch; an order has two periods or more."""
+GRAIN, MOST = 1e-3, 1.0 - 1e-9
+"""Share of a wave's square that must be left for it to count; share of a residual that it may
+explain, since logarithms end there."""
 LAGS = (0.0, 0.002, 0.004, 0.008, 0.016)
 """How late a force may arrive [s]. A lag that is wrong by d turns the phase by n d times the change
 of speed within a stretch, which hides an order once that is a turn; loops of drives and links take
@@ -41,41 +50,82 @@ CHUNK = 4096
 def spectrum(
     times: Sequence[Vector], angles: Sequence[Vector], residuals: Sequence[Vector]
 ) -> Vector:
-    """Power P(n) of the orders 1 to `HIGHEST`.
+    """P(n) of the orders 1 to `HIGHEST`, one row per run.
 
     Args:
         times: of the samples of each run [s].
         angles: of the shaft there [rad].
         residuals: (samples, channels) of each run over the noise, NaN in gaps.
     """
-    power = np.zeros((len(LAGS), HIGHEST))
-    for time, angle, residual in zip(times, angles, residuals, strict=True):
-        for index, lag in enumerate(LAGS):
-            power[index] += _power(np.interp(time - lag, time, angle), residual)
-    return np.asarray(power.max(axis=0))
+    lags = [
+        [_power(np.interp(time - lag, time, angle), residual) for lag in LAGS]
+        for time, angle, residual in zip(times, angles, residuals, strict=True)
+    ]
+    return np.asarray(np.max(np.array(lags), axis=1))
 
 
 def _power(angle: Vector, residual: Vector) -> Vector:
     """P(n) of one run without a lag."""
-    power, orders = np.zeros(HIGHEST), -1j * np.arange(1.0, HIGHEST + 1.0)
+    power = np.zeros(HIGHEST)
     turns = np.cumsum(np.abs(np.diff(angle, prepend=angle[:1]))) / (2.0 * np.pi)
     first = np.flatnonzero(np.diff(np.floor(turns / TURNS), prepend=-1.0))
     for begin, end in zip(first, [*first[1:], angle.size], strict=True):
-        if end - begin < LEAST:
-            continue
-        window = np.hanning(end - begin)
-        rows = np.nan_to_num(residual[begin:end]) * window[:, None]
-        wave = np.zeros((HIGHEST, rows.shape[1]), dtype=np.complex128)
-        for part in range(0, end - begin, CHUNK):
-            turned = np.outer(orders, angle[begin + part : min(begin + part + CHUNK, end)])
-            wave += np.exp(turned) @ rows[part : part + CHUNK]
-        power += np.sum(np.abs(wave) ** 2, axis=1) / float(window @ window)
+        if end - begin >= LEAST:
+            power += _gained(angle[begin:end], np.nan_to_num(residual[begin:end]))
     return power
 
 
+def _gained(angle: Vector, rows: Vector) -> Vector:
+    """P(n) of one stretch."""
+    window = np.hanning(angle.size)
+    time = np.linspace(-1.0, 1.0, angle.size)
+    slow, _ = np.linalg.qr(window[:, None] * time[:, None] ** np.arange(SLOW + 1))
+    own = window[:, None] * rows
+    own -= slow @ (slow.T @ own)
+    crossed = np.zeros((2, HIGHEST, rows.shape[1]))
+    absorbed = np.zeros((2, HIGHEST, SLOW + 1))
+    gram = np.zeros((3, HIGHEST))
+    for part in range(0, angle.size, CHUNK):
+        piece = slice(part, part + CHUNK)
+        turned = np.exp(1j * angle[piece])
+        wave = np.multiply.accumulate(np.broadcast_to(turned, (HIGHEST, turned.size)), axis=0)
+        both = np.stack([wave.real, wave.imag]) * window[piece]
+        crossed += both @ own[piece]
+        absorbed += both @ slow[piece]
+        gram += [np.sum(both[i] * both[j], axis=1) for i, j in ((0, 0), (1, 1), (0, 1))]
+    # what the parabola does not absorb of cosine and sine, and a grain against what is left of none
+    a, b, c = (
+        gram[k] - np.sum(absorbed[i] * absorbed[j], axis=1)
+        for k, (i, j) in enumerate(((0, 0), (1, 1), (0, 1)))
+    )
+    size = float(window @ window)
+    a, b = a + GRAIN * size, b + GRAIN * size
+    x, y = crossed
+    shares = (b[:, None] * x**2 - 2.0 * c[:, None] * x * y + a[:, None] * y**2) / (
+        (a * b - c**2)[:, None]
+    )
+    # noise has unit size: less than that is luck
+    whole = np.maximum(np.sum(own**2, axis=0), size)
+    count = size**2 / float(np.sum(window**4))
+    gain = -0.5 * count * np.log1p(-np.minimum(shares / whole, MOST))
+    return np.asarray(np.sum(np.logaddexp(0.0, gain - np.log(count)), axis=1))
+
+
 def peaks(power: Vector, most: int = PEAKS) -> list[float]:
-    """The orders at local maxima of the spectrum, the highest first; as many as there may be."""
-    padded = np.concatenate([[0.0], power, [0.0]])
-    local = (power >= padded[:-2]) & (power >= padded[2:])
-    ranked = np.argsort(np.where(local, -power, np.inf), kind="stable")
+    """The orders at local maxima, those that stand out most first; as many as there may be.
+
+    An order stands out of the spectrum of one run, or of all together, whichever is more: it may
+    show only in the run in which its shaft turns slowly enough.
+
+    Args:
+        power: P(n), one row per run.
+        most: orders to give.
+    """
+    rows = np.vstack([power, power.sum(axis=0)])
+    middle = np.median(rows, axis=1, keepdims=True)
+    spread = np.median(np.abs(rows - middle), axis=1, keepdims=True)
+    out = np.max(np.divide(rows - middle, spread, where=spread > 0.0, out=0.0 * rows), axis=0)
+    padded = np.concatenate([[-np.inf], out, [-np.inf]])
+    local = (out >= padded[:-2]) & (out >= padded[2:])
+    ranked = np.argsort(np.where(local, -out, np.inf), kind="stable")
     return [float(n + 1) for n in ranked[: min(most, int(local.sum()))]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from .models import GATE, Fitted, compare, is_open, more_general
 from .probes import batches
 from .rounds import Round
 from .secant import Bench, model_values
+from .shafts import geared
 from .shortlist import promising, remaining
 from .signature import Signature, merge, worthy
 from .whiteness import whiteness_tests
@@ -132,6 +134,11 @@ class Search(LateFitter):
         if raw.late and typical(r for _, r in first.residuals) > OFF:
             raw = self.count_in_full()
         self.evaluations += first.evaluations
+        if self.known:
+            shafts = geared(first.simulator, first.theta, _changes(self.known, self.declared))
+            raw = self.taken(raw.changed(shafts=shafts))
+            whole = first.problem.changed(shafts=shafts)
+            first = replace(first, simulator=self.simulator.of(whole))
         self.say(
             f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
         )
@@ -163,7 +170,8 @@ class Search(LateFitter):
         residual = stack.vector([rest[n] for n in stack.names])
         root = stack.root(residual)
         absorber = self.absorber(base, stack, root)
-        return Bench(simulator, base.estimate.theta, stack, model, residual, absorber, root)
+        seen = self.fitting, self.fit_data - base.fit
+        return Bench(simulator, base.estimate.theta, stack, model, residual, absorber, root, seen)
 
     def telling(self, base: Fitted) -> SampleStack:
         """The run with most of what the model lacks; all, if no channel exceeds its noise.

@@ -65,6 +65,7 @@ class Bench:
         residual: of theta.
         absorber: of the calibration, its rows multiplied by `root`.
         root: factors on the samples; those of stretches that are far off are small.
+        seen: residual over the noise of more runs than are simulated, see `choices`.
     """
 
     def __init__(
@@ -76,12 +77,14 @@ class Bench:
         residual: Vector,
         absorber: Absorber,
         root: Vector | None = None,
+        seen: tuple[SampleStack, Vector] | None = None,
     ) -> None:
         self.simulator, self.problem = simulator, simulator.problem
         self.theta, self.stack = theta, stack
         self.model, self.absorber = model, absorber
         self.root = np.ones_like(residual) if root is None else root
         self.residual = absorber.rest(self.root * residual)
+        self.seen = (stack, self.residual) if seen is None else seen
         self.evaluations = 0
         self._lock = threading.Lock()
 
@@ -228,7 +231,7 @@ class Bench:
         problem = trials[0].probe.problem
         strengths = {t.probe.candidate.label: t.best.value for t in trials if t.best is not None}
         offered = [
-            choices(t.probe, self.simulator, self.theta, self.stack, self.residual) for t in trials
+            choices(t.probe, self.simulator, self.theta, self.stack, self.seen) for t in trials
         ]
         for fixed_values in zip(*offered):  # noqa: B905 - no choice is worth more than another
             changes = []

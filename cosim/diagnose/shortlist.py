@@ -49,7 +49,9 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
     seen = able(judge, current)
     good = [s for s in seen if current.corrected[s.candidate.label] < LEVEL]
     if not good and judge.lacking(current.base):
-        good = [s for s in seen if s.score.z > GATE_Z]
+        # far off, deviations are those of what is missing: only fits tell the next ones apart
+        far = is_open(current.base.estimate)
+        good = [s for s in seen if far or s.score.z > GATE_Z]
     best = max((s.score.gain for s in good), default=0.0)
     single = balances(current.base.problem)
     alike: Counter[tuple[str, str, str]] = Counter()

@@ -86,6 +86,22 @@ def proposal(table: Table) -> int | None:
     return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
 
 
+def unasked(table: Table, best: int) -> list[int]:
+    """Sets with fewer laws that the data do not tell from a set, but for being asked law by law.
+
+    They would be the answer if each of their laws is missed without it.
+    """
+    return [
+        i
+        for i, model in enumerate(table.models)
+        if 1 < len(model.laws) < len(table.models[best].laws)
+        and not model.rough
+        and not _apart(table, best, i)
+        and all(law.there for law in model.laws)
+        and any(law.missed is None for law in model.laws)
+    ]
+
+
 def doubts(table: Table, model: Model) -> list[str]:
     """Why a set cannot be named whatever it leaves; nothing for one that can."""
     if not model.laws:
