@@ -12,7 +12,7 @@ import pytest
 
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.facts import Comparison, Force, Gain, Law, Left, Model, Table, Value
-from cosim.diagnose.verdict import above, decide, gate
+from cosim.diagnose.verdict import above, decide, gate, proposal, unasked
 
 COUNT = 4000
 """Measured values in identification runs, and in unused ones."""
@@ -410,3 +410,16 @@ def test_the_nearest_set_is_the_first_hint_without_laws_that_add_nothing() -> No
     found = decide(table(FAR, far, both, close))
     assert found.kind == "unexplained"
     assert [[x.effect for x in hint.laws] for hint in found.hints] == [["delay"], ["cogging"]]
+
+
+def test_fewer_laws_are_asked_where_the_data_do_not_tell_them_from_the_best() -> None:
+    late = [law("delay", place, gain=900.0) for place in ("motor.shaft", "gearbox.flange_a")]
+    friction = law("coulomb", "load.flange")
+    command = law("delay", "load.flange", gain=900.0)
+    three, two = model(*late, friction), model(command, friction)
+    open_ = replace(two, laws=tuple(replace(item, missed=None) for item in two.laws))
+    assert unasked(table(FAR, three, open_, alike=((1, 2),)), 1) == [2]
+    assert unasked(table(FAR, three, open_), 1) == []  # told apart
+    assert unasked(table(FAR, three, two, alike=((1, 2),)), 1) == []  # asked before
+    assert proposal(table(FAR, three, two, alike=((1, 2),))) == 2
+    assert unasked(table(FAR, open_, three, alike=((1, 2),)), 1) == []  # more laws
