@@ -1,4 +1,4 @@
-"""FMUs that an installed wheel carries: files of the catalogue, and packs of variants with effects.
+"""FMUs that an installed wheel carries, in packs.
 
 A pack is a .tar.xz of what some twenty FMUs contain, folder by folder; they share nearly all of it.
 An FMU is written into the cache when it is first asked for, byte for byte as it was built.
@@ -29,7 +29,7 @@ class Library:
     """Provider of the FMUs in a folder that `python -m sources.distribution` made.
 
     Args:
-        folder: with `catalogue.json`, `fmus` and `packs`.
+        folder: with `catalogue.json` and `packs`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -75,8 +75,7 @@ class Library:
     def has(self, variant: str) -> bool:
         """Whether the library has a variant's FMU for FMI 2, or knows that there is none."""
         stem = file_stem(str(parse_name(variant)))
-        file = self.folder / "fmus" / "fmi2" / f"{stem}.fmu"
-        return f"2/{stem}" in self._packed or stem in self._impossible or file.is_file()
+        return f"2/{stem}" in self._packed or stem in self._impossible
 
     def find(self, variant: str, fmi: int = 2) -> Path | None:
         """Path of a variant's FMU, None if the library has none.
@@ -88,9 +87,6 @@ class Library:
         stem = file_stem(str(parse_name(variant)))
         if stem in self._impossible:
             raise VariantError(f"{variant}: its effects do not fit")
-        path = self.folder / "fmus" / f"fmi{fmi}" / f"{stem}.fmu"
-        if path.is_file():
-            return path
         key = f"{fmi}/{stem}"
         if key not in self._packed:
             return None
@@ -120,7 +116,7 @@ class Library:
         return pack(files)
 
     def near(self, variant: str) -> list[str]:
-        """Packed variants with the same effect at a named balance."""
+        """Variants with the same effect at a named balance."""
         name = str(parse_name(variant))
         if not parse_name(name).effects or "@" in name:
             return []
@@ -168,7 +164,7 @@ class Library:
         return list(self.content.get("variants", []))
 
     def names(self) -> Iterator[str]:
-        """Of the variants that have a file of their own."""
+        """Of the variants without effects, and those with effects that scenarios ask for."""
         yield from self.content.get("names", ())
 
     def candidates(self, variant: str) -> list[tuple[str, str, str]] | None:

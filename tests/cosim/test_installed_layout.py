@@ -51,6 +51,13 @@ def test_a_wheel_serves_who_begins_with_a_template() -> None:
     assert sorted_out(asked) == (asked, [])
 
 
+def test_a_wheel_serves_the_diagnoses_whose_logs_it_brings() -> None:
+    """Sheets of rigs and templates; not public logs, nor logs that are made for estimation."""
+    served = {path.parent.name for path in contents.searched()}
+    assert {"motor_bench", "mobile_manipulator_bench", "omni_bench", "ur5_bench"} <= served
+    assert not {"emps", "ur10e", "neato_diffdrive", "mir250", "mobile_manipulator"} & served
+
+
 @pytest.fixture(scope="module")
 def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as a wheel without FMUs fills it."""
@@ -69,8 +76,7 @@ def site(bare: Path, made: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     folder = tmp_path_factory.mktemp("full") / "site"
     shutil.copytree(bare, folder)
     shutil.copytree(made / "kernel", folder / "cosim" / "master" / "kernel" / "lib")
-    for name in ("fmus", "packs"):
-        shutil.copytree(made / name, folder / "cosim_library" / name)
+    shutil.copytree(made / "packs", folder / "cosim_library" / "packs")
     shutil.copy(made / "catalogue.json", folder / "cosim_library")
     return folder
 
