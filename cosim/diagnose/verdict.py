@@ -193,9 +193,12 @@ def _explained(table: Table, model: Model, less: Model) -> float:
     return min(max(taken / excess, 0.0), 1.0) if excess > 0.0 else 0.0
 
 
-def _size_of(model: Model) -> tuple[int, int, int]:
-    """How simple a set is."""
-    return len(model.laws), sum(law.own for law in model.laws), model.free
+def _size_of(model: Model) -> tuple[int, int, int, int]:
+    """How simple a set is; of as many parameters the special case, which holds fewer of its own."""
+    laws = model.laws
+    return (
+        len(laws), sum(law.own for law in laws), model.free, sum(len(law.contains) for law in laws)
+    )  # fmt: skip
 
 
 def _apart(table: Table, first: int, second: int) -> bool:
