@@ -106,8 +106,8 @@ def searched() -> list[Path]:
 
     Not those of public logs, which name their `origin`: the wheel does not bring the logs, and
     effects for all of them would be half of it. Not those that say `diagnosed = false`: logs that
-    are made for `cosim calibrate`, and rigs with hundreds of large FMUs and no logs here. Not those that another one names in `further`: what it finds is
-    only judged on their runs.
+    are made for `cosim calibrate`, and rigs with hundreds of large FMUs and no logs here. Not those
+    that another one names in `further`: what it finds is only judged on their runs.
     """
     tables = mappings()
     further = {p.parent / name for p, table in tables.items() for name in table.get("further", ())}
