@@ -6,10 +6,12 @@ An FMU is written into the cache when it is first asked for, byte for byte as it
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import lzma
 import tarfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +23,7 @@ from ..spec.archive import pack
 from ..spec.cache import cache_folder, seal, sealed
 from ..spec.variant import file_stem, parse_name
 
-CATALOGUE = "catalogue.json"
+CATALOGUE = "catalogue.json.gz"
 """What the library holds and what the sources would say of it: components, candidates."""
 
 
@@ -29,7 +31,7 @@ class Library:
     """Provider of the FMUs in a folder that `python -m sources.distribution` made.
 
     Args:
-        folder: with `catalogue.json` and `packs`.
+        folder: with `catalogue.json.gz` and `packs`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,9 +40,13 @@ class Library:
     @cached_property
     def _text(self) -> bytes:
         try:
-            return (self.folder / CATALOGUE).read_bytes()
+            return gzip.decompress((self.folder / CATALOGUE).read_bytes())
         except FileNotFoundError:
             return b"{}"
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise CosimError(
+                f"{self.folder / CATALOGUE}: is damaged ({error}); reinstall"
+            ) from error
         except OSError as error:
             raise CosimError(
                 f"{self.folder / CATALOGUE}: cannot be read ({error.strerror})"

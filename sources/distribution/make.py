@@ -7,6 +7,7 @@ so that nothing of it needs CasADi.
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import io
 import json
@@ -100,7 +101,8 @@ def make(
     catalogue = _catalogue(list(dict.fromkeys([*plain, *map(_canonical, instances)])))
     catalogue["packs"] = {path.name: [key for key, _ in fmus] for path, fmus in jobs}
     catalogue["impossible"] = [file_stem(name) for name in impossible]
-    (out / CATALOGUE).write_text(json.dumps(catalogue, separators=(",", ":")), encoding="utf-8")
+    content = json.dumps(catalogue, separators=(",", ":")).encode()
+    (out / CATALOGUE).write_bytes(gzip.compress(content, mtime=0))
     targets = list(PLATFORMS) if platform == "all" else [host_platform()]
     for target in targets:
         build_kernel(kernel.SOURCES, out / "kernel" / kernel.library_name(target), target)
