@@ -139,6 +139,22 @@ def of_templates(provider: Provider) -> list[Problem]:
     return found
 
 
+def geared_motor(provider: Provider) -> Problem:
+    """A motor on a logged voltage, a gear and a load: what a first log of one's own shows."""
+    instances = {
+        "bare_motor": "bare_motor/winding", "gearbox": "gearbox/ratio", "inertia": "inertia/disc",
+    }  # fmt: skip
+    wires = (
+        DeclaredConnection("bare_motor.tau", "gearbox.tau_a"),
+        DeclaredConnection("gearbox.w_a", "bare_motor.w"),
+        DeclaredConnection("gearbox.tau_b", "inertia.tau"),
+        DeclaredConnection("inertia.w", "gearbox.w_b"),
+        DeclaredConnection("gearbox.J_b", "inertia.J_added"),
+    )
+    file = SystemFile(places.scenarios(), "geared_motor", "", instances, {}, wires)
+    return Problem(file.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
+
+
 def beside_foreign(provider: Provider) -> Problem:
     """What stands beside an FMU without sources: the bench of the example, and all adapters."""
     instances = {"motor": "bare_motor/winding", "rotor": "rotor/rigid"}

@@ -75,7 +75,8 @@ def make(
     plain = contents.plain(provider) if plain is None else list(plain)
     systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
     if mappings is None:
-        systems += [*contents.of_templates(provider), contents.beside_foreign(provider)]
+        systems += [*contents.of_templates(provider), contents.geared_motor(provider)]
+        systems += [contents.beside_foreign(provider)]
     asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
     fitting, impossible = contents.sorted_out(asked)
     extra = [name for name in fitting if name not in set(plain)]

@@ -52,6 +52,12 @@ def test_a_wheel_serves_who_begins_with_a_template() -> None:
     assert sorted_out(asked) == (asked, [])
 
 
+def test_a_wheel_serves_a_motor_on_a_logged_voltage() -> None:
+    asked = contents.of_diagnosis(contents.geared_motor(default_provider()))
+    assert "inertia/disc+coulomb@flange" in asked
+    assert not any(name.startswith("inertia.") for name in asked)
+
+
 def test_a_wheel_serves_rigs_but_no_public_logs() -> None:
     """Nor logs that are made for estimation."""
     served = {path.parent.name for path in contents.searched()}
