@@ -13,7 +13,7 @@ import lzma
 import tarfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,22 @@ from ..spec.variant import file_stem, parse_name
 
 CATALOGUE = "catalogue.json.gz"
 """What the library holds and what the sources would say of it: components, candidates."""
+
+
+@lru_cache(maxsize=3)
+def _members(path: Path, changed: int) -> dict[str, bytes]:
+    """Files of a pack; who asks for one of its FMUs soon asks for more, and it must be read whole.
+
+    Args:
+        path: of the pack.
+        changed: when, so that another file of the name is read.
+    """
+    with tarfile.open(path, "r|xz") as archive:
+        return {
+            member.name: file.read()
+            for member in archive
+            if (file := archive.extractfile(member)) is not None
+        }
 
 
 class Library:
@@ -110,16 +126,11 @@ class Library:
     def _unpacked(self, name: str, key: str) -> bytes:
         path = self.folder / "packs" / name
         try:
-            with tarfile.open(path, "r|xz") as archive:
-                files = {
-                    member.name.removeprefix(f"{key}/"): file.read()
-                    for member in archive
-                    if member.name.startswith(f"{key}/")
-                    and (file := archive.extractfile(member)) is not None
-                }
+            files = _members(path, path.stat().st_mtime_ns)
         except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
             raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
-        return pack(files)
+        begin = f"{key}/"
+        return pack({n.removeprefix(begin): c for n, c in files.items() if n.startswith(begin)})
 
     def near(self, variant: str) -> list[str]:
         """Variants with the same effect at a named balance."""
