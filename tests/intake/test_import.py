@@ -283,7 +283,7 @@ def test_what_the_logs_do_not_tell_apart_is_said(tmp_path: Path) -> None:
         w += 0.02 * (8.0 * torque - 0.05 * w) / 0.1
     (tmp_path / "a.csv").write_text("\n".join(lines))
     wishes = Wishes(str(tmp_path / "drive.toml"), ["torque_Nm=gear.tau_a", "speed_rad_s=load.w"])
-    kept = "the logs do not tell gear.eta apart from what is estimated"
+    kept = "the logs do not tell gear.eta apart from the rest"
 
     def notes(given: dict[str, tuple[float, ...]]) -> str:
         asked = replace(wishes, parameters=given)
