@@ -82,8 +82,13 @@ def proposal(table: Table) -> int | None:
     if len(table.models[fewest].laws) < len(table.models[best].laws):
         best = fewest
         alike = [i for i in able if i == best or not _apart(table, best, i)]
-    one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
-    return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
+    while True:  # the special case of the same law elsewhere, say
+        one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
+        least = min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
+        if least == best:
+            return best
+        best = least
+        alike = [i for i in able if i == best or not _apart(table, best, i)]
 
 
 def doubts(table: Table, model: Model) -> list[str]:

@@ -402,7 +402,9 @@ def _entry(p: Parameter) -> Entry:
 
 def _assumed(p: Parameter) -> Entry:
     """An entry with what is known beforehand."""
-    entry = _entry(p)
+    far = 3.0 * TOLERANCE * abs(p.nominal)  # nor does a model that lacks something drive it away
+    low, high = max(p.minimum, p.nominal - far), min(p.maximum, p.nominal + far)
+    entry = _entry(replace(p, minimum=low, maximum=high))
     prior = float(f"{TOLERANCE * abs(p.nominal):.3g}")
     text = (
         f"The logs do not tell it apart from the others: taken as known to {TOLERANCE:.0%}, "
