@@ -143,7 +143,7 @@ def _table_of(keys: Mapping[str, Check]) -> Check:
 
 MAPPING: dict[str, Check] = {
     "description": text, "origin": text, "rig": text, "system": text, "base": text,
-    "further": texts,
+    "further": texts, "diagnosed": flag,
     "step": positive, "algorithm": text, "options": table, "period": positive, "ticks": flag,
     "search_step": positive, "search": _table_of(SEARCH), "lead": at_least_zero,
     "time": text, "resample": positive, "gap": positive, "only": table,

@@ -96,17 +96,18 @@ class Verdict:
         if self.kind == "bad_data":
             return "; ".join(self.errors)
         names = " and ".join(law.label for law in self.laws)
+        explain = "explains" if len(self.laws) == 1 else "explain"
         tail = f" More than noise is left in {over(self.left)}." if self.left else ""
         if self.kind == "effect_found":
             text = (
-                f"{names} explains {percent(self.explained)} of what the declared model leaves "
+                f"{names} {explain} {percent(self.explained)} of what the declared model leaves "
                 "beyond noise. The gain holds on runs that were not used for fitting, and no other "
                 "effect of the catalogue does as well."
             )
             return text + tail + self._ended()
         if self.kind == "confounded":
             others = ", ".join(" and ".join(labels) for labels in self.others)
-            return f"{names} explains the data, but so does {others}.{tail}{self._ended()}"
+            return f"{names} {explain} the data, but so does {others}.{tail}{self._ended()}"
         if self.kind == "nothing_missing":
             return (
                 "The calibrated model leaves noise in all channels, and no effect of the catalogue "

@@ -122,7 +122,9 @@ def candidates(problem: Problem) -> list[Candidate]:
 def delays(problem: Problem) -> list[Candidate]:
     """Delays of columns of the log: of each alone, and of all that one instance gives or takes.
 
-    What a mapping declares is not asked again. Elements of a vector come in one message.
+    What a mapping declares is not asked again. Elements of a vector come in one message. All inputs
+    that act late are all channels that are late, but for what the inputs were before the log began,
+    which no log says: both are one model, under two names.
     """
     declared = clocked(problem.parameters)
     gives: dict[str, list[str]] = {}
@@ -141,10 +143,17 @@ def delays(problem: Problem) -> list[Candidate]:
     groups = {
         f"{name}.outputs": Shift(channels=tuple(few)) for name, few in gives.items() if few[1:]
     } | {f"{name}.inputs": Shift(inputs=tuple(few)) for name, few in takes.items() if few[1:]}
+    if len(gives) == len(takes) == 1 and not declared and not problem.ticks:
+        (giver,), (taker,) = gives, takes
+        if {f"{giver}.outputs", f"{taker}.inputs"} <= groups.keys():
+            groups[f"{taker}.inputs"] = groups[f"{giver}.outputs"]
     return [
-        Candidate(LOG, LOG, DELAY, place, FOLLOWS if shift.inputs else SHOWS, shift=shift)
+        Candidate(
+            LOG, LOG, DELAY, place,
+            FOLLOWS if shift.inputs or place.endswith(".inputs") else SHOWS, shift=shift,
+        )
         for place, shift in (single | groups).items()
-    ]
+    ]  # fmt: skip
 
 
 def balances(problem: Problem) -> dict[tuple[str, str], str]:

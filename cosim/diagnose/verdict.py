@@ -82,8 +82,13 @@ def proposal(table: Table) -> int | None:
     if len(table.models[fewest].laws) < len(table.models[best].laws):
         best = fewest
         alike = [i for i in able if i == best or not _apart(table, best, i)]
-    one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
-    return min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
+    while True:  # the special case of the same law elsewhere, say
+        one = [i for i in alike if _one_answer(table.models[best], table.models[i])]
+        least = min([best, *one], key=lambda i: (_size_of(table.models[i]), -table.models[i].score))
+        if least == best:
+            return best
+        best = least
+        alike = [i for i in able if i == best or not _apart(table, best, i)]
 
 
 def unasked(table: Table, best: int) -> list[int]:
@@ -209,9 +214,12 @@ def _explained(table: Table, model: Model, less: Model) -> float:
     return min(max(taken / excess, 0.0), 1.0) if excess > 0.0 else 0.0
 
 
-def _size_of(model: Model) -> tuple[int, int, int]:
-    """How simple a set is."""
-    return len(model.laws), sum(law.own for law in model.laws), model.free
+def _size_of(model: Model) -> tuple[int, int, int, int]:
+    """How simple a set is; of as many parameters the special case, which holds fewer of its own."""
+    laws = model.laws
+    return (
+        len(laws), sum(law.own for law in laws), model.free, sum(len(law.contains) for law in laws)
+    )  # fmt: skip
 
 
 def _apart(table: Table, first: int, second: int) -> bool:

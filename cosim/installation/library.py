@@ -1,4 +1,4 @@
-"""FMUs that an installed wheel carries: files of the catalogue, and packs of variants with effects.
+"""FMUs that an installed wheel carries, in packs.
 
 A pack is a .tar.xz of what some twenty FMUs contain, folder by folder; they share nearly all of it.
 An FMU is written into the cache when it is first asked for, byte for byte as it was built.
@@ -6,12 +6,14 @@ An FMU is written into the cache when it is first asked for, byte for byte as it
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import lzma
 import tarfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +23,31 @@ from ..spec.archive import pack
 from ..spec.cache import cache_folder, seal, sealed
 from ..spec.variant import file_stem, parse_name
 
-CATALOGUE = "catalogue.json"
+CATALOGUE = "catalogue.json.gz"
 """What the library holds and what the sources would say of it: components, candidates."""
+
+
+@lru_cache(maxsize=3)
+def _members(path: Path, changed: int) -> dict[str, bytes]:
+    """Files of a pack; who asks for one of its FMUs soon asks for more, and it must be read whole.
+
+    Args:
+        path: of the pack.
+        changed: when, so that another file of the name is read.
+    """
+    with tarfile.open(path, "r|xz") as archive:
+        return {
+            member.name: file.read()
+            for member in archive
+            if (file := archive.extractfile(member)) is not None
+        }
 
 
 class Library:
     """Provider of the FMUs in a folder that `python -m sources.distribution` made.
 
     Args:
-        folder: with `catalogue.json`, `fmus` and `packs`.
+        folder: with `catalogue.json.gz` and `packs`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,9 +56,13 @@ class Library:
     @cached_property
     def _text(self) -> bytes:
         try:
-            return (self.folder / CATALOGUE).read_bytes()
+            return gzip.decompress((self.folder / CATALOGUE).read_bytes())
         except FileNotFoundError:
             return b"{}"
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise CosimError(
+                f"{self.folder / CATALOGUE}: is damaged ({error}); reinstall"
+            ) from error
         except OSError as error:
             raise CosimError(
                 f"{self.folder / CATALOGUE}: cannot be read ({error.strerror})"
@@ -75,8 +97,7 @@ class Library:
     def has(self, variant: str) -> bool:
         """Whether the library has a variant's FMU for FMI 2, or knows that there is none."""
         stem = file_stem(str(parse_name(variant)))
-        file = self.folder / "fmus" / "fmi2" / f"{stem}.fmu"
-        return f"2/{stem}" in self._packed or stem in self._impossible or file.is_file()
+        return f"2/{stem}" in self._packed or stem in self._impossible
 
     def find(self, variant: str, fmi: int = 2) -> Path | None:
         """Path of a variant's FMU, None if the library has none.
@@ -88,9 +109,6 @@ class Library:
         stem = file_stem(str(parse_name(variant)))
         if stem in self._impossible:
             raise VariantError(f"{variant}: its effects do not fit")
-        path = self.folder / "fmus" / f"fmi{fmi}" / f"{stem}.fmu"
-        if path.is_file():
-            return path
         key = f"{fmi}/{stem}"
         if key not in self._packed:
             return None
@@ -108,19 +126,14 @@ class Library:
     def _unpacked(self, name: str, key: str) -> bytes:
         path = self.folder / "packs" / name
         try:
-            with tarfile.open(path, "r|xz") as archive:
-                files = {
-                    member.name.removeprefix(f"{key}/"): file.read()
-                    for member in archive
-                    if member.name.startswith(f"{key}/")
-                    and (file := archive.extractfile(member)) is not None
-                }
+            files = _members(path, path.stat().st_mtime_ns)
         except (OSError, tarfile.TarError, lzma.LZMAError, EOFError) as error:
             raise CosimError(f"{path}: is damaged ({error}); reinstall") from error
-        return pack(files)
+        begin = f"{key}/"
+        return pack({n.removeprefix(begin): c for n, c in files.items() if n.startswith(begin)})
 
     def near(self, variant: str) -> list[str]:
-        """Packed variants with the same effect at a named balance."""
+        """Variants with the same effect at a named balance."""
         name = str(parse_name(variant))
         if not parse_name(name).effects or "@" in name:
             return []
@@ -168,7 +181,7 @@ class Library:
         return list(self.content.get("variants", []))
 
     def names(self) -> Iterator[str]:
-        """Of the variants that have a file of their own."""
+        """Of the variants without effects, and those with effects that scenarios ask for."""
         yield from self.content.get("names", ())
 
     def candidates(self, variant: str) -> list[tuple[str, str, str]] | None:

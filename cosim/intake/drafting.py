@@ -34,7 +34,7 @@ class Layout:
     """How the runs' parts are read.
 
     Attributes:
-        whole: whether files are read as they are; else each part is a Parquet file.
+        whole: whether files are read as they are; else each part is a file of its own.
         main: key of the part whose clock counts.
         command: keys of the parts that hold inputs.
         late: [s] bound on the lateness of other clocks.

@@ -1,27 +1,26 @@
-"""The logs of a data set to be: copied as they are, or each topic in a Parquet file of its own."""
+"""The logs of a data set to be: copied as they are, or each topic in a file of its own."""
 
 from __future__ import annotations
 
+import csv
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.columns import EPOCHS
 from ..files import atomic, make_folder, writing
-from ..spec.distribution import needed
+from ..spec.distribution import has
 from ..spec.units import parse
 from .clock import Clock
 from .grouping import plain
 from .runs import Part, Run
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 Vector = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Good = NDArray[np.bool_]
 LOGS = "logs"
 
 
@@ -56,7 +55,8 @@ def place(run: Run, folder: Path, whole: bool) -> dict[str, str]:
     Args:
         run: with its parts.
         folder: of the data set.
-        whole: copy files as they are; else each part becomes a Parquet file.
+        whole: copy files as they are; else each part becomes a Parquet file, or CSV where pyarrow
+            is not installed.
 
     Returns:
         Path of each part's file, relative to the folder.
@@ -73,39 +73,61 @@ def place(run: Run, folder: Path, whole: bool) -> dict[str, str]:
                     shutil.copyfile(part.path, target)
         else:
             name = plain(f"{run.name}_{key}" if key else run.name)
-            target = folder / LOGS / f"{name}.parquet"
+            target = folder / LOGS / f"{name}{'.parquet' if has('pyarrow') else '.csv'}"
             write_part(part, target)
         found[key] = target.relative_to(folder).as_posix()
     return found
 
 
 def write_part(part: Part, path: Path) -> None:
-    """Write a part as Parquet: its clock as `time` [ns], its columns with their units.
+    """Write a part: its clock as `time` [ns], its columns with their units.
 
-    Raises:
-        InputError: pyarrow is not installed.
+    Args:
+        part: what is written.
+        path: of a Parquet file, or of a table of text with a row of units.
     """
-    pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
-    import pyarrow as pa
-
     topic, clock = part.report.topic, part.report.clock
-    fields, arrays = [], []
     origin = topic.log.origins.get(clock.column, 0)
-    fields.append(pa.field("time", pa.int64(), metadata={"unit": "ns"}))
-    arrays.append(nanoseconds(topic.log[clock.column], origin, clock))
-    for column in part.report.columns:
-        sure = column.unit.unit if column.unit.sure else ""
-        fields.append(pa.field(column.name, pa.float64(), metadata={"unit": sure}))
-        arrays.append(pa.array(topic.log[column.name], pa.float64()))
+    times, good = nanoseconds(topic.log[clock.column], origin, clock)
+    columns = {c.name: topic.log[c.name] for c in part.report.columns}
+    units = [c.unit.unit if c.unit.sure else "" for c in part.report.columns]
     with atomic(path) as temporary:
-        pq.write_table(pa.table(arrays, schema=pa.schema(fields)), temporary)
+        write = _write_parquet if path.suffix == ".parquet" else _write_text
+        write(temporary, times, good, columns, units)
 
 
-def nanoseconds(values: Vector, origin: int, clock: Clock) -> pa.Array:
-    """Times as whole nanoseconds, exact where the log was; in seconds if the unit is unknown."""
+def _write_parquet(
+    path: Path, times: Whole, good: Good, columns: Mapping[str, Vector], units: Sequence[str]
+) -> None:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
+    fields = [pa.field("time", pa.int64(), metadata={"unit": "ns"})]
+    arrays = [pa.array(times, pa.int64(), mask=~good)]
+    for (name, values), unit in zip(columns.items(), units, strict=True):
+        fields.append(pa.field(name, pa.float64(), metadata={"unit": unit}))
+        arrays.append(pa.array(values, pa.float64()))
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), path)
+
+
+def _write_text(
+    path: Path, times: Whole, good: Good, columns: Mapping[str, Vector], units: Sequence[str]
+) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time", *columns])
+        writer.writerow(["ns", *(unit if unit not in ("", "1") else "-" for unit in units)])
+        for time, known, *row in zip(times, good, *columns.values(), strict=True):
+            cells = [repr(float(v)) if np.isfinite(v) else "" for v in row]
+            writer.writerow([int(time) if known else "", *cells])
+
+
+def nanoseconds(values: Vector, origin: int, clock: Clock) -> tuple[Whole, Good]:
+    """Times as whole nanoseconds, exact where the log was, and which of them are known.
+
+    In seconds if the unit is unknown.
+    """
     factor = round(parse(clock.unit.unit or "s").factor / 1e-9)
     good = np.isfinite(values)
     whole = np.rint(np.where(good, values, 0.0) * factor).astype(np.int64) + origin * factor
-    return pa.array(whole, pa.int64(), mask=~good)
+    return whole, good

@@ -174,9 +174,11 @@ def import_logs(
     make_folder(folder)
     stored = {run.name: place(run, folder, plan.whole) for run in runs}
     said = _system_entry(file, folder, wishes.system)
+    # templates call every system file `system.toml`
+    known = file.path.resolve().parent.name if file.name == "system" else file.name
     head = (
         f"Made by `cosim data import` from {sum(len(paths) for paths in files.values())} files for "
-        f"the system {file.name}. It is yours: correct what you know better. docs/datasets.md says "
+        f"the system {known}. It is yours: correct what you know better. docs/datasets.md says "
         "what each key means."
     )
     draft = draft_of(runs, matches, stored, plan, said, head)
@@ -368,8 +370,8 @@ def _refined(
     told("trying which parameters the logs tell")
     if kept := add_parameters(draft, problem(), wishes.parameters):
         notes.append(
-            f"the logs do not tell {', '.join(kept)} apart from what is estimated: they keep the "
-            "system's values, and what is found is right as far as these are"
+            f"the logs do not tell {', '.join(kept)} apart from the rest: the system's values are "
+            "taken as right to the `prior` in the mapping, else as exact; correct what you know"
         )
     return notes
 

@@ -48,6 +48,11 @@ WIDE = 5.0
 APART = 1e-3
 """Share of what the logs tell of a parameter that must be left beside the others: differences with
 a step of 5e-3 leave 2.5e-5 of two that do the same."""
+TOLERANCE, ASSUMED = 0.1, 3
+"""How well values are known that the logs do not tell apart from what is estimated, as a share of
+them: a tenth, as data sheets are; and how many such values are estimated at most."""
+PARALLEL = 0.9
+"""Cosine of what two such values do to the others, from which the second one adds nothing."""
 NEARER = 2.0
 """What a parameter counts more that belongs to what is measured, where another does the same."""
 BUILT = ("ratio", "teeth", "poles", "counts")
@@ -261,11 +266,14 @@ def _bounded(
     return Parameter(name, unit, value, low, high, ((name, 1.0),), span=abs(value), text=text)
 
 
-def told(problem: Problem, tried: Sequence[Parameter]) -> list[str]:
-    """Those of some parameters that the logs tell together, the best first.
+def told(problem: Problem, tried: Sequence[Parameter]) -> tuple[list[str], list[str]]:
+    """Those of some parameters that the logs tell together, the best first; and those that decide
+    what these come out as, which the logs show but do not tell apart from them.
 
     One after the other the parameter is taken that is told best beside those taken before, in
     spans and white noise; then those that are not told to `KNOWN` beside all others are left out.
+    What is left out and would move those taken by more than their deviations, if it was off by
+    `TOLERANCE`, decides, unless one that moves them more does so in the same way.
     """
     own = list(problem.parameters)
     both = problem.with_parameters([*own, *tried])
@@ -311,13 +319,36 @@ def told(problem: Problem, tried: Sequence[Parameter]) -> list[str]:
 
     while lacking := [i for i in chosen if not enough(i, others(i))]:
         chosen.remove(min(lacking, key=lambda i: conditional(i, others(i))))
-    return [both.parameters[i].name for i in chosen]
+
+    taken = [*range(len(own)), *chosen]
+    block = information[np.ix_(taken, taken)]
+    deviations = np.sqrt(np.diag(np.linalg.pinv(block, rcond=1e-12, hermitian=True)))
+    moves: dict[int, Vector] = {}
+    for index in range(len(own), size) if chosen else ():
+        cross = information[np.ix_(taken, [index])][:, 0]
+        moved = TOLERANCE * np.linalg.lstsq(block, cross, rcond=1e-12)[0] / deviations
+        if index not in chosen and float(np.max(np.abs(moved[len(own) :]))) > 1.0:
+            moves[index] = moved
+    deciding: list[int] = []
+    for index in sorted(moves, key=lambda i: -float(np.linalg.norm(moves[i]))):
+        if all(_cosine(moves[index], moves[k]) < PARALLEL for k in deciding):
+            deciding.append(index)
+    names = [p.name for p in both.parameters]
+    return [names[i] for i in chosen], [names[i] for i in deciding[:ASSUMED]]
+
+
+def _cosine(first: Vector, second: Vector) -> float:
+    """Of the angle between two directions, whatever their signs."""
+    return abs(float(first @ second)) / float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
 def add_parameters(
     draft: Draft, problem: Problem, given: Mapping[str, tuple[float, ...]]
 ) -> list[str]:
     """Write the parameters that are estimated: those given, or those that the logs tell.
+
+    Values that decide what these come out as are estimated, too, within the tolerance of a data
+    sheet: held, they would make confident intervals around wrong values.
 
     Returns:
         Those that the logs do not tell apart from these.
@@ -330,9 +361,10 @@ def add_parameters(
         return []
     built = [p for p in tried if any(word in p.name.lower().partition(".")[2] for word in BUILT)]
     free = [p for p in tried if p not in built]
-    chosen = told(problem, free) if free else []
+    chosen, deciding = told(problem, free) if free else ([], [])
     draft.parameters += [_entry(p) for p in free if p.name in chosen]
-    kept = [p for p in free if p.name not in chosen]
+    draft.parameters += [_assumed(p) for p in free if p.name in deciding]
+    kept = [p for p in free if p.name not in (*chosen, *deciding)]
     for what, names in (
         ("The logs do not tell these apart from the others, so they keep the system's values",
          [f"{p.name} = {p.nominal:.6g} {p.unit}" for p in kept]),
@@ -341,7 +373,7 @@ def add_parameters(
     ):  # fmt: skip
         if names:
             draft.held.append(f"{what}: {', '.join(names)}.")
-    return [p.name for p in kept] if chosen else []
+    return [p.name for p in free if p.name not in chosen] if chosen else []
 
 
 def _stated(
@@ -366,3 +398,17 @@ def _entry(p: Parameter) -> Entry:
          "min": float(f"{p.minimum:.4g}"), "max": float(f"{p.maximum:.4g}"), "targets": p.name},
         f"{p.text}." if p.text else "",
     )  # fmt: skip
+
+
+def _assumed(p: Parameter) -> Entry:
+    """An entry with what is known beforehand."""
+    far = 3.0 * TOLERANCE * abs(p.nominal)  # nor does a model that lacks something drive it away
+    low, high = max(p.minimum, p.nominal - far), min(p.maximum, p.nominal + far)
+    entry = _entry(replace(p, minimum=low, maximum=high))
+    prior = float(f"{TOLERANCE * abs(p.nominal):.3g}")
+    text = (
+        f"The logs do not tell it apart from the others: taken as known to {TOLERANCE:.0%}, "
+        "and the intervals of all others contain that. Correct `prior` (a standard deviation, in "
+        "the unit) if you know it better; weigh it, say."
+    )
+    return Entry({**entry.keys, "prior": prior}, f"{entry.comment} {text}".strip())

@@ -71,8 +71,8 @@ def _swaps(reference: str) -> Iterator[str]:
 
 
 def plain(provider: Provider) -> list[str]:
-    """Every fidelity of every component, for the devices of all systems too; and what scenarios
-    and studies ask for, effects included.
+    """Every fidelity of every component, for the devices of all systems too; and what scenarios,
+    studies and the systems of all logs ask for, effects included.
     """
     found = dict.fromkeys(name for name in catalog.names() if "+" not in name)
     for file in system_files():
@@ -85,6 +85,9 @@ def plain(provider: Provider) -> list[str]:
             prepare(scenario.scenario(run), asked)
     for path in sorted((places.scenarios() / "studies").glob("*.toml")):
         plan_study(read_study(path), asked)
+    for path in mappings():
+        instances = declared(path, provider).instances.values()
+        found |= dict.fromkeys(str(parse_name(name)) for name in instances if component(name))
     return list(found | asked.variants)
 
 
@@ -92,15 +95,26 @@ def _has_data(path: Path) -> bool:
     return (path.parent / "data").is_dir()
 
 
+def mappings() -> dict[Path, dict[str, Any]]:
+    """All mappings below `scenarios/`, those of rigs first, with what they say."""
+    found = sorted(places.scenarios().rglob("*.toml"), key=lambda p: (not _has_data(p), p))
+    return {p: read_mapping(p) for p in found if {"channels", "base"} & set(read_toml(p))}
+
+
 def searched() -> list[Path]:
     """Mappings below `scenarios/` whose systems are searched for what they lack, rigs first.
 
-    Those that another one names in `further` are not: what it finds is only judged on their runs.
+    Not those of public logs, which name their `origin`: the wheel does not bring the logs, and
+    effects for all of them would be half of it. Not those that say `diagnosed = false`: logs that
+    are made for `cosim calibrate`, and rigs with hundreds of large FMUs and no logs here. Not those
+    that another one names in `further`: what it finds is only judged on their runs.
     """
-    found = sorted(places.scenarios().rglob("*.toml"), key=lambda p: (not _has_data(p), p))
-    tables = {p: read_mapping(p) for p in found if {"channels", "base"} & set(read_toml(p))}
+    tables = mappings()
     further = {p.parent / name for p, table in tables.items() for name in table.get("further", ())}
-    return [path for path in tables if path not in further]
+    return [
+        path for path, table in tables.items()
+        if path not in further and "origin" not in table and table.get("diagnosed", True)
+    ]  # fmt: skip
 
 
 def declared(mapping: Path, provider: Provider) -> Problem:
@@ -123,6 +137,22 @@ def of_templates(provider: Provider) -> list[Problem]:
                 create.from_template(name, out, template, provider, logs=False)
                 found.append(declared(out / "dataset.toml", provider))
     return found
+
+
+def geared_motor(provider: Provider) -> Problem:
+    """A motor on a logged voltage, a gear and a load: what a first log of one's own shows."""
+    instances = {
+        "bare_motor": "bare_motor/winding", "gearbox": "gearbox/ratio", "inertia": "inertia/disc",
+    }  # fmt: skip
+    wires = (
+        DeclaredConnection("bare_motor.tau", "gearbox.tau_a"),
+        DeclaredConnection("gearbox.w_a", "bare_motor.w"),
+        DeclaredConnection("gearbox.tau_b", "inertia.tau"),
+        DeclaredConnection("inertia.w", "gearbox.w_b"),
+        DeclaredConnection("gearbox.J_b", "inertia.J_added"),
+    )
+    file = SystemFile(places.scenarios(), "geared_motor", "", instances, {}, wires)
+    return Problem(file.name, Model.of(file, provider), (), (), (), 1.0, Coarse(1.0))
 
 
 def beside_foreign(provider: Provider) -> Problem:

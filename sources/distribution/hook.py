@@ -30,7 +30,7 @@ class LibraryHook(BuildHookInterface):  # type: ignore[misc]
                 "before"
             )
             return
-        for name in ("fmus", "packs", "catalogue.json"):
+        for name in ("packs", "catalogue.json.gz"):
             included[str(made / name)] = f"cosim_library/{name}"
         included[str(made / "kernel")] = "cosim/master/kernel/lib"
         tag = (made / "tag").read_text(encoding="ascii")

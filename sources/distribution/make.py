@@ -1,12 +1,14 @@
 """Makes what a wheel carries: `python -m sources.distribution`, then `pip wheel` (`make wheel`).
 
-FMUs of the catalogue as files, in FMI 2 and 3; in packs those of other devices, in both, and
-variants with effects, which diagnoses need, in FMI 2; the compiled executor; and what the sources
-would say, so that nothing of it needs CasADi.
+FMUs of the catalogue and of the devices of all systems, in FMI 2 and 3, and variants with effects,
+which diagnoses need, in FMI 2, all in packs; the compiled executor; and what the sources would say,
+so that nothing of it needs CasADi.
 """
 
 from __future__ import annotations
 
+import gzip
+import hashlib
 import io
 import json
 import lzma
@@ -19,6 +21,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Literal
 
+from cosim.files import atomic
 from cosim.installation.builder import Builder
 from cosim.installation.library import CATALOGUE
 from cosim.master import kernel
@@ -39,8 +42,10 @@ TAGS = {
     "aarch64-darwin": "macosx_11_0_arm64",
 }  # fmt: skip
 """Platform tags of wheels: the oldest systems that `PLATFORMS` compiles for."""
-PACKED = 24
+PACKED = 48
 """FMUs in a pack: all are unpacked to get one, which takes a tenth of a second."""
+PRESET = 9
+"""Of xz: what FMUs share lies further apart than the usual dictionary reaches."""
 
 
 def make(
@@ -57,7 +62,7 @@ def make(
         platform: this machine, or all five.
         say: told what is done.
         mappings: whose diagnoses the wheel serves, all if not given.
-        plain: variants that get files of their own; those of `contents.plain` if not given.
+        plain: variants for FMI 2 and 3; those of `contents.plain` if not given.
     """
     begun = time.monotonic()
 
@@ -70,23 +75,21 @@ def make(
     plain = contents.plain(provider) if plain is None else list(plain)
     systems = [contents.declared(path, provider) for path in mappings or contents.searched()]
     if mappings is None:
-        systems += [*contents.of_templates(provider), contents.beside_foreign(provider)]
+        systems += [*contents.of_templates(provider), contents.geared_motor(provider)]
+        systems += [contents.beside_foreign(provider)]
     asked = list(dict.fromkeys(name for item in systems for name in contents.of_diagnosis(item)))
     fitting, impossible = contents.sorted_out(asked)
     extra = [name for name in fitting if name not in set(plain)]
     kept = cache_folder() / f"distribution-{platform}"
     packed: dict[str, list[tuple[str, Path]]] = {}
-    catalogued = set(catalog.names())
-    versions: tuple[Literal[2, 3], ...] = (2, 3)
-    for fmi in versions:
-        own = [name for name in plain if name in catalogued]
-        told(f"{len(own)} FMUs of the catalogue, FMI {fmi}")
-        _built(own, out / "fmus", fmi, platform, told)
-        others = [name for name in plain if name not in catalogued] + (extra if fmi == 2 else [])
-        told(f"{len(others)} FMUs of other devices and with effects, FMI {fmi}")
-        paths = _built(others, kept, fmi, platform, told)
-        for name, path in zip(others, paths, strict=True):
-            packed.setdefault(_group(name, fmi), []).append((f"{fmi}/{path.stem}", path))
+    wanted: tuple[tuple[Literal[2, 3], list[str]], ...] = ((2, plain), (3, plain), (2, extra))
+    for fmi, names in wanted:
+        told(f"{len(names)} FMUs {'with effects' if names is extra else 'without'}, FMI {fmi}")
+        paths = _built(names, kept, fmi, platform, told)
+        for name, path in zip(names, paths, strict=True):
+            packed.setdefault(_group(name), []).append((f"{fmi}/{path.stem}", path))
+    for fmus in packed.values():  # both versions of a variant share their library
+        fmus.sort(key=lambda fmu: fmu[1].stem)
     jobs = [
         (out / "packs" / f"{group}.{first // PACKED}.tar.xz", fmus[first : first + PACKED])
         for group, fmus in sorted(packed.items())
@@ -94,12 +97,13 @@ def make(
     ]
     told(f"{len(jobs)} packs")
     with ProcessPoolExecutor() as pool:
-        list(pool.map(write_pack, *zip(*jobs, strict=True)) if jobs else ())
+        list(pool.map(_keep_pack, *zip(*jobs, strict=True)) if jobs else ())
     instances = [name for item in systems for name in item.instances.values()]
     catalogue = _catalogue(list(dict.fromkeys([*plain, *map(_canonical, instances)])))
     catalogue["packs"] = {path.name: [key for key, _ in fmus] for path, fmus in jobs}
     catalogue["impossible"] = [file_stem(name) for name in impossible]
-    (out / CATALOGUE).write_text(json.dumps(catalogue, separators=(",", ":")), encoding="utf-8")
+    content = json.dumps(catalogue, separators=(",", ":")).encode()
+    (out / CATALOGUE).write_bytes(gzip.compress(content, mtime=0))
     targets = list(PLATFORMS) if platform == "all" else [host_platform()]
     for target in targets:
         build_kernel(kernel.SOURCES, out / "kernel" / kernel.library_name(target), target)
@@ -107,11 +111,11 @@ def make(
     told(f"done: {sum(p.stat().st_size for p in out.rglob('*') if p.is_file()) / 1e6:.1f} MB")
 
 
-def _group(name: str, fmi: int) -> str:
+def _group(name: str) -> str:
     """Of FMUs that share most: those of one component, or of one fidelity of a device."""
     parsed = parse_name(name)
     many = f"{parsed.model}/{parsed.fidelity}" if parsed.effects else parsed.component
-    return f"fmi{fmi}-{file_stem(many)}"
+    return file_stem(many)
 
 
 def _canonical(name: str) -> str:
@@ -137,10 +141,22 @@ def _built(
     return build_many(names, out=out, fmi=fmi, platform=platform, progress=progress)
 
 
+def _keep_pack(path: Path, fmus: Sequence[tuple[str, Path]]) -> None:
+    """Write a pack, or take the same one from the cache: compressing takes most of the time."""
+    digest = hashlib.sha256(f"{PRESET}\0".encode())
+    for key, fmu in fmus:
+        digest.update(f"{key}\0{hashlib.sha256(fmu.read_bytes()).hexdigest()}\0".encode())
+    kept = cache_folder() / "packs" / digest.hexdigest()
+    if not kept.is_file():
+        with atomic(kept) as temporary:
+            write_pack(temporary, fmus)
+    shutil.copyfile(kept, path)
+
+
 def write_pack(path: Path, fmus: Sequence[tuple[str, Path]]) -> None:
     """Write what several FMUs contain, each below its key; the same bytes for the same FMUs."""
     with (
-        lzma.open(path, "wb", preset=6) as stream,
+        lzma.open(path, "wb", preset=PRESET) as stream,
         tarfile.open(fileobj=stream, mode="w", format=tarfile.PAX_FORMAT) as archive,
     ):
         for key, fmu in fmus:

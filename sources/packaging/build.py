@@ -217,13 +217,16 @@ def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
 
 @lru_cache(maxsize=1)
 def sources_key() -> str:
-    """Hash of what an FMU is made of: `sources/`, units and names of `cosim/spec`, its makers."""
+    """Hash of what an FMU is made of: `sources/`, units and names of `cosim/spec`, its makers.
+
+    What a wheel carries (`sources/distribution`) is no part of it.
+    """
     digest = hashlib.sha256()
     for folder in (_SOURCES, _SPEC):
         for path in sorted(folder.rglob("*")):
-            if path.suffix in (".py", ".c", ".toml"):
-                name = path.relative_to(folder).as_posix().encode()
-                digest.update(name + b"\0" + path.read_bytes())
+            name = path.relative_to(folder)
+            if path.suffix in (".py", ".c", ".toml") and name.parts[0] != "distribution":
+                digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
     for package in ("casadi", "pythonfmu", "ziglang"):
         digest.update(importlib.metadata.version(package).encode())
     digest.update(f"{rights.attributes()}".encode() + rights.LICENSE.read_bytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import shutil
@@ -13,7 +14,7 @@ import pytest
 
 from cosim.errors import CosimError, VariantError
 from cosim.installation.builder import default_provider
-from cosim.installation.library import Library
+from cosim.installation.library import CATALOGUE, Library
 from sources.distribution import contents
 from sources.distribution.contents import sorted_out
 from sources.distribution.make import make, write_pack
@@ -51,6 +52,18 @@ def test_a_wheel_serves_who_begins_with_a_template() -> None:
     assert sorted_out(asked) == (asked, [])
 
 
+def test_a_wheel_serves_a_motor_on_a_logged_voltage() -> None:
+    asked = contents.of_diagnosis(contents.geared_motor(default_provider()))
+    assert "inertia/disc+coulomb@flange" in asked
+    assert not any(name.startswith("inertia.") for name in asked)
+
+
+def test_a_wheel_serves_rigs_but_no_public_logs() -> None:
+    """Nor logs that are made for estimation."""
+    served = {path.parent.name for path in contents.searched()}
+    assert served == {"motor_bench", "mobile_manipulator_bench", "omni_bench"}
+
+
 @pytest.fixture(scope="module")
 def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as a wheel without FMUs fills it."""
@@ -69,9 +82,8 @@ def site(bare: Path, made: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     folder = tmp_path_factory.mktemp("full") / "site"
     shutil.copytree(bare, folder)
     shutil.copytree(made / "kernel", folder / "cosim" / "master" / "kernel" / "lib")
-    for name in ("fmus", "packs"):
-        shutil.copytree(made / name, folder / "cosim_library" / name)
-    shutil.copy(made / "catalogue.json", folder / "cosim_library")
+    shutil.copytree(made / "packs", folder / "cosim_library" / "packs")
+    shutil.copy(made / CATALOGUE, folder / "cosim_library")
     return folder
 
 
@@ -192,9 +204,9 @@ def test_packed_fmus_are_those_that_are_built(
 
 
 def test_what_does_not_fit_is_known(made: Path, tmp_path: Path) -> None:
-    content = json.loads((made / "catalogue.json").read_text())
+    content = json.loads(gzip.decompress((made / CATALOGUE).read_bytes()))
     content["impossible"] = ["gearbox-ratio+backlash@x"]
-    (tmp_path / "catalogue.json").write_text(json.dumps(content))
+    (tmp_path / CATALOGUE).write_bytes(gzip.compress(json.dumps(content).encode()))
     library = Library(tmp_path)
     assert library.has("gearbox/ratio+backlash@x")
     with pytest.raises(VariantError, match="its effects do not fit"):
@@ -218,9 +230,10 @@ def test_damage_is_seen(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (folder / "packs" / pack).write_bytes(content[: len(content) // 2])
     with pytest.raises(CosimError, match=r"\.tar\.xz: is damaged .*; reinstall"):
         Library(folder).find(variant)
-    (folder / "catalogue.json").write_text("{")
-    with pytest.raises(CosimError, match=r"catalogue\.json: is damaged"):
-        Library(folder).find("gearbox/none")
+    for damaged in (b"{", gzip.compress(b"{"), (made / CATALOGUE).read_bytes()[:-99]):
+        (folder / CATALOGUE).write_bytes(damaged)
+        with pytest.raises(CosimError, match=r"catalogue\.json\.gz: is damaged"):
+            Library(folder).find("gearbox/none")
 
 
 def test_packs_are_the_same_bytes_for_the_same_fmus(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.calibrate.clocks import Shift
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, delays
@@ -88,7 +89,9 @@ def test_clocks_that_agree_are_not_named(tmp_path: Path) -> None:
 def test_a_declared_clock_is_not_named_again(tmp_path: Path) -> None:
     """As a nuisance it is the same quantity: it takes what the effect would."""
     problem = written(tmp_path, 0.2, MAPPING + CLOCK)
-    assert {c.port for c in delays(problem)} == {"base.w_l", "base.w_r", "base.inputs"}
+    few = {c.port: c.shift for c in delays(problem)}
+    assert set(few) == {"base.w_l", "base.w_r", "base.inputs"}
+    assert few["base.inputs"] == Shift(inputs=("base.w_l", "base.w_r"))
     base, winner = found(problem)
     assert winner is None
     assert base.estimate.values["clock"] == pytest.approx(0.2, abs=2e-3)  # as above
@@ -106,4 +109,7 @@ def test_a_delay_is_of_columns_and_needs_no_fmu(tmp_path: Path) -> None:
         delay = added.parameters[-1]
         assert (delay.minimum, delay.maximum, delay.nominal) == (-0.5, 0.5, 0.0)
         assert delay.name == f"{item.prefix}t_d"
+    # all inputs late and all channels late: one model, so no log can tell, and both are named
+    shifts = {c.port: c.shift for c in few}
+    assert shifts["base.inputs"] == shifts["base.outputs"] != shifts["base.w_l"]
     assert isinstance(few[0], Candidate) and few[0].effect == "delay"

@@ -354,6 +354,16 @@ def test_a_law_and_its_special_case_are_one_answer(more: float) -> None:
     assert [x.effect for x in apart.laws] == ["bristle"]
 
 
+@pytest.mark.parametrize("more", [0.0, 3.0])
+def test_of_as_many_parameters_the_special_case_is_named(more: float) -> None:
+    """Dry friction whose sticking speed was fitted, not one whose asymmetry is 0 within noise."""
+    simple, general = law(own=2), law("bristle", own=2, contains=("coulomb",))
+    found = decide(table(FAR, model(general, gain=more), model(simple), alike=((1, 2),)))
+    assert [x.effect for x in found.laws] == ["coulomb"]
+    apart = decide(table(FAR, model(general), model(simple, rms=1.2)))
+    assert [x.effect for x in apart.laws] == ["bristle"]
+
+
 @pytest.mark.parametrize("special", [True, False])
 def test_sets_of_special_cases_are_one_answer_law_by_law(special: bool) -> None:
     """Whichever place a law has in its set; a set with another law is a rival."""

@@ -94,8 +94,12 @@ def test_one_clock_needs_no_late_one(tmp_path: Path) -> None:
     assert done.runs[0].purpose == "identification"
 
 
-def test_clocks_in_units_that_a_mapping_cannot_know_are_converted(tmp_path: Path) -> None:
-    """Small milliseconds beside seconds: both files become Parquet with nanoseconds."""
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+def test_clocks_in_units_that_a_mapping_cannot_know_are_converted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """Small milliseconds beside seconds: both files become tables with nanoseconds."""
+    monkeypatch.setattr("cosim.intake.files.has", lambda module: kind == "parquet")
     commands, poses = write_csv(drive(0), "a", tmp_path)
     for path, divisor in ((commands, 1e6), (poses, 1e9)):
         head, *rows = path.read_text().splitlines()
@@ -108,7 +112,7 @@ def test_clocks_in_units_that_a_mapping_cannot_know_are_converted(tmp_path: Path
     (tmp_path / "robot.toml").write_text(SYSTEM)
     imported(tmp_path, tmp_path / "set")
     assert sorted(p.name for p in (tmp_path / "set" / "logs").iterdir()) == [
-        "a_cmd.parquet", "a_pose.parquet",
+        f"a_cmd.{kind}", f"a_pose.{kind}",
     ]  # fmt: skip
     problem = read_problem(tmp_path / "set")
     run = problem.runs[0]
@@ -283,7 +287,7 @@ def test_what_the_logs_do_not_tell_apart_is_said(tmp_path: Path) -> None:
         w += 0.02 * (8.0 * torque - 0.05 * w) / 0.1
     (tmp_path / "a.csv").write_text("\n".join(lines))
     wishes = Wishes(str(tmp_path / "drive.toml"), ["torque_Nm=gear.tau_a", "speed_rad_s=load.w"])
-    kept = "the logs do not tell gear.eta apart from what is estimated"
+    kept = "the logs do not tell gear.eta apart from the rest"
 
     def notes(given: dict[str, tuple[float, ...]]) -> str:
         asked = replace(wishes, parameters=given)
