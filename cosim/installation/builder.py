@@ -6,7 +6,6 @@ The only module that knows the sources of the components; it finds them by name 
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,6 +17,7 @@ from typing import Any
 from ..errors import CosimError, InputError, UnbuiltError, VariantError
 from ..spec import devices
 from ..spec.cache import cache_folder
+from ..spec.cores import cores
 from ..spec.distribution import way_out
 from ..spec.variant import parse_name
 from ..system.provider import FolderProvider, Provider
@@ -175,7 +175,7 @@ class Builder:
             self._packaging.build_many(
                 names,
                 out=self.out,
-                workers=os.cpu_count() or 1,
+                workers=cores(),
                 progress=lambda name, path: self._count.end(name),
             )
 
