@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.spec import cores
+from cosim.master import cores
 
 QUICK = "not slow"
 LONGEST = 60.0

@@ -17,10 +17,10 @@ import numpy as np
 from ..data.segments import relative_pose
 from ..data.signals import Signal
 from ..errors import FmuCallError
+from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
-from ..spec.cores import cores
 from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem

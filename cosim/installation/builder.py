@@ -15,9 +15,9 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, UnbuiltError, VariantError
+from ..master.cores import cores
 from ..spec import devices
 from ..spec.cache import cache_folder
-from ..spec.cores import cores
 from ..spec.distribution import way_out
 from ..spec.variant import parse_name
 from ..system.provider import FolderProvider, Provider

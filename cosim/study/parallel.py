@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CosimError, InputError
-from ..spec.cores import cores
+from ..master.cores import cores
 from ..spec.distribution import way_out
 from .compute import RunnerPool, TaskResult, compute, lost
 from .planning import Found, Group, Task

@@ -14,7 +14,7 @@ from ..data.recording import Recording
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
-from ..spec.cores import cores
+from ..master.cores import cores
 from ..spec.distribution import has
 from ..system.provider import Provider
 from .compute import RunnerPool, TaskResult
