@@ -8,7 +8,7 @@ lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -65,10 +65,10 @@ connections = []
 [instances]
 load = "inertia/disc"
 """
-RUNS = {"sweep": "identification", "steps": "identification", "check": "validation"}
-SECONDS = 2.5
-"""Length of a run: two fitted ones, and one that is not, tell all laws of the tests apart, and what
-a diagnosis takes goes with their number and length."""
+RUNS = {
+    "sweep": "identification", "steps": "identification", "slow": "identification",
+    "check": "validation", "again": "validation",
+}  # fmt: skip
 
 
 def torque(name: str, t: Vector) -> Vector:
@@ -77,7 +77,11 @@ def torque(name: str, t: Vector) -> Vector:
         return np.asarray(0.5 * np.sin(2.0 * np.pi * (0.3 + 0.15 * t) * t))
     if name == "steps":
         return np.asarray(0.4 * np.sign(np.sin(1.7 * t + 0.4)))
-    return np.asarray(0.35 * np.sin(2.3 * t) + 0.25 * np.sin(5.1 * t + 1.0))
+    if name == "slow":
+        return np.asarray(0.3 * np.sin(1.1 * t) + 0.1)
+    if name == "check":
+        return np.asarray(0.35 * np.sin(2.3 * t) + 0.25 * np.sin(5.1 * t + 1.0))
+    return np.asarray(0.3 * np.sign(np.sin(1.2 * t)) + 0.2 * np.sin(3.0 * t))
 
 
 def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Vector]:
@@ -104,18 +108,20 @@ def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Ve
     return time, tau, w, theta
 
 
-def write(folder: Path, law: Law, seed: int = 3, seconds: float = SECONDS) -> Path:
-    """The data set of a disc with this law."""
+def write(
+    folder: Path, law: Law, seed: int = 3, seconds: float = 4.0, names: Iterable[str] = RUNS
+) -> Path:
+    """The data set of a disc with this law, of all runs or of those that are named."""
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     text = MAPPING
-    for name, purpose in RUNS.items():
+    for name in names:
         time, tau, w, theta = run(name, law, seconds)
         columns = [time, tau, w + SIGMA["w"] * random.standard_normal(w.size),
                    theta + SIGMA["theta"] * random.standard_normal(w.size)]  # fmt: skip
         np.savetxt(folder / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
-        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{purpose}"\n'
+        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{RUNS[name]}"\n'
     (folder / "dataset.toml").write_text(text, encoding="utf-8")
     (folder / "system.toml").write_text(SYSTEM, encoding="utf-8")
     return folder
