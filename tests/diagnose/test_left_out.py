@@ -99,6 +99,7 @@ def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
     assert ('id="hints"' in shown) == bool(content["hints"])
 
 
+@pytest.mark.slow
 def test_two_laws_that_explain_little_alone_are_both_named(diagnosed: Plant) -> None:
     """Alone, to first order, the better of the two explains 4 % of what is missing."""
     found = diagnosed("two")
@@ -123,6 +124,7 @@ def test_two_laws_hundreds_of_sigma_off_are_named_or_the_nearest_hint(diagnosed:
     assert found.verdict == ("effect_found" if found.answer.laws else "unexplained")
 
 
+@pytest.mark.slow
 def test_a_law_that_does_the_same_may_stand_for_one_that_is_left_out(diagnosed: Plant) -> None:
     """Cogging with one cycle per turn is an unbalance, and leaves noise."""
     found = diagnosed("unbalance", "unbalance")
