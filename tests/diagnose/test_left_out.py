@@ -54,9 +54,9 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Plant:
 @pytest.mark.parametrize(
     ("law", "effect", "name", "size"),
     [
-        ("friction", "coulomb", "tau_c", 0.08),
+        pytest.param("friction", "coulomb", "tau_c", 0.08, marks=pytest.mark.slow),
         ("drag", "quadratic_drag", "c", 2e-3),
-        ("unbalance", "unbalance", "m_u", 0.1),
+        pytest.param("unbalance", "unbalance", "m_u", 0.1, marks=pytest.mark.slow),
     ],
 )
 def test_a_law_of_the_catalogue_is_named_with_its_size(
