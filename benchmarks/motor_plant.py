@@ -173,28 +173,59 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
     rows: dict[str, list[Vector]] = {k: [] for k in ("speed", "current", "voltage", "angle")}
     last = RATIO * angle
 
-    def rates(
-        i: Vector, w: Vector, angle: Vector, w_out: Vector, angle_out: Vector
-    ) -> tuple[Vector, Vector, Vector]:
-        constant = k_t * (1 - saturation * i**2 / (i**2 + 20.0**2))
-        constant = constant * (1 + ripple * np.cos(n_ripple * RATIO * angle))
-        hot = resistance * (1 + 0.00393 * heating * heat)
-        supply = u * (1 - sag * (u * i / 48.0) / 48.0)
-        i_rate = (supply - hot * i - constant * RATIO * w - drop * np.tanh(i / 0.2)) / L_A
-        torque = RATIO * eta * constant * i - RATIO * cogging * np.sin(n_cog * RATIO * angle + 0.7)
-        sign = np.tanh(w_out / 2e-3)
-        friction = (
-            b * w_out + drag * w_out * np.abs(w_out) + (coulomb + load_mu * np.abs(torque)) * sign
-            + stribeck * np.exp(-((w_out / w_s) ** 2)) * sign
-        )  # fmt: skip
-        springs = unbalance * np.sin(angle_out) + hose * angle_out
+    # what no bench has is not computed: it would add zeros
+    has = {
+        name: bool(np.any(values))
+        for name, values in {
+            "saturation": saturation, "ripple": ripple, "heating": heating, "sag": sag,
+            "drop": drop, "cogging": cogging, "drag": drag, "dry": np.abs(coulomb) + load_mu,
+            "stribeck": stribeck, "unbalance": unbalance, "hose": hose, "elastic": elastic,
+        }.items()
+    }  # fmt: skip
+
+    def torque_constant(i: Vector, angle: Vector) -> Vector:
+        constant = k_t
+        if has["saturation"]:
+            constant = constant * (1 - saturation * i**2 / (i**2 + 20.0**2))
+        if has["ripple"]:
+            constant = constant * (1 + ripple * np.cos(n_ripple * RATIO * angle))
+        return constant
+
+    def current_rate(i: Vector, w: Vector, constant: Vector) -> Vector:
+        hot = resistance * (1 + 0.00393 * heating * heat) if has["heating"] else resistance
+        supply = u * (1 - sag * (u * i / 48.0) / 48.0) if has["sag"] else u
+        volts = supply - hot * i - constant * RATIO * w
+        if has["drop"]:
+            volts = volts - drop * np.tanh(i / 0.2)
+        return np.asarray(volts / L_A)
+
+    def speed_rates(
+        i: Vector, w: Vector, angle: Vector, w_out: Vector, angle_out: Vector, constant: Vector
+    ) -> tuple[Vector, Vector]:
+        torque = RATIO * eta * constant * i
+        if has["cogging"]:
+            torque = torque - RATIO * cogging * np.sin(n_cog * RATIO * angle + 0.7)
+        friction = b * w_out
+        if has["drag"]:
+            friction = friction + drag * w_out * np.abs(w_out)
+        if has["dry"] or has["stribeck"]:
+            sign = np.tanh(w_out / 2e-3)
+            friction = friction + (coulomb + load_mu * np.abs(torque)) * sign
+            if has["stribeck"]:
+                friction = friction + stribeck * np.exp(-((w_out / w_s) ** 2)) * sign
+        springs = np.zeros(n)
+        if has["unbalance"]:
+            springs = unbalance * np.sin(angle_out)
+        if has["hose"]:
+            springs = springs + hose * angle_out
+        together = (torque - friction - springs) / inertia
+        if not has["elastic"]:
+            return together, together
         twist = angle - angle_out
         pressed = twist - np.clip(twist, -gap / 2, gap / 2)
         touching = np.abs(twist) >= gap / 2
         through = touching * (stiffness * pressed + D_TWIST * (w - w_out))
-        together = (torque - friction - springs) / inertia
         return (
-            i_rate,
             np.where(elastic, (torque - through) / rotor, together),
             np.where(elastic, (through - friction - springs) / load, together),
         )
@@ -220,8 +251,10 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
         current_integral = current_integral + np.where(free, KI_I * error * TICK, 0.0)
         u = np.clip(wanted, -U_MAX, U_MAX)
         # all rates at the tick's start; the current by the midpoint rule, its winding is fast
-        i_rate, w_rate, out_rate = rates(i, w, angle, w_out, angle_out)
-        i = i + TICK * rates(i + 0.5 * TICK * i_rate, w, angle, w_out, angle_out)[0]
+        constant = torque_constant(i, angle)
+        w_rate, out_rate = speed_rates(i, w, angle, w_out, angle_out, constant)
+        middle = i + 0.5 * TICK * current_rate(i, w, constant)
+        i = i + TICK * current_rate(middle, w, torque_constant(middle, angle))
         w, w_out = w + TICK * w_rate, w_out + TICK * out_rate
         angle, angle_out = angle + TICK * w, angle_out + TICK * w_out
         heat = heat + TICK * (resistance * i**2 - heat) / t_th

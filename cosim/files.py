@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import pickle
 import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +152,13 @@ def exists(path: Path) -> bool:
         return False
 
 
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> bytes | None:
+    """A TOML text, which is parsed slowly, as something that can be had again; None: too deep."""
+    content = tomllib.loads(text)
+    return None if depth_of(content) > DEPTH else pickle.dumps(content)
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
@@ -159,7 +168,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         if excess := TEXT.excess(path.stat().st_size):
             raise ScenarioError(f"{path}: {excess}")
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        parsed = _parsed(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ScenarioError(f"{path}: there is no such file") from None
     except RecursionError:
@@ -173,6 +182,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         OverflowError,
     ) as error:  # TOML and UTF-8, numbers of thousands of digits, impossible paths
         raise ScenarioError(f"{path}: is not TOML ({error})") from error
-    if depth_of(content) > DEPTH:
+    if parsed is None:
         raise ScenarioError(f"{path}: its lists and tables lie more than {DEPTH} deep")
+    content: dict[str, Any] = pickle.loads(parsed)
     return content

@@ -5,12 +5,16 @@ Modules that are slow as a whole are not even imported then, and it says so when
 
 from __future__ import annotations
 
+import gc
+import os
 import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from cosim.master import cores
 
 QUICK = "not slow"
 LONGEST = 60.0
@@ -36,6 +40,16 @@ def checkout_stays_clean() -> Iterator[None]:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[BEGIN] = time.perf_counter()
+    # each worker of xdist has its share of the processors: more threads would only wait
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    if workers > 1:
+        os.environ.setdefault(cores.VARIABLE, str(max(cores.cores() // workers, 1)))
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of collected tests stay to the end: nobody has to look through them for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -61,6 +75,6 @@ def pytest_terminal_summary(
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes a minute each: at the end, one worker would wait for the other."""
-    longest = ("tests/diagnose/test_left_out.py", "tests/diagnose/test_intervals.py")
+    """Begin with what takes longest: at the end, one worker would wait for the other."""
+    longest = "tests/diagnose/"
     items.sort(key=lambda item: not item.nodeid.startswith(longest))

@@ -9,6 +9,6 @@ from cosim.calibrate.simulator import Simulator
 SESSIONS = SessionPool()
 
 
-def simulator(problem: Problem, workers: int = 2) -> Simulator:
-    """Without limits on time."""
+def simulator(problem: Problem, workers: int | None = None) -> Simulator:
+    """Without limits on time; as many threads as this worker of the tests has processors."""
     return Simulator(problem, workers=workers, pool=SESSIONS)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 from ..data.logs import Log
 from ..errors import ScenarioError, UnitError
@@ -445,6 +444,8 @@ def _filtered(times: Vector, values: Vector, entry: Mapping[str, Any], where: st
         raise ScenarioError(f"{where}: a low-pass of {cutoff:g} is above half the sample rate")
     if not np.isfinite(values).all():
         raise ScenarioError(f"{where}: has gaps, which a filter does not bridge")
+
+    from scipy.signal import butter, filtfilt  # takes most of a second, and few columns want it
 
     def smooth(rough: Vector) -> Vector:
         return filtfilt(*butter(5, share), rough) if share else rough

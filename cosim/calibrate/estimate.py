@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from .descent import Descent
 from .known import Known
@@ -174,7 +174,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         # nuisance values of runs that were not fitted are no finding
         if float(np.sum(directions[concerned, i] ** 2)) > 0.5
     )
-    half = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(covariance))
+    half = float(stdtrit(freedom, 0.975)) * np.sqrt(np.diag(covariance))
     near = 1e-6 * scale
     at_bound = [
         p.name

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ PURPOSE = "identification"
 COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
+SHIFTS = 32
+"""Shifts whose places are kept; channels have two or three."""
 CLOCK = "clock:"
 """Begins the name of a target that is no variable of the system: `clock:CHANNEL` or `clock:INPUT`,
 how late the clock of a channel, or of the column that drives an input, is [s]."""
@@ -184,6 +187,8 @@ class Sampler:
             held = times.clip(recorded[0], recorded[-1])
             before = (np.searchsorted(recorded, held, "right") - 1).clip(0, last - 1)
             found = before, held - recorded[before]
+        if len(self._places) >= SHIFTS:  # a clock that is being estimated has ever new ones
+            self._places.clear()
         self._places[shift] = found
         return found
 
@@ -219,9 +224,89 @@ class MeasuredRun:
     noisy: Mapping[str, float] = field(default_factory=dict)
     noise: InputNoise | None = None
 
+    @cached_property
+    def interval(self) -> float:
+        """The usual time between samples [s]."""
+        return float(np.median(np.diff(self.times)))
+
     def white(self, rows: Vector) -> Vector:
         """Residuals, or derivatives of model values, over their noise, made white."""
         return rows if self.noise is None else self.noise.white(rows)
+
+
+class Target(NamedTuple):
+    """What one parameter sets.
+
+    Attributes:
+        name: full variable name, or a clock.
+        place: of the parameter.
+        factor: on its value.
+        least: of a value whose inverse counts; None where the value itself does.
+    """
+
+    name: str
+    place: int
+    factor: float
+    least: float | None
+
+
+class Assigned(NamedTuple):
+    """What is set in one run, sorted once for thousands of simulations.
+
+    Attributes:
+        run: which.
+        known: full variable name -> value that no parameter changes.
+        late: the same of clocks, by channel or input.
+        variables, clocks: what parameters set.
+        size: how many parameters there are.
+    """
+
+    run: MeasuredRun
+    known: Mapping[str, float]
+    late: Mapping[str, float]
+    variables: tuple[Target, ...]
+    clocks: tuple[Target, ...]
+    size: int
+
+    @classmethod
+    def among(
+        cls,
+        parameters: Sequence[Parameter],
+        run: MeasuredRun,
+        known: Mapping[str, float],
+        given: Mapping[str, float],
+    ) -> Assigned:
+        """What these parameters set, over what is known of variables and given of clocks."""
+        targets = [
+            Target(name, index, factor, p.minimum if p.inverse else None)
+            for index, p in enumerate(parameters)
+            if p.run in ("", run.name)
+            for name, factor in p.targets
+        ]
+        return cls(
+            run,
+            {name: value for name, value in known.items() if not name.startswith(CLOCK)},
+            {n.removeprefix(CLOCK): v for n, v in given.items() if n.startswith(CLOCK)},
+            tuple(t for t in targets if not t.name.startswith(CLOCK)),
+            tuple(
+                t._replace(name=t.name.removeprefix(CLOCK))
+                for t in targets
+                if t.name.startswith(CLOCK)
+            ),
+            len(parameters),
+        )
+
+    def of(self, theta: Vector, targets: Sequence[Target]) -> dict[str, float]:
+        """Targets of the parameters with these values -> values."""
+        if theta.size != self.size:
+            raise ValueError(f"{theta.size} values for {self.size} parameters")
+        if not targets:
+            return {}
+        values = theta.tolist()
+        return {
+            name: factor * (values[index] if least is None else 1.0 / max(values[index], least))
+            for name, index, factor, least in targets
+        }
 
 
 class Sensitivity(NamedTuple):

@@ -114,11 +114,12 @@ class SessionPool:
 
     def ran(self, key: Key, values: Mapping[str, float], limit: float) -> Ran | None:
         """What was simulated with these values before, if that was within the limit."""
+        place = (key, frozenset(values.items()))
         with self._lock:
-            found = self._ran.get((key, frozenset(values.items())))
+            found = self._ran.get(place)
             if found is None or not found.within(limit):
                 return None
-            self._ran.move_to_end((key, frozenset(values.items())))
+            self._ran.move_to_end(place)
             return found
 
     def remember(self, key: Key, values: Mapping[str, float], ran: Ran) -> bool:

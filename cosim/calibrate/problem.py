@@ -25,7 +25,16 @@ from ..system.system import System
 from ..system.toml import SystemFile
 from .checks.finding import NO_SOURCE, Source
 from .model import Model
-from .parts import CLOCK, Channel, Coarse, MeasuredRun, Parameter, adjustable, free_parameter
+from .parts import (
+    CLOCK,
+    Assigned,
+    Channel,
+    Coarse,
+    MeasuredRun,
+    Parameter,
+    adjustable,
+    free_parameter,
+)
 
 Vector = NDArray[np.float64]
 
@@ -85,8 +94,15 @@ class Problem:
 
     # -- values ------------------------------------------------------------------------------------
 
+    @cached_property
+    def _columns(self) -> dict[str, Vector]:
+        return {
+            of: np.array([getattr(p, of) for p in self.parameters], dtype=np.float64)
+            for of in ("nominal", "minimum", "maximum", "scale")
+        }
+
     def _column(self, of: str) -> Vector:
-        return np.array([getattr(p, of) for p in self.parameters], dtype=np.float64)
+        return self._columns[of].copy()
 
     @property
     def nominal(self) -> Vector:
@@ -198,6 +214,10 @@ class Problem:
         )  # fmt: skip
 
     @cached_property
+    def _assignments(self) -> dict[str, Assigned]:
+        return {}
+
+    @cached_property
     def _system(self) -> System:
         return self.model.system({**self.constants, **self._coarse})
 
@@ -226,27 +246,24 @@ class Problem:
     def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
         """Full variable name -> value for a run."""
         run = self.run(run) if isinstance(run, str) else run
-        found = dict(self._fixed)
-        found.update((name, value) for name, value in run.starts.items() if self._has(name))
-        found.update(self._set(theta, run))
-        return {name: value for name, value in found.items() if not name.startswith(CLOCK)}
+        assigned = self._assigned(run)
+        return {**assigned.known, **assigned.of(theta, assigned.variables)}
 
     def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
         """How late the clocks of channels are in a run [s], where that is estimated or held."""
         run = self.run(run) if isinstance(run, str) else run
-        found = {**self.constants, **run.starts, **self._set(theta, run)}
-        return {
-            name.removeprefix(CLOCK): value
-            for name, value in found.items()
-            if name.startswith(CLOCK)
-        }
+        assigned = self._assigned(run)
+        return {**assigned.late, **assigned.of(theta, assigned.clocks)}
 
-    def _set(self, theta: Vector, run: MeasuredRun) -> dict[str, float]:
-        """Targets of the parameters that concern a run -> values."""
-        found: dict[str, float] = {}
-        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
-            if parameter.run in ("", run.name):
-                found.update(parameter.set(value))
+    def _assigned(self, run: MeasuredRun) -> Assigned:
+        """What is set in a run; made once, since thousands of simulations ask for it."""
+        found = self._assignments.get(run.name)
+        if found is None or found.run is not run:
+            starts = {name: value for name, value in run.starts.items() if self._has(name)}
+            given = {**self.constants, **run.starts}
+            found = self._assignments[run.name] = Assigned.among(
+                self.parameters, run, {**self._fixed, **starts}, given
+            )
         return found
 
     # -- changes -----------------------------------------------------------------------------------

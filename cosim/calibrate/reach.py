@@ -24,7 +24,7 @@ def known(
         read: one column per channel.
     """
     times, read = run.times, read.copy()
-    close = COINCIDENT * float(np.median(np.diff(times)))
+    close = COINCIDENT * run.interval
     begin = float(times[0]) - run.lead - close
     end = float(times[-1]) - max([0.0, *(late.get(name, 0.0) for name in run.inputs)]) + close
     for index, channel in enumerate(channels):
@@ -41,8 +41,8 @@ def apart(run: MeasuredRun, read: Vector, sigma: Vector) -> Vector:
     that is explained; one that is left out would be worth half a nat.
     """
     found = np.asarray((run.data - read) / sigma, dtype=np.float64)
-    out = np.isnan(read) & np.isfinite(run.data)
-    if np.any(out):
+    gaps = np.isnan(read)
+    if gaps.any() and np.any(out := gaps & np.isfinite(run.data)):
         side = np.where(np.arange(run.times.size) % 2 == 0, 1.0, -1.0)
         found[out] = np.broadcast_to(side[:, None], found.shape)[out]
     return found

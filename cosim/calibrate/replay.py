@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from ..data.comparison import Reference
 from ..data.recording import Recording
 from ..master.master import Master
@@ -29,7 +27,7 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
     """
     system = problem.model.system(problem.values(theta, run))
     looks = scenes(system)
-    interval = problem.period or float(np.median(np.diff(run.times)))
+    interval = problem.period or run.interval
     every = max(round(interval / problem.step), 1)
     count = int((run.times[-1] - run.times[0] + run.lead) / (every * problem.step) + COINCIDENT)
     first = float(run.times[0]) - run.lead

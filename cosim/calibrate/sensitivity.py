@@ -19,7 +19,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ..errors import FmuCallError
 from ..files import atomic
@@ -66,6 +65,8 @@ def correlation_index(
         seed: of the Latin hypercube.
         everywhere: look at the validation runs, too, one by one.
     """
+    from scipy.stats import qmc  # slow to import
+
     problem = simulator.problem
     chosen = [i for i, p in enumerate(problem.parameters) if p.role != "nuisance" and not p.run]
     cube = qmc.LatinHypercube(len(chosen), rng=seed).random(samples) * 2.0 - 1.0

@@ -8,10 +8,8 @@ logged inputs adds to them, they are made white (`whitening`), and derivatives w
 from __future__ import annotations
 
 import math
-import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,6 +17,7 @@ import numpy as np
 from ..data.segments import relative_pose
 from ..data.signals import Signal
 from ..errors import FmuCallError
+from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
@@ -26,6 +25,7 @@ from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
 from .reach import apart, known
+from .threads import shared
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -54,12 +54,13 @@ class Simulator:
         pool: SessionPool | None = None,
     ) -> None:
         self.problem = problem
-        self.workers = workers or os.cpu_count() or 1
+        self.workers = workers or cores()
         self.limits: Mapping[str, float] = dict(limits or {})
         self.evaluations = 0
         self.costs: dict[str, float] = {}
         self._pool = pool or SessionPool()
         self._lock = threading.Lock()
+        self._samplers: dict[str, Sampler] = {}
 
     def of(self, problem: Problem) -> Simulator:
         """A simulator of another problem with the same sessions, threads and limits."""
@@ -72,7 +73,7 @@ class Simulator:
     # -- one run -----------------------------------------------------------------------------------
 
     def _key(self, run: MeasuredRun) -> Key:
-        interval = float(np.median(np.diff(run.times)))
+        interval = run.interval
         spans = (float(run.times[0]), float(run.times[-1]), interval, run.lead)
         return Key(self.problem.kind, (run.name, spans, id(run.inputs)))
 
@@ -96,7 +97,7 @@ class Simulator:
         master = Master(
             problem.plain(), problem.algorithm, problem.step, options=problem.chosen_options
         )
-        interval = problem.period or float(np.median(np.diff(run.times)))
+        interval = problem.period or run.interval
         every = max(round(interval / problem.step), 1)
         size = every * problem.step
         first = float(run.times[0]) - run.lead
@@ -157,7 +158,7 @@ class Simulator:
         """What the channels read of a simulated run."""
         problem = self.problem
         place = {name: column for column, name in enumerate(ran.names)}
-        sampler = Sampler(run.times, ran.times)
+        sampler = self._sampler(run, ran.times)
         read = np.column_stack(
             [
                 c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
@@ -168,6 +169,14 @@ class Simulator:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)
         return known(run, problem.channels, late, read) if late else read
+
+    def _sampler(self, run: MeasuredRun, recorded: Vector) -> Sampler:
+        """What reads signals of a run: the same while it is recorded at the same times."""
+        known = self._samplers.get(run.name)
+        if known and known.times is run.times and np.array_equal(known.recorded, recorded):
+            return known
+        made = self._samplers[run.name] = Sampler(run.times, recorded)
+        return made
 
     def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
@@ -202,10 +211,7 @@ class Simulator:
     def spread(self, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Apply a function that simulates to items, in threads."""
         self.problem.plain()  # FMUs are built once, before threads ask for them
-        if self.workers == 1 or len(items) < 2:
-            return [function(item) for item in items]
-        with ThreadPoolExecutor(self.workers) as threads:
-            return list(threads.map(function, items))
+        return shared(function, items, self.workers)
 
     def residuals(
         self,

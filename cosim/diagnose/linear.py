@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from ..calibrate.loss import WINDOW, concentrated, trust
 from ..calibrate.normal import BLOCK, block_length
@@ -229,7 +229,7 @@ def score(direction: Vector, residual: Vector, stack: SampleStack, freedom: int)
     robust = float(sums @ sums) * stack.blocks / degrees
     spread = float(np.sqrt(max(robust / square, 1.0)))
     z = amplitude * np.sqrt(square) / spread
-    p_value = float(2.0 * student.sf(abs(z), max(min(degrees, active * 4), 1)))
+    p_value = float(2.0 * stdtr(max(min(degrees, active * 4), 1), -abs(z)))
     gain, size = 0.5 * amplitude**2 * square, float(np.sqrt(square))
     return ScoreTest(amplitude, gain, z, p_value, size, spread)
 

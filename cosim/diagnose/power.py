@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from .linear import MATERIAL, SampleStack
 from .models import LEVEL
@@ -19,7 +19,7 @@ POWER = 0.9
 def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
     """Label -> smallest detectable strength, or why the effect cannot be seen."""
     tests = max(len(current.signatures), 1)
-    needed = float(norm.isf(LEVEL / tests / 2) + norm.isf(1 - POWER))
+    needed = float(-ndtri(LEVEL / tests / 2) - ndtri(1 - POWER))
     table: dict[str, dict[str, Any]] = {}
     for item in current.signatures:
         p = item.strength

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ..calibrate.loss import WINDOW
 from .linear import SampleStack
@@ -94,7 +94,7 @@ def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]
         sizes = np.mean(np.square(windows), axis=1)
         kept = np.argsort(sizes)[: sizes.size - int(BURST * sizes.size)]
         lasting = float(np.mean(sizes[kept])) if sizes.size else variance
-        p_value = float(chi2.sf(np.sum(sums[kept]), kept.size)) if sums.size else 1.0
+        p_value = float(chdtrc(kept.size, np.sum(sums[kept]))) if sums.size else 1.0
         found.append(
             WhitenessTest(channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
                       float(np.sqrt(slow)), float(correlation), freedom, p_value)

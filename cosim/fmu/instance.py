@@ -144,6 +144,11 @@ class Instance:
         """A C function as a ctypes object; its first argument is `address`."""
         return self._functions[name]
 
+    @property
+    def dead(self) -> bool:
+        """Whether a call returned `fatal`, after which none may follow."""
+        return self._dead[0]
+
     def failure(self, what: str, status: int) -> FmuCallError:
         """The error for a call that returned `status`, with what the FMU logged."""
         if status == 4:

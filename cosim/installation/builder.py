@@ -6,7 +6,6 @@ The only module that knows the sources of the components; it finds them by name 
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import CosimError, InputError, UnbuiltError, VariantError
+from ..master.cores import cores
 from ..spec import devices
 from ..spec.cache import cache_folder
 from ..spec.distribution import way_out
@@ -175,7 +175,7 @@ class Builder:
             self._packaging.build_many(
                 names,
                 out=self.out,
-                workers=os.cpu_count() or 1,
+                workers=cores(),
                 progress=lambda name, path: self._count.end(name),
             )
 

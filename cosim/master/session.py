@@ -32,12 +32,15 @@ from .execution import Execution
 from .initialization import initialize
 from .kernel.stepper import Compiled
 from .master import Master
+from .numbers import Numbers
 from .outline import Outline
 
 Vector = NDArray[np.float64]
 LOOK, CHECK = 50, 100
 """Communication steps after which a limited run looks at its work, and at what it has recorded; as
 in the compiled executor."""
+SETS = 8
+"""Sets of names whose places are kept: a fit alternates between few."""
 RUNAWAY = 1e30
 """Recorded value beyond which a limited run ends: no quantity of a robot is as large in any unit,
 and solvers crawl long before squares overflow."""
@@ -90,6 +93,7 @@ class Session:
         self.targets = tuple(targets)
         self.work = 0
         self._later: dict[str, float] = {}
+        self._numbers: dict[tuple[str, ...], Numbers | None] = {}
         self._stack = ExitStack()
         try:
             self._execution = Execution(outline, self._stack)
@@ -147,6 +151,43 @@ class Session:
         need_table("values of a run", values, '{"load.J": 0.09}')
         run = self._run
         self._execution.restart()
+        if not self._given_together(values):
+            self._give(values)
+        initialize(run)
+        begun = self._steps_of_solvers()
+        try:
+            self._execution.begin()
+            try:
+                self._advance_within(limit)
+            except EndRequest as request:  # an end that an FMU asks for is one
+                self._execution.finish(request)
+            else:
+                self._execution.finish()
+        except (FmuCallError, AlgebraicLoopError) as error:
+            raise self._execution.stopped(error, keep=False) from error
+        self.work = self._steps_of_solvers() - begun + self.count * len(run.instances)
+        return run.recorded_times(), run.rows[: run.row].copy()
+
+    def _given_together(self, values: Mapping[str, Any]) -> bool:
+        """Give values in one call per instance, where all are plain numbers that fit."""
+        names = tuple(values)
+        if names not in self._numbers:
+            fit = Numbers.fit(self.system, names)
+            made = Numbers(self.system, self._run.instances, names) if fit else None
+            self._numbers = dict([*self._numbers.items(), (names, made)][-SETS:])
+        together = self._numbers[names]
+        if together is None:
+            return False
+        try:
+            return together.give(values)
+        except FmuCallError:
+            if any(instance.dead for instance in self._run.instances):
+                raise
+        self._execution.restart()  # one by one, the error says which it was
+        return False
+
+    def _give(self, values: Mapping[str, Any]) -> None:
+        """Give values one by one."""
         arrays: dict[str, tuple[Block, list[Any]]] = {}
         for name, value in values.items():
             if name not in self._blocks:
@@ -162,20 +203,6 @@ class Session:
                 )
         for block, items in arrays.values():
             block.set(items)
-        initialize(run)
-        begun = self._steps_of_solvers()
-        try:
-            self._execution.begin()
-            try:
-                self._advance_within(limit)
-            except EndRequest as request:  # an end that an FMU asks for is one
-                self._execution.finish(request)
-            else:
-                self._execution.finish()
-        except (FmuCallError, AlgebraicLoopError) as error:
-            raise self._execution.stopped(error, keep=False) from error
-        self.work = self._steps_of_solvers() - begun + self.count * len(run.instances)
-        return run.recorded_times(), run.rows[: run.row].copy()
 
     def shift(self, later: Mapping[str, float]) -> None:
         """Let inputs come later than their signals say, from the next run on (see `Shifted`).

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..diagnose.linear import MATERIAL
 from ..diagnose.models import GATE
@@ -424,7 +424,7 @@ class Detector:
         if result.freedom < 1:
             return change
         size = float(result.slope[0]) * change.full
-        half = float(student.ppf(0.975, result.freedom) * result.deviation[0]) * change.full
+        half = float(stdtrit(result.freedom, 0.975) * result.deviation[0]) * change.full
         if change.profile.kind == "creep":
             bend = CURVED * self.patterns.bent.get(direction.columns[0], 0.0)
             half += bend * abs(size)

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 Vector = NDArray[np.float64]
 Kind = Literal["step", "creep", "outlier"]
@@ -116,7 +116,7 @@ def regress(values: Vector, weight: Vector, known: Vector, shapes: Vector) -> Re
     slope = np.where(seen, rest @ y / safe, 0.0)
     spread = np.maximum(float(y @ y) - slope**2 * safe, 0.0) / freedom
     deviation = np.sqrt(np.maximum(spread, 1e-300) / safe)
-    p = np.where(seen, 2.0 * student.sf(np.abs(slope) / deviation, freedom), 1.0)
+    p = np.where(seen, 2.0 * stdtr(freedom, -np.abs(slope) / deviation), 1.0)
     return Regression(slope, np.where(seen, deviation, np.inf), p, freedom)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..display.html import unit as shown_unit
 from .change import Change, Found
@@ -148,7 +148,7 @@ class Monitored:
         centre, spread = float(first.mean()), float(first.std(ddof=1))
         charts = self.patterns.declared + len(self.series.problem.channels)
         points = max(charts * (len(self.series.logs) - self.baseline), 1)
-        factor = float(student.isf(0.5 * self.rate / points, first.size - 1))
+        factor = float(-stdtrit(first.size - 1, 0.5 * self.rate / points))
         half = factor * spread * math.sqrt(1.0 + 1.0 / first.size)
         low, high = centre - half, centre + half
         outside = tuple(

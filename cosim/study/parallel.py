@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CosimError, InputError
+from ..master.cores import cores
 from ..spec.distribution import way_out
 from .compute import RunnerPool, TaskResult, compute, lost
 from .planning import Found, Group, Task
@@ -113,7 +113,7 @@ def _pool(study: str, provider: Found, isolate: float | None) -> RunnerPool:
             for pool in _pools.values():
                 pool.close()
             _pools.clear()
-            _pools[study, isolate] = RunnerPool(provider, os.cpu_count() or 1, isolate)
+            _pools[study, isolate] = RunnerPool(provider, cores(), isolate)
         return _pools[study, isolate]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -15,6 +14,7 @@ from ..data.recording import Recording
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import write_text
 from ..installation import builder
+from ..master.cores import cores
 from ..spec.distribution import has
 from ..system.provider import Provider
 from .compute import RunnerPool, TaskResult
@@ -183,7 +183,7 @@ def run_study(
             name = f"{study.name} {time.time_ns()}"
             on_scheduler(missing, scheduler, plan.provider, isolate, name, keep, report)
         elif missing:
-            count = min(workers or os.cpu_count() or 1, len(missing))
+            count = min(workers or cores(), len(missing))
             if plan.single and isolate is None and count > 1:
                 notes.append(
                     f"one thread only: the FMU of {plan.single[0]} allows one instance per "

@@ -23,8 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..files import atomic
 from .definition import Study
@@ -44,7 +43,7 @@ def significance_limit(samples: int, parameters: int, level: float = LEVEL) -> f
     """Correlation that independent samples exceed with this probability for any parameter."""
     if samples < 3:
         return 1.0
-    quantile = float(student.ppf(1.0 - level / max(parameters, 1) / 2.0, samples - 2))
+    quantile = float(stdtrit(samples - 2, 1.0 - level / max(parameters, 1) / 2.0))
     return quantile / math.sqrt(samples - 2 + quantile**2)
 
 
@@ -219,6 +218,8 @@ def _one(study: Study, samples: Samples, name: str, unit: str) -> Sensitivity | 
         )  # fmt: skip
         names = ("mu", "mu_star", "mu_star_conf", "sigma")
     else:
+        from scipy.stats import rankdata  # slow to import
+
         ranks = rankdata(used)
         columns = np.array([rankdata(samples.values[n][kept]) for n in all_of])
         result = {"correlation": [float(np.corrcoef(x, ranks)[0, 1]) for x in columns]}

@@ -2,10 +2,56 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from ..fmu.description import Description
 
 Graph = Mapping[str, Sequence[str]]
 """Node -> the nodes that it directly influences."""
+
+
+class Wire(Protocol):
+    """A connection of two variables."""
+
+    @property
+    def source(self) -> str:
+        """The output."""
+
+    @property
+    def target(self) -> str:
+        """The input that it drives."""
+
+
+class Influences:
+    """Who influences whom in a system, gone through again only when the system has grown."""
+
+    def __init__(self) -> None:
+        self._seen: list[object] = []
+        self._found: Graph = {}
+
+    def of(self, members: Mapping[str, Description], connections: Sequence[Wire]) -> Graph:
+        """Variable -> variables that it influences at the same instant; a plan asks ten times."""
+        present: list[object] = [*members, *members.values(), *connections]
+        if len(present) != len(self._seen) or any(map(operator.is_not, present, self._seen)):
+            self._seen, self._found = present, _influences(members, connections)
+        return self._found
+
+
+def _influences(members: Mapping[str, Description], connections: Sequence[Wire]) -> Graph:
+    found: dict[str, list[str]] = {}
+    for connection in connections:
+        found.setdefault(connection.source, []).append(connection.target)
+    for member, description in members.items():
+        for output, inputs in description.dependencies.items():
+            names = description.variables[output].elements()
+            for item in inputs:
+                for element in description.variables[item].elements():
+                    found.setdefault(f"{member}.{element}", []).extend(
+                        f"{member}.{name}" for name in names
+                    )
+    return found
 
 
 def components(nodes: Iterable[str], graph: Graph) -> list[list[str]]:

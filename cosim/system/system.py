@@ -100,6 +100,9 @@ class System:
     members: dict[str, Member] = field(default_factory=dict)
     connections: list[Connection] = field(default_factory=list)
     _drivers: dict[str, str] = field(default_factory=dict)
+    _influences: feedthrough.Influences = field(
+        default_factory=feedthrough.Influences, init=False, repr=False, compare=False
+    )
 
     # -- building --------------------------------------------------------------------------------
 
@@ -345,21 +348,12 @@ class System:
 
     # -- structure -------------------------------------------------------------------------------
 
-    def dependencies(self) -> dict[str, list[str]]:
+    def dependencies(self) -> Mapping[str, Sequence[str]]:
         """Variable -> variables that it influences at the same instant, through FMUs and wires."""
-        found: dict[str, list[str]] = {}
-        for connection in self.connections:
-            found.setdefault(connection.source, []).append(connection.target)
-        for member in self.members.values():
-            description = member.description
-            for output, inputs in description.dependencies.items():
-                names = description.variables[output].elements()
-                for item in inputs:
-                    for element in description.variables[item].elements():
-                        found.setdefault(f"{member.name}.{element}", []).extend(
-                            f"{member.name}.{name}" for name in names
-                        )
-        return found
+        return self._influences.of(
+            {member.name: member.description for member in self.members.values()},
+            self.connections,
+        )
 
     def order(self) -> list[str]:
         """Instances, those first whose outputs others pass on at the same instant."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,8 +22,25 @@ def scenes(system: System) -> Scenes:
     for member in system.members.values():
         looks = member.description.extra.get("scene")
         if looks:
-            found[member.name] = fitted(looks, _signals(member).__contains__, _numbers(member))
+            found[member.name] = _looks(member, looks)
     return {instance: nodes for instance, nodes in found.items() if nodes}
+
+
+_FITTED: OrderedDict[tuple[str, frozenset[tuple[str, float]]], list[dict[str, Any]]] = OrderedDict()
+"""Scenes by FMU and parameters, the last ones: a study runs the same ones again and again."""
+KEPT = 64
+
+
+def _looks(member: Member, looks: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    numbers = _numbers(member)
+    key = member.fmu.digest, frozenset(numbers.items())
+    known = _FITTED.get(key)
+    if known is None:
+        known = fitted(looks, _signals(member).__contains__, numbers)
+        while len(_FITTED) >= KEPT:
+            _FITTED.popitem(last=False)
+        _FITTED[key] = known
+    return copy.deepcopy(known)
 
 
 def _signals(member: Member) -> set[str]:

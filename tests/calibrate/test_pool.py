@@ -55,7 +55,7 @@ def test_what_is_held_does_not_stay_in_a_shared_session(
 def test_other_steps_inputs_and_lengths_get_sessions_of_their_own(
     short: Problem, truth: np.ndarray
 ) -> None:
-    whole = Simulator(short)
+    whole = Simulator(short, workers=2)
     whole.residuals(truth, None)
     assert same(whole.of(short.changed(step=0.5 * short.step)), truth)
     cut = [replace(r, times=r.times[:501], data=r.data[:501]) for r in short.runs]
@@ -84,8 +84,8 @@ def test_sessions_that_were_not_used_for_long_are_freed(
 
 
 def test_a_closed_simulator_can_still_be_used(short: Problem, truth: np.ndarray) -> None:
-    whole = Simulator(short)
-    first = Simulator(short).residuals(truth, None)
+    whole = Simulator(short, workers=2)
+    first = Simulator(short, workers=2).residuals(truth, None)
     whole.residuals(1.01 * truth, None)
     whole.close()
     assert all(
@@ -117,7 +117,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 def test_what_was_simulated_before_is_not_simulated_again(
     short: Problem, truth: np.ndarray, ran: list[Session]
 ) -> None:
-    whole = Simulator(short)
+    whole = Simulator(short, workers=2)
     whole.residuals(truth, None)
     first, count = len(ran), len(short.runs)
     assert (first, whole.evaluations) == (count, count)

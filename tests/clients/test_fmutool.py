@@ -9,11 +9,12 @@ from __future__ import annotations
 import logging
 from functools import lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-import xmlschema
 from fmu_manipulation_toolbox import checker
 from fmu_manipulation_toolbox.operations import FMU
+from lxml import etree
 
 from tests.fmus import catalogue, fmu
 
@@ -22,14 +23,24 @@ pytestmark = pytest.mark.slow
 SCHEMAS = Path(checker.__file__).parent / "resources" / "fmi-3.0"
 
 
-@pytest.fixture(autouse=True)
-def schemas_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+class Schema:
+    """The toolbox's schemas as libxml2 reads them: a hundred times as fast as its own reader."""
+
+    def __init__(self, path: str) -> None:
+        self._schema = etree.XMLSchema(etree.parse(path))
+
+    def iter_errors(self, path: str) -> list[SimpleNamespace]:
+        self._schema.validate(etree.parse(path))
+        log = self._schema.error_log
+        return [SimpleNamespace(reason=entry.message, path=entry.path) for entry in log]
+
+
+schema = lru_cache(Schema)
+
+
+@pytest.fixture
+def quick_schemas(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checker.xmlschema, "XMLSchema", schema)
-
-
-@lru_cache
-def schema(path: str, *, _read: type[xmlschema.XMLSchema] = xmlschema.XMLSchema) -> object:
-    return _read(path)
 
 
 class Complaints(logging.Handler):
@@ -63,13 +74,20 @@ def further_complaints(folder: Path) -> list[str]:
         ("sources/buildDescription.xml", "fmi3BuildDescription.xsd"),
     ):
         if (folder / name).exists():
-            errors = schema(str(SCHEMAS / xsd)).iter_errors(str(folder / name))  # type: ignore[attr-defined]
+            errors = checker.xmlschema.XMLSchema(str(SCHEMAS / xsd)).iter_errors(str(folder / name))
             found += [f"{name}: {error.reason}" for error in errors]
     return found
 
 
 @pytest.mark.parametrize("name", catalogue())
+@pytest.mark.usefixtures("quick_schemas")
 def test_nothing_is_found(name: str) -> None:
+    assert complaints(fmu(name)) == []
+    assert complaints(fmu(name, fmi=3)) == []
+
+
+def test_nothing_is_found_by_its_own_reader_either() -> None:
+    name = "dc_motor/sampled"
     assert complaints(fmu(name)) == []
     assert complaints(fmu(name, fmi=3)) == []
 
@@ -84,6 +102,7 @@ def test_nothing_is_found(name: str) -> None:
         ("terminalsAndIcons/terminalsAndIcons.xml", "matchingRule", "rule", "rule"),
     ],
 )
+@pytest.mark.usefixtures("quick_schemas")
 def test_a_fault_is_found(member: str, old: str, new: str, expected: str, tmp_path: Path) -> None:
     """The negative twin: what nothing is found in above would have been found."""
     import zipfile

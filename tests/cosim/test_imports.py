@@ -51,6 +51,13 @@ def test_a_picture_loads_what_draws() -> None:
     assert "matplotlib" in found and "cosim.running.runner" not in found
 
 
+def test_diagnoses_begin_without_the_slow_parts_of_scipy() -> None:
+    """They are most of a second, and few logs need a filter."""
+    found = loaded("import cosim.diagnose, cosim.monitor, cosim.study.sensitivity")
+    assert "scipy.special" in found
+    assert not found & {"scipy.signal", "scipy.stats", "matplotlib", "typer"}
+
+
 def test_help_loads_nothing_that_works() -> None:
     found = loaded(
         "import sys\nfrom cosim.cli import main\nsys.argv = ['cosim', '--help']\n"

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import StepError, UnknownNameError, ValueRangeError
+from cosim.errors import FmuCallError, StepError, UnknownNameError, ValueRangeError
+from cosim.fmu.exchange import Part
+from cosim.fmu.instance import Instance
 from cosim.installation.builder import default_provider
 from cosim.master.master import Master
 from cosim.master.session import Session
@@ -54,6 +56,47 @@ def test_values_by_array_and_by_name(parts) -> None:
         with pytest.raises(ValueRangeError):
             session.run({"load.J": -1.0})
         assert np.array_equal(session.run({"load.J": 0.09, "motor.R_a": 0.36})[1], named)
+
+
+def test_numbers_are_given_in_one_call_and_one_by_one_where_that_is_refused(
+    parts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    master, inputs = parts
+    values = {
+        "load.J": 0.09,
+        "motor.R_a": 0.36,
+        "load.b": 0.02,
+        "motor.K_t": 0.09,
+        "load.speed": 0.5,
+    }
+    given: list[tuple[str, int]] = []
+    refused: set[str] = set()
+    set_part = Instance.set_part
+
+    def watched(self: Instance, part: Part) -> None:
+        given.append((self.name, part.references.size))
+        if self.name in refused and part.references.size == 3:
+            raise FmuCallError("all at once")
+        set_part(self, part)
+
+    with Session(master, DURATION, inputs=inputs, record=RECORD) as session:
+        session.run()
+        monkeypatch.setattr(Instance, "set_part", watched)
+        _, together = session.run(values)
+        assert given[:2] == [("motor", 2), ("load", 3)]
+        refused.add("load")
+        _, apart = session.run(values)
+        assert np.array_equal(apart, together)
+        refused.clear()
+        _, mixed = session.run({**values, "load.J": np.float64(0.09), "load.b": 0})
+        _, whole = session.run({**values, "load.b": 0.0})
+        assert np.array_equal(mixed, whole)
+        with pytest.raises(ValueRangeError, match=r"load\.b: b = -1 .*outside its bounds"):
+            session.run({**values, "load.b": -1.0})
+        with pytest.raises(ValueRangeError, match=r"load\.J: J = nan is not finite"):
+            session.run({**values, "load.J": float("nan")})
+        with pytest.raises(ValueRangeError, match=r"motor\.R_a: R_a = inf is not finite"):
+            session.run({**values, "motor.R_a": float("inf")})
 
 
 @pytest.mark.parametrize("executor", ["c", "python"])

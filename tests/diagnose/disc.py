@@ -8,7 +8,7 @@ lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -108,18 +108,20 @@ def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Ve
     return time, tau, w, theta
 
 
-def write(folder: Path, law: Law, seed: int = 3, seconds: float = 4.0) -> Path:
-    """The data set of a disc with this law."""
+def write(
+    folder: Path, law: Law, seed: int = 3, seconds: float = 4.0, names: Iterable[str] = RUNS
+) -> Path:
+    """The data set of a disc with this law, of all runs or of those that are named."""
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     text = MAPPING
-    for name, purpose in RUNS.items():
+    for name in names:
         time, tau, w, theta = run(name, law, seconds)
         columns = [time, tau, w + SIGMA["w"] * random.standard_normal(w.size),
                    theta + SIGMA["theta"] * random.standard_normal(w.size)]  # fmt: skip
         np.savetxt(folder / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
-        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{purpose}"\n'
+        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{RUNS[name]}"\n'
     (folder / "dataset.toml").write_text(text, encoding="utf-8")
     (folder / "system.toml").write_text(SYSTEM, encoding="utf-8")
     return folder

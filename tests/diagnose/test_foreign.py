@@ -73,7 +73,7 @@ def test_a_system_with_adapters_gives_the_same_numbers(clean: Problem, algorithm
         ("fan.tau", "output"), ("fan.w", "input"), ("fan.tau", "sensor"), ("rotor.w", "sensor"),
     }  # fmt: skip
     for (name, plain), (other, through) in zip(
-        simulator(problem).residuals(problem.nominal, None),
+        simulator(problem, 2).residuals(problem.nominal, None),  # in processes of its own
         simulator(changed).residuals(problem.nominal, None),
         strict=True,
     ):

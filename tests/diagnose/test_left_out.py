@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -31,6 +32,9 @@ LAWS: dict[str, disc.Law] = {
     "two": lambda w, theta, t: 0.01 * math.tanh(w / 0.02) + 4e-4 * w * abs(w),
     "teeth": lambda w, theta, t: 0.05 * math.sin(14.0 * theta + 0.5),
 }
+SHORT: dict[str, Any] = {"seconds": 2.5, "names": ("sweep", "steps", "check")}
+"""Where no law of the catalogue fits, a diagnosis tries everything: two fitted runs, and one that
+is not, are enough to see that."""
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +42,10 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     """The diagnosis of a disc with a law, some effects left out of the catalogue."""
     folder = tmp_path_factory.mktemp("discs")
 
-    def found(law: str, *without: str) -> Diagnosis:
-        place = folder / law
+    def found(law: str, *without: str, short: bool = False) -> Diagnosis:
+        place = folder / f"{law}{'_short' * short}"
         if not place.is_dir():
-            disc.write(place, LAWS[law])
+            disc.write(place, LAWS[law], **(SHORT if short else {}))
         return diagnose(read_problem(place), without=without)
 
     return found
@@ -50,9 +54,9 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Plant:
 @pytest.mark.parametrize(
     ("law", "effect", "name", "size"),
     [
-        ("friction", "coulomb", "tau_c", 0.08),
+        pytest.param("friction", "coulomb", "tau_c", 0.08, marks=pytest.mark.slow),
         ("drag", "quadratic_drag", "c", 2e-3),
-        ("unbalance", "unbalance", "m_u", 0.1),
+        pytest.param("unbalance", "unbalance", "m_u", 0.1, marks=pytest.mark.slow),
     ],
 )
 def test_a_law_of_the_catalogue_is_named_with_its_size(
@@ -76,13 +80,14 @@ def test_a_disc_that_lacks_nothing_has_no_name_whatever_is_left_out(diagnosed: P
     [
         ("drag", ("quadratic_drag",)),
         ("unbalance", ("unbalance", "cogging", "harmonic_ripple")),
-        pytest.param("teeth", ("cogging", "harmonic_ripple"), marks=pytest.mark.slow),
+        ("teeth", ("cogging", "harmonic_ripple")),
     ],
 )
+@pytest.mark.slow
 def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
     diagnosed: Plant, law: str, without: tuple[str, ...]
 ) -> None:
-    found = diagnosed(law, *without)
+    found = diagnosed(law, *without, short=True)
     assert found.verdict == "unexplained" and not found.answer.laws
     assert found.after is found.before and not found.files
     assert found.answer.force is not None and found.answer.force.label == "load.flange"
@@ -94,6 +99,7 @@ def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
     assert ('id="hints"' in shown) == bool(content["hints"])
 
 
+@pytest.mark.slow
 def test_two_laws_that_explain_little_alone_are_both_named(diagnosed: Plant) -> None:
     """Alone, to first order, the better of the two explains 4 % of what is missing."""
     found = diagnosed("two")
@@ -109,7 +115,7 @@ def test_two_laws_that_explain_little_alone_are_both_named(diagnosed: Plant) -> 
 @pytest.mark.slow
 def test_two_laws_hundreds_of_sigma_off_are_named_or_the_nearest_hint(diagnosed: Plant) -> None:
     """Rounds end with unbalance and three wrong laws; unused runs are predicted a little worse."""
-    found = diagnosed("both")
+    found = diagnosed("both", short=True)
     named = found.answer.laws or found.answer.hints[0].laws
     friction = {"coulomb", "asymmetric_coulomb", "stribeck", "bristle"}
     assert len(named) == 2
@@ -118,6 +124,7 @@ def test_two_laws_hundreds_of_sigma_off_are_named_or_the_nearest_hint(diagnosed:
     assert found.verdict == ("effect_found" if found.answer.laws else "unexplained")
 
 
+@pytest.mark.slow
 def test_a_law_that_does_the_same_may_stand_for_one_that_is_left_out(diagnosed: Plant) -> None:
     """Cogging with one cycle per turn is an unbalance, and leaves noise."""
     found = diagnosed("unbalance", "unbalance")

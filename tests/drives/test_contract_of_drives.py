@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sources.function import Oracle
-from sources.model import Model, ModelError
+from sources.model import Model, misfit
 from sources.variant import build_model, components, device_values, devices, effects, fidelities
 
 pytestmark = pytest.mark.slow
@@ -30,14 +30,8 @@ def variants() -> list[str]:
     for plain in PLAIN:
         for balance in build(plain).balances.values():
             for effect, module in effects().items():
-                if balance.kind not in module.EFFECT.kinds:
-                    continue
-                name = f"{plain}+{effect}@{balance.name}"
-                try:
-                    build(name)
-                except ModelError:  # needs a signal or unit that this balance does not have
-                    continue
-                found.append(name)
+                if not misfit(module.EFFECT, balance):
+                    found.append(f"{plain}+{effect}@{balance.name}")
     return found
 
 

@@ -50,6 +50,7 @@ def simulated(problem: Problem) -> dict[str, np.ndarray]:
     return dict(zip((c.name for c in problem.channels), values.T, strict=True))
 
 
+@pytest.mark.slow
 def test_a_folded_arm_is_the_mass_that_the_base_carries(tmp_path: Path) -> None:
     folder = data_set(tmp_path / "folded", 0.0)
     alone = simulated(read_problem(folder))

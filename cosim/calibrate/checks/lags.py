@@ -33,7 +33,7 @@ def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -
     for run in problem.runs:
         own = [lags[run.name, i] for i in range(len(problem.channels))]
         sure = [lag for lag, gain in own if gain > evident]
-        interval = float(np.median(np.diff(run.times)))
+        interval = run.interval
         if (
             len(sure) > len(own) / 2
             and not estimated
@@ -53,7 +53,7 @@ def check_lags(problem: Problem, models: Mapping[str, Vector], evident: float) -
                   if i != index and lags[run.name, i][1] > evident]  # fmt: skip
         apart = not others or abs(np.median(others) - np.median(sure or [0])) >= 2
         if len(sure) > len(problem.runs) / 2 and abs(np.median(sure)) >= 2 and apart:
-            interval = float(np.median(np.diff(problem.runs[0].times)))
+            interval = problem.runs[0].interval
             text = f"is late by {np.median(sure) * interval:.4g} s against the model (clock offset)"
             yield Finding("warning", "clock", "", channel.name, text)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity
+from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity, Target
 from ...calibrate.problem import Problem
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError, UnknownNameError, VariantError, listing
@@ -98,15 +99,25 @@ class LawProblem(Problem):
             **{f.name: getattr(problem, f.name) for f in fields(Problem)}, coefficient=coefficient
         )
 
+    @cached_property
+    def _coefficients(self) -> tuple[Target, ...]:
+        """What sets them, in order."""
+        return tuple(
+            Target(name, index, factor, p.minimum if p.inverse else None)
+            for index, p in enumerate(self.parameters)
+            if p.targets[0][0].startswith(self.coefficient)
+            for name, factor in p.targets
+        )
+
     def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
         """See `Problem.values`."""
         run = self.run(run) if isinstance(run, str) else run
         found = super().values(theta, run)
         sums: dict[str, float] = {}
-        for parameter, value in zip(self.parameters, theta.tolist(), strict=True):
-            if parameter.targets[0][0].startswith(self.coefficient):
-                for name, part in parameter.set(value).items():
-                    sums[name] = sums.get(name, 0.0) + part
+        values = theta.tolist()
+        for name, index, factor, least in self._coefficients:
+            value = values[index] if least is None else 1.0 / max(values[index], least)
+            sums[name] = sums.get(name, 0.0) + factor * value
         for name, value in sums.items():
             if value == 0.0 and name not in self.constants:  # as the FMU has it
                 del found[name]

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ...errors import CosimError
 from ...files import make_folder
@@ -24,7 +24,7 @@ from .trial import Law, Maker
 Vector = NDArray[np.float64]
 POINTS, ACROSS = 121, (41, 25)
 """Of a curve, and of a surface along both signals."""
-BAND = float(norm.ppf(0.975))
+BAND = float(ndtri(0.975))
 """Standard deviations of a 95 % interval."""
 
 
