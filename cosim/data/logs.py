@@ -65,10 +65,12 @@ class Log:
 
         Raises:
             UnknownNameError: with the nearest names.
-            ScenarioError: it holds text.
+            ScenarioError: it holds text, or numbers that may mean others.
         """
         if column in self.texts:
             held = self.texts[column]
+            if held.fault:
+                raise ScenarioError(f"{self.name}: column {column!r} {held.fault}")
             raise ScenarioError(
                 f"{self.name}: column {column!r} holds text: {held}; name another column, or write "
                 "numbers (and nothing, or N/A, where none was measured)"
