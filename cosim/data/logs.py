@@ -172,6 +172,7 @@ class DataSet:
         units, noise: of the columns, from the sheet.
         rate: samples per second, where `set.toml` says so.
         listed: columns of the set, where `set.toml` says so.
+        file: where its runs are listed, for errors; `set.toml` if None.
     """
 
     folder: Path
@@ -183,6 +184,7 @@ class DataSet:
     noise: Mapping[str, float]
     rate: float | None = None
     listed: tuple[str, ...] = ()
+    file: Path | None = None
 
     def log(self, run: str) -> Log:
         """Read a run.
@@ -195,7 +197,7 @@ class DataSet:
             raise UnknownNameError(f"data set {self.name}: {listing(self.runs, run)} as run")
         entry = self.runs[run]
         name = f"{self.name}/{run}"
-        with within(f"{self.folder / 'set.toml'}: run {run}"):
+        with within(f"{self.file or self.folder / 'set.toml'}: run {run}"):
             if "" in entry.files:
                 log = read_log(entry.files[""], units=self.units)
             else:

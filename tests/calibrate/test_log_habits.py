@@ -389,6 +389,15 @@ def test_steps_and_starts_that_do_not_fit_are_named(tmp_path: Path) -> None:
     assert "start" in kinds(found, "warning") and not kinds(found)
 
 
+def test_a_variable_that_two_parameters_set(tmp_path: Path) -> None:
+    text = written()
+    again = '[[parameter]]\nname = "c"\nnominal = 0.9\nmin = 0.5\nmax = 2.0\ntargets = "load.b"\n'
+    with pytest.raises(ScenarioError, match="parameters 'b' and 'c' both set load"):
+        read(tmp_path, text, RUN=again)
+    with pytest.raises(ScenarioError, match=r"dataset\.toml: run one: .*two columns 'tau'"):
+        read(tmp_path, written("time,tau,tau"))  # named by the file that lists the runs
+
+
 def test_a_folder_that_does_not_exist_is_named(tmp_path: Path) -> None:
     (tmp_path / "somewhere").mkdir()
     with pytest.raises(ScenarioError, match=r"no such folder; beside it did you mean 'some"):
