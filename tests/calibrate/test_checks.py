@@ -302,7 +302,7 @@ def test_a_clock_at_another_rate(noisy) -> None:
 
 
 def test_clocks_in_thousandths(noisy) -> None:
-    problem = noisy(0)
+    problem = noisy(0).changed(source=NO_SOURCE)
     slow = [replace(r, times=r.times * (1e3 if r.name == "check" else 1.0)) for r in problem.runs]
     [found] = [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
     assert (found.severity, found.run, found.column) == ("error", "check", "time")
