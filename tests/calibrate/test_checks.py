@@ -308,6 +308,7 @@ def test_clocks_in_thousandths(noisy) -> None:
     assert (found.severity, found.run, found.column) == ("error", "check", "time")
     assert "has samples every 1 s, those of sines are 0.001 s apart" in found.text
     slow = [replace(run, times=run.times * 1e3) for run in problem.runs]
+    problem = problem.changed(step=1e-3)
     [found] = [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
     assert found.severity == "warning" and "1000 communication steps" in found.text
     slow = [replace(r, times=r.times * (20.0 if r.name == "check" else 1.0)) for r in problem.runs]
