@@ -13,7 +13,7 @@ from scipy.stats import t as student
 from .descent import Descent
 from .known import Known
 from .loss import loss_for
-from .normal import BOUNDS, KNOWN, NOTHING, Normal, cost_of
+from .normal import BOUNDS, KNOWN, WIDER, Normal, cost_of
 from .parts import Sensitivity
 from .problem import Problem
 from .simulator import Simulator
@@ -156,7 +156,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     factor = np.sqrt(np.maximum(white, correlated) / np.maximum(correlated, 1e-300))
     known = sandwich * np.outer(factor, factor)
     unknown = (turned[:, poor] * (spread / (values[poor] + BOUNDS))) @ turned[:, poor].T
-    unbounded = turned[:, poor] ** 2 @ (spread / np.maximum(values[poor], NOTHING))
+    wider = turned[:, poor] ** 2 @ (spread / (values[poor] + BOUNDS / WIDER**2))
     scaled = known + unknown
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
@@ -187,7 +187,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         covariance=covariance,
         low=np.maximum(run.theta - half, problem.lower),
         high=np.minimum(run.theta + half, problem.upper),
-        identifiable=determined(np.diag(covariance) / scale**2, np.diag(unknown), unbounded),
+        identifiable=determined(np.diag(covariance) / scale**2, np.diag(unknown), wider),
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=cost,
@@ -199,22 +199,22 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     )
 
 
-def determined(whole: Vector, bounds: Vector, unbounded: Vector) -> NDArray[np.bool_]:
+def determined(whole: Vector, bounds: Vector, wider: Vector) -> NDArray[np.bool_]:
     """Which parameters the data determine, to `KNOWN` of their span.
 
-    Either the smaller part of their variance comes from directions that the data leave open, so
-    that bounds count there; or it would be small without any bounds, too: data that say as much of
-    a neighbour as its bounds do say something, and a parameter that hardly depends on it is known.
-    In a valley that data leave open altogether, what is left to the one is left to the other.
+    Either the smaller part of their variance comes from directions that the data leave open, where
+    bounds count; or it would still be small if all bounds were `WIDER` times as wide. Data that say
+    as much of a neighbour as its bounds do say something, and a parameter that hardly depends on it
+    is known; in a valley that data leave open altogether, nothing would be known of either.
 
     Args:
         whole: variance of each parameter, in spans squared.
         bounds: the part of it that comes from open directions.
-        unbounded: the same if the data alone counted there.
+        wider: this part with the wider bounds.
     """
-    alone = whole - bounds + unbounded
+    there = whole - bounds + wider
     return np.asarray(
-        (whole < KNOWN**2) & ((bounds < 0.5 * whole) | (alone < KNOWN**2)), dtype=np.bool_
+        (whole < KNOWN**2) & ((bounds < 0.5 * whole) | (there < KNOWN**2)), dtype=np.bool_
     )
 
 
