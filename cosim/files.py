@@ -126,14 +126,32 @@ def write_text(path: Path, text: str) -> None:
 
 
 def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
-    """`{"gearbox": {"ratio": 3}}` and `{"gearbox.ratio": 3}` alike as `{"gearbox.ratio": 3}`."""
+    """`{"gearbox": {"ratio": 3}}` and `{"gearbox.ratio": 3}` alike as `{"gearbox.ratio": 3}`.
+
+    Elements come after what they are elements of, wherever they stand, so that both count.
+
+    Raises:
+        ScenarioError: a name is there twice, in two ways of writing it.
+    """
     flat: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, Mapping):
-            flat.update({f"{key}.{name}": item for name, item in flatten(value).items()})
-        else:
-            flat[key] = value
-    return flat
+        nested = isinstance(value, Mapping)
+        for name, item in (flatten(value) if nested else {"": value}).items():
+            full = f"{key}.{name}" if nested else key
+            if full in flat:
+                raise ScenarioError(f"{full} is given twice, {flat[full]!r} and {item!r}; keep one")
+            flat[full] = item
+    return dict(sorted(flat.items(), key=lambda pair: _whole(pair[0]) in flat))
+
+
+def overlay(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by full name where those of `over` count; a whole array there, for each element."""
+    return {**{n: v for n, v in under.items() if _whole(n) not in over}, **over}
+
+
+def _whole(name: str) -> str | None:
+    """The array that an element's name is of: `a.x` for `a.x[2]`."""
+    return name.rpartition("[")[0] if name.endswith("]") else None
 
 
 def is_file(path: Path) -> bool:

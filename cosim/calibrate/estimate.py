@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 from .descent import Descent
 from .known import Known
 from .loss import loss_for
-from .normal import BOUNDS, KNOWN, Normal, cost_of
+from .normal import BOUNDS, KNOWN, WIDER, Normal, cost_of
 from .parts import Sensitivity
 from .problem import Problem
 from .simulator import Simulator
@@ -49,7 +49,7 @@ class Estimate:
         theta: values of all parameters.
         covariance: of the parameters; sandwich over blocks, so correlated residuals count.
         low, high: 95 % intervals, cut at the bounds.
-        identifiable: per parameter whether the data say more than the bounds.
+        identifiable: per parameter whether the data determine it (`determined`).
         combinations: what the runs cannot tell apart.
         at_bound: parameters that ended at a bound.
         cost: half the sum of squared residuals over sigma, priors included.
@@ -157,6 +157,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     factor = np.sqrt(np.maximum(white, correlated) / np.maximum(correlated, 1e-300))
     known = sandwich * np.outer(factor, factor)
     unknown = (turned[:, poor] * (spread / (values[poor] + BOUNDS))) @ turned[:, poor].T
+    wider = turned[:, poor] ** 2 @ (spread / (values[poor] + BOUNDS / WIDER**2))
     scaled = known + unknown
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
@@ -187,8 +188,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         covariance=covariance,
         low=np.maximum(run.theta - half, problem.lower),
         high=np.minimum(run.theta + half, problem.upper),
-        identifiable=(np.sqrt(np.diag(covariance)) < KNOWN * scale)
-        & (np.diag(unknown) < 0.5 * np.diag(scaled)),
+        identifiable=determined(np.diag(covariance) / scale**2, np.diag(unknown), wider),
         combinations=combinations,
         at_bound=tuple(at_bound),
         cost=cost,
@@ -197,6 +197,25 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         evaluations=run.simulator.evaluations - run.begun,
         jacobian=run.jacobian,
         residuals=run.residuals,
+    )
+
+
+def determined(whole: Vector, bounds: Vector, wider: Vector) -> NDArray[np.bool_]:
+    """Which parameters the data determine, to `KNOWN` of their span.
+
+    Either the smaller part of their variance comes from directions that the data leave open, where
+    bounds count; or it would still be small if all bounds were `WIDER` times as wide. Data that say
+    as much of a neighbour as its bounds do say something, and a parameter that hardly depends on it
+    is known; in a valley that data leave open altogether, nothing would be known of either.
+
+    Args:
+        whole: variance of each parameter, in spans squared.
+        bounds: the part of it that comes from open directions.
+        wider: this part with the wider bounds.
+    """
+    there = whole - bounds + wider
+    return np.asarray(
+        (whole < KNOWN**2) & ((bounds < 0.5 * whole) | (there < KNOWN**2)), dtype=np.bool_
     )
 
 

@@ -24,6 +24,7 @@ from ..system.provider import Provider
 from ..system.toml import SystemFile, read_system
 from ..system.variants import apply
 from .joining import Joined
+from .parts import Parameter
 from .problem import Problem
 from .schema import check_mapping
 
@@ -156,7 +157,9 @@ def read_joined(
     with _named(path, folder):
         file = _arranged(file, table, provider)
         joined = Joined(path, table, data, only or {})
-        return joined, joined.problem(file, provider).changed(further=further)
+        problem = joined.problem(file, provider).changed(further=further)
+        _set_once(problem)
+    return joined, problem
 
 
 def _arranged(file: SystemFile, table: Mapping[str, Any], provider: Provider) -> SystemFile:
@@ -166,6 +169,20 @@ def _arranged(file: SystemFile, table: Mapping[str, Any], provider: Provider) ->
     return replace(
         file, instances=apply(file.instances, table.get("variants", {}), provider, folder)
     )
+
+
+def _set_once(problem: Problem) -> None:
+    """Refuse two parameters that set the same variable in the same run: the last one would win."""
+    setting: dict[str, list[Parameter]] = {}
+    for parameter in problem.parameters:
+        for target, _ in parameter.targets:
+            for other in setting.setdefault(target, []):
+                if not (other.run and parameter.run and other.run != parameter.run):
+                    raise ScenarioError(
+                        f"parameters {other.name!r} and {parameter.name!r} both set {target}; "
+                        "take it out of the targets of one"
+                    )
+            setting[target].append(parameter)
 
 
 @contextmanager
@@ -198,4 +215,4 @@ def _plain(folder: Path, path: Path, table: Mapping[str, Any], used: set[str]) -
             "([[run]] with name, file, purpose)"
         )
     found = runs_of(runs, folder, str(path), used)
-    return DataSet(folder, folder.resolve().name, "", found, {}, {}, {})
+    return DataSet(folder, folder.resolve().name, "", found, {}, {}, {}, file=path)

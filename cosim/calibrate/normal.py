@@ -21,6 +21,8 @@ KNOWN = 0.25
 """A combination is identifiable if its standard deviation is below this fraction of the span."""
 BOUNDS = 12.0
 """Information of the bounds: 1 / variance of a value anywhere between them, in spans."""
+WIDER = 100.0
+"""What needs bounds is asked with bounds that are so many times as wide."""
 DISTRUST = 4.0
 """Multiple of the disagreement of both sides that is taken off the information of a run."""
 

@@ -96,6 +96,8 @@ def calibrate_command(
         typer.echo(f"warning: {exchange}", err=True)
     unused = validation_residuals(estimate)
     content = calibration_table(estimate, unused, correlation, findings)
+    for line in _far(content["channels"]):
+        typer.echo(f"warning: {line}", err=True)
     content["exchange"] = exchange.to_dict()
     content["evaluations"] = simulator.evaluations + exchange.evaluations
     content["wall_s"] = time.perf_counter() - started
@@ -118,6 +120,29 @@ def calibrate_command(
         print_json(content)
     else:
         _print(content)
+
+
+def _far(channels: dict[str, Any]) -> list[str]:
+    """What the model leaves far beyond the noise, in the runs that were fitted and in others."""
+    fitted, others = (
+        {n: (v[purpose] or 0.0) / v["noise_rms"] for n, v in channels.items()}
+        for purpose in ("identification", "validation")
+    )
+    said = []
+    name = max(fitted, key=lambda n: fitted[n])
+    if fitted[name] > FAR:
+        said.append(
+            f"the model leaves {fitted[name]:.3g} times the noise in {name}: it lacks something "
+            "that values and intervals make up for; `cosim diagnose` looks for it"
+        )
+    name = max(others, key=lambda n: others[n] / max(fitted[n], 1.0))
+    if others[name] > FAR * max(fitted[name], 1.0):
+        said.append(
+            f"in runs that were not fitted it leaves {others[name]:.3g} times the noise in {name}, "
+            f"in those that were {fitted[name]:.3g}: what was found does not hold there, or these "
+            "logs are of another kind"
+        )
+    return said
 
 
 def _usable(problem: Problem, findings: list[Finding]) -> list[Finding]:
@@ -264,13 +289,5 @@ def _print(content: dict[str, Any]) -> None:
         )  # fmt: skip
     console.print(table)
     console.print(content["exchange"]["text"], soft_wrap=True)
-    far = {n: (v["identification"] or 0.0) / v["noise_rms"] for n, v in content["channels"].items()}
-    name = max(far, key=lambda n: far[n])
-    if far[name] > FAR:
-        console.print(
-            f"the model leaves {far[name]:.3g} times the noise in {name}: it lacks something that "
-            "values and intervals make up for; `cosim diagnose` looks for it",
-            soft_wrap=True,
-        )
     for path in content["files"]:
         console.print(path, soft_wrap=True)

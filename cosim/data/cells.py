@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,18 @@ EXACT = 2**53
 DAY = 10**15
 """What is taken off larger integers is a multiple of this, so that the rest is exact."""
 _COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
+_GROUPS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+"""What may be 1234 as well as 1.234."""
+_SPACES = " '\u2019\u00a0\u2009\u202f"
+_GROUPED = re.compile(
+    r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:[" + _SPACES + r"]\d{3})+(?:[.,]\d*)?)"
+)
+"""Numbers whose thousands are separated."""
+_MEASURED = re.compile(
+    r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?) *([a-zA-Z%\u00b0\u00b5\u03bc].*)"
+)
+"""A number and its unit."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +42,7 @@ class Gaps:
         example: the first of these, or of the empty ones that say something.
         row: of the example, counted from 1 below the head.
         count: all cells.
+        fault: why the numbers may mean others than they seem to.
     """
 
     empty: int = 0
@@ -37,11 +50,12 @@ class Gaps:
     example: str = ""
     row: int = 0
     count: int = 0
+    fault: str = ""
 
     @property
     def text(self) -> bool:
-        """Whether the column holds text: most of what was written there is no number."""
-        return self.strange > 0.5 * (self.count - self.empty)
+        """Whether the column holds text: most of what was written there is no clear number."""
+        return bool(self.fault) or self.strange > 0.5 * (self.count - self.empty)
 
     def __str__(self) -> str:
         number = self.empty + self.strange
@@ -54,7 +68,7 @@ def numbers(cells: Sequence[str], comma: bool = False) -> tuple[Vector, Gaps, in
 
     Args:
         cells: as written.
-        comma: whether a decimal comma is possible, since something else separates the columns.
+        comma: whether a decimal comma is possible.
     """
     plain = _plain(cells)
     if plain is not None:
@@ -77,6 +91,42 @@ def numbers(cells: Sequence[str], comma: bool = False) -> tuple[Vector, Gaps, in
     return values, Gaps(empty, strange, example, row, len(cells)), 0
 
 
+def ambiguity(cells: Sequence[str], unit: Callable[[str], str]) -> str:
+    """Why numbers of a column may mean others than they seem to, "" if they do not.
+
+    Args:
+        cells: as written.
+        unit: the unit that a text means, "" if none.
+    """
+    texts = [cell.strip().strip('"').strip() for cell in cells]
+    if grouped := next((text for text in texts if _GROUPED.fullmatch(text)), ""):
+        return f"has the cell {grouped!r}; write numbers without separators of thousands"
+    comma = next((text for text in texts if _COMMA.fullmatch(text)), "")
+    point = next((text for text in texts if _POINT.fullmatch(text)), "")
+    if comma and point:
+        return (
+            f"has the cells {comma!r} and {point!r}; write numbers with one decimal mark, and "
+            "without separators of thousands"
+        )
+    for text in texts:
+        if (found := _MEASURED.fullmatch(text)) and unit(found[2]):
+            return (
+                f"has the cell {text!r} among numbers; write all of them in one unit, and the unit "
+                "into the head"
+            )
+    return ""
+
+
+def decimal_comma(cells: Sequence[str]) -> tuple[bool, str]:
+    """Whether a comma among the cells can be nothing but a decimal one; else a cell that has one.
+
+    `1,234` may be 1234, `0,234` and `1,5` may not.
+    """
+    commas = [text for cell in cells if _COMMA.fullmatch(text := cell.strip().strip('"').strip())]
+    sure = any(not _GROUPS.fullmatch(text) for text in commas)
+    return sure, commas[0] if commas and not sure else ""
+
+
 def _number(text: str, comma: bool) -> float | None:
     if text.lower() in TRUTH:
         return TRUTH[text.lower()]
@@ -86,7 +136,7 @@ def _number(text: str, comma: bool) -> float | None:
     if "_" in text:
         return None
     try:
-        return float(text)
+        return float(text.replace("\u2212", "-"))  # the minus sign of printed texts
     except ValueError:
         return None
 

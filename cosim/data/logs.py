@@ -65,10 +65,12 @@ class Log:
 
         Raises:
             UnknownNameError: with the nearest names.
-            ScenarioError: it holds text.
+            ScenarioError: it holds text, or numbers that may mean others.
         """
         if column in self.texts:
             held = self.texts[column]
+            if held.fault:
+                raise ScenarioError(f"{self.name}: column {column!r} {held.fault}")
             raise ScenarioError(
                 f"{self.name}: column {column!r} holds text: {held}; name another column, or write "
                 "numbers (and nothing, or N/A, where none was measured)"
@@ -170,6 +172,7 @@ class DataSet:
         units, noise: of the columns, from the sheet.
         rate: samples per second, where `set.toml` says so.
         listed: columns of the set, where `set.toml` says so.
+        file: where its runs are listed, for errors; `set.toml` if None.
     """
 
     folder: Path
@@ -181,6 +184,7 @@ class DataSet:
     noise: Mapping[str, float]
     rate: float | None = None
     listed: tuple[str, ...] = ()
+    file: Path | None = None
 
     def log(self, run: str) -> Log:
         """Read a run.
@@ -193,7 +197,7 @@ class DataSet:
             raise UnknownNameError(f"data set {self.name}: {listing(self.runs, run)} as run")
         entry = self.runs[run]
         name = f"{self.name}/{run}"
-        with within(f"{self.folder / 'set.toml'}: run {run}"):
+        with within(f"{self.file or self.folder / 'set.toml'}: run {run}"):
             if "" in entry.files:
                 log = read_log(entry.files[""], units=self.units)
             else:

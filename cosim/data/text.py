@@ -12,7 +12,7 @@ import codecs
 import csv
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from ..errors import ScenarioError, UnitError
 from ..reading.limits import DATA
 from ..spec.units import parse
-from .cells import EXACT, Gaps, numbers
+from .cells import EXACT, Gaps, ambiguity, decimal_comma, numbers
 
 Vector = NDArray[np.float64]
 SEPARATORS = (";", "\t", ",", "|")
 """Tried in this order: a comma may be in the numbers of a table that something else separates."""
 COMMENTS = ("#", "%")
-_CELL = 8
-"""Bytes of memory per byte of a file: seven digits are a text of 56 and a pointer."""
+_CELL = 9
+"""Bytes of memory per byte of a file: seven digits are a text of 56 and two pointers."""
 _DIGITS = 16
 """Of integers from 2^53 on, at least."""
 _SQUARE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
@@ -148,17 +148,34 @@ def text_table(path: Path) -> Table:
     if twice := next((name for name in seen if seen.count(name) > 1), None):
         raise ScenarioError(f"{path}: has two columns {twice!r}; rename one of them")
     units = _units(rows, names)
-    wide = next((i for i, row in enumerate(rows, 1) if len(row) > len(names)), 0)
-    if wide and any(cell.strip() for cell in rows[wide - 1][len(names) :]):
+    wide = next((i for i, row in enumerate(rows, 1) if any(map(str.strip, row[len(names) :]))), 0)
+    if wide:
         raise ScenarioError(
             f"{path}: row {wide} has {len(rows[wide - 1])} cells, but the head names {len(names)} "
             f"columns, taken as separated by {separator!r}; a decimal comma needs another "
             "separator, e.g. a semicolon"
         )
-    for index, (name, _) in enumerate(names):
-        cells = [row[index] if index < len(row) else "" for row in rows]
-        values, gaps, origin = numbers(cells, comma=separator != ",")
-        table.units[name] = units[index]
+    columns = {
+        name: [row[index] if index < len(row) else "" for row in rows]
+        for index, (name, _) in enumerate(names)
+    }
+    commas = {
+        name: decimal_comma(cells)
+        for name, cells in columns.items() if any("," in cell for cell in cells)
+    }  # fmt: skip
+    sure = any(found for found, _ in commas.values())
+    for (name, cells), unit in zip(columns.items(), units, strict=True):
+        values, gaps, origin = numbers(cells, comma=True)
+        if not gaps.text and (gaps.strange or name in commas):
+            fault = ambiguity(cells, spelled)
+            if not fault and not sure and (unclear := commas.get(name, (False, ""))[1]):
+                fault = (
+                    f"has the cell {unclear!r}, which may mean {unclear.replace(',', '')} or "
+                    f"{unclear.replace(',', '.', 1)}; write numbers without separators of "
+                    "thousands, or with a decimal point"
+                )
+            gaps = replace(gaps, fault=fault)
+        table.units[name] = unit
         table.add(name, values, gaps, origin, exact_of(cells, gaps))
     return table
 

@@ -100,8 +100,8 @@ def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """Entries of an archive by name; backslashes of old Windows tools are read as slashes.
 
     Raises:
-        ArchiveError: an entry that is encrypted, a link, there twice or leads out of the archive,
-            or all together are too large.
+        ArchiveError: an entry that is encrypted, a link, there twice with other content or leads
+            out of the archive, or all together are too large.
     """
     found: dict[str, zipfile.ZipInfo] = {}
     if excess := FILES.excess(len(archive.filelist)):
@@ -126,9 +126,9 @@ def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
             name = name[2:]
         if not name:
             continue
-        if name in found and not name.endswith("/"):
+        if name in found and not name.endswith("/") and not _same(found[name], info):
             raise ArchiveError(f"it has two entries {shown}; which one counts is not defined")
-        found[name] = info
+        found.setdefault(name, info)
     for name in found:
         parts = name.rstrip("/").split("/")
         for length in range(1, len(parts)):
@@ -137,6 +137,11 @@ def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
                     f"its entry {'/'.join(parts[:length])!r} is a file and a folder at once"
                 )
     return found
+
+
+def _same(first: zipfile.ZipInfo, second: zipfile.ZipInfo) -> bool:
+    """Whether two entries hold the same; some tools pack a folder twice."""
+    return (first.file_size, first.CRC) == (second.file_size, second.CRC)
 
 
 def unpack(archive: zipfile.ZipFile, folder: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import UnknownNameError, ValueRangeError
+from ..files import overlay
 from ..scenario.scenario import Scenario
 from ..system.provider import Provider, get_ready
 from ..system.system import System
@@ -36,7 +37,7 @@ def swapped_system(
     notes = []
     get_ready(provider, instances.values())
     system = replace(scenario.system, instances=dict(instances), parameters={}).build(provider)
-    for name, value in {**scenario.system.parameters, **scenario.parameters}.items():
+    for name, value in overlay(scenario.system.parameters, scenario.parameters).items():
         instance = name.partition(".")[0]
         try:
             system.set(name, value)

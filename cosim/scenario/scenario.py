@@ -18,7 +18,7 @@ from ..data.comparison import Reference, circle
 from ..data.logs import Log, read_data_set, read_log
 from ..data.signals import Constant, Signal, SignalVector, Table
 from ..errors import ScenarioError, UnknownNameError, listing, within
-from ..files import flatten, is_file, read_toml
+from ..files import flatten, is_file, overlay, read_toml
 from ..installation import places
 from ..reading.limits import DATA
 from ..system.toml import SystemFile, read_system
@@ -187,9 +187,11 @@ def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     merged = dict(copy.deepcopy(base))
     for key, value in changes.items():
         if key in ("parameters", "inputs", "variants", "compare", "record"):
-            ours = flatten(value) if key == "parameters" else value
             theirs = merged.get(key, {})
-            merged[key] = {**(flatten(theirs) if key == "parameters" else theirs), **ours}
+            merged[key] = (
+                overlay(flatten(theirs), flatten(value)) if key == "parameters"
+                else {**theirs, **value}
+            )  # fmt: skip
         elif key == "checks":
             merged[key] = [*merged.get(key, []), *value]
         else:

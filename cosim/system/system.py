@@ -164,17 +164,17 @@ class System:
                 f"{self.name}: {name} is a structural parameter; arrays have the sizes that its "
                 f"start value {first.start[:1]} gives, so it cannot be set"
             )
-        found = check_values(f"{self.name}: {member.name}", variables, value)
+        where = f"{self.name}: {member.name}"
+        found = check_values(where, variables, value)
         if first.index is None:
             plain = isinstance(value, (bool, int, float)) and not variables[0].items
             member.parameters[name.partition(".")[2]] = value if plain else _given(value, found)
             return
         whole = member.description.whole(first.name)
-        items = list(member.parameters.get(whole.name, whole.start))
+        given = member.parameters.get(whole.name)  # as it was written: rows, one for all
+        items = list(whole.start) if given is None else check_values(where, [whole], given)
         if len(items) != whole.size:
-            raise GraphError(
-                f"{self.name}: {member.name}.{whole.name} has no start values; set it as a whole"
-            )
+            raise GraphError(f"{where}.{whole.name} has no start values; set it as a whole")
         items[first.index] = found[0]
         member.parameters[whole.name] = items
 

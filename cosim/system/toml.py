@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import ScenarioError, UnknownNameError, listing, within
-from ..files import flatten, read_toml
+from ..files import flatten, overlay, read_toml
 from ..reading.schema import Check, anything, keyed, list_of, table, text
 from .provider import Provider
 from .system import System
@@ -67,7 +67,7 @@ class SystemFile:
                     offset=wire.offset,
                     convert=wire.convert,
                 )
-            for name, value in self.parameters.items():
+            for name, value in overlay(self.parameters, given).items():
                 if name not in given:
                     system.set(name, value)
         for name, value in given.items():

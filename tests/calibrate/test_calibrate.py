@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.differences import directional, jacobian
-from cosim.calibrate.estimate import channel_rms
+from cosim.calibrate.estimate import channel_rms, determined
 from cosim.calibrate.fit import Effort, fit
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
 from cosim.calibrate.simulator import Simulator
@@ -165,3 +165,16 @@ def test_a_problem_stays_what_it_is(short) -> None:
         short.model.instances = {}
     finer = short.changed(step=0.5 * short.step)
     assert finer.step == 0.5 * short.step and finer.model is short.model
+
+
+def test_what_the_data_determine_without_narrow_bounds() -> None:
+    """Beside a neighbour of which data and bounds say as much; in a valley; hardly in it."""
+    data, bounds = np.array([12.0, 1e-3, 1e-3]), 12.0
+    turn = np.array([0.02, 0.05, 1e-6]) ** 2  # how much each is of the open direction
+    own = np.array([3e-3, 1e-3, 1e-3]) ** 2
+    rests = turn / (data + bounds)
+    found = determined(own + rests, rests, turn / (data + bounds / 100.0**2))
+    # the share that rests on bounds is 0.65, 0.995 and 0; with wide ones the deviations are
+    # 0.0065, 1.07 and 0.001 of the span
+    assert found.tolist() == [True, False, True]
+    assert determined(np.array([0.07]), np.zeros(1), np.zeros(1)).tolist() == [False]  # 0.26

@@ -16,6 +16,7 @@ from cosim.calibrate.checks.examine import check_data, check_model, examine
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding, Source, lines
 from cosim.calibrate.checks.late import check_late
 from cosim.calibrate.checks.swaps import check_channels
+from cosim.calibrate.checks.times import check_times
 from cosim.calibrate.fit import Effort, fit
 from cosim.data.signals import Table
 from tests.problems import simulator
@@ -249,10 +250,23 @@ def test_spikes_of_one_column_are_faults_of_the_log(noisy) -> None:
     assert "the largest 1e+09 A at 1.5 s" in found[0].text
 
 
-def test_a_jolt_shows_in_other_columns(noisy) -> None:
-    """The end of a play is felt for a sample, by the speed and by the current that follows it."""
+def test_a_jolt_moves_something(noisy) -> None:
+    """The end of a play is felt for a sample by the current, and the speed is another one then."""
     jolted = changed(noisy(0), "current", struck)
-    assert not of_kind(changed(jolted, "speed", lambda x: struck(np.roll(x, 1))), "spikes")
+
+    def pushed(x: np.ndarray) -> np.ndarray:
+        at = np.arange(x.size)
+        return x + sum(2.0 * np.where(at >= k, np.exp(-(at - k) / 50.0), 0.0)
+                       for k in (300, 700, 1500))  # fmt: skip
+
+    assert not of_kind(changed(jolted, "speed", pushed), "spikes")
+
+
+def test_a_row_that_is_wrong_in_all_columns(noisy) -> None:
+    struck_twice = changed(changed(noisy(0), "current", struck), "speed", struck)
+    found = of_kind(struck_twice, "spikes")
+    assert {f.column for f in found} == {"current", "speed"}
+    assert {f.severity for f in found} == {"error"}
 
 
 @pytest.mark.parametrize("apart", [0, 37])
@@ -285,6 +299,30 @@ def test_a_clock_at_another_rate(noisy) -> None:
     assert "the clock is 1.00% fast" in found[0].text
     problem = problem.changed(source=Source(rate=1010.0, allow=frozenset({"rate"})))
     assert {f.severity for f in of_kind(problem, "rate")} == {"warning"}
+
+
+def test_clocks_in_thousandths(noisy) -> None:
+    problem = noisy(0).changed(source=NO_SOURCE)
+    slow = [replace(r, times=r.times * (1e3 if r.name == "check" else 1.0)) for r in problem.runs]
+    [found] = [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
+    assert (found.severity, found.run, found.column) == ("error", "check", "time")
+    assert "has samples every 1 s, those of sines are 0.001 s apart" in found.text
+    slow = [replace(run, times=run.times * 1e3) for run in problem.runs]
+    problem = problem.changed(step=1e-3)
+    [found] = [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
+    assert found.severity == "warning" and "1000 communication steps" in found.text
+    slow = [replace(r, times=r.times * (20.0 if r.name == "check" else 1.0)) for r in problem.runs]
+    assert not [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
+
+
+def test_where_all_columns_are_too_small_the_inputs_are_named(noisy) -> None:
+    problem = noisy(0)
+    data = {run.name: 0.01 * run.data for run in problem.runs}
+    found = of_kind(problem.with_data(data), "unit")
+    assert found and all("look at the units of the inputs and of the clock" in f.text
+                         for f in found)  # fmt: skip
+    one = of_kind(changed(problem, "voltage", lambda x: 0.01 * x), "unit")
+    assert len(one) == 1 and "units of the inputs" not in one[0].text
 
 
 def test_a_sign_turned_in_one_run_is_named_only_where_the_model_foretells_the_others(noisy) -> None:

@@ -13,6 +13,7 @@ import pytest
 from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.checks.examine import examine
 from cosim.calibrate.checks.finding import Finding
+from cosim.data.logs import read_log
 from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError
 from tests.problems import simulator
 
@@ -110,6 +111,10 @@ def same(problem: Problem) -> None:
                         SPEED * 30.0 / np.pi).replace(".0000", ".00"),
         lambda: '"time","tau","w"\n' + written().partition("\n")[2],
         lambda: "\n\n" + written().replace(",", ", "),
+        lambda: written().replace("-", "\u2212"),
+        lambda: "".join(
+            ",".join(f'"{cell}"' for cell in row.replace(".", ",").split(";")) + "\n"
+            for row in written(separator=";").splitlines()),  # decimal commas in quotes
     ],
 )  # fmt: skip
 def test_other_clothes(tmp_path: Path, write: Callable[[], str | bytes]) -> None:
@@ -143,6 +148,47 @@ def test_cells_without_a_number_are_gaps_and_counted(tmp_path: Path) -> None:
     assert "4 of 300 cells hold no number (the first 'N/A' in row 101)" in said[0].text
 
 
+def cells_of(*cells: str, separator: str = ";", time: Callable[[int], str] = str) -> str:
+    """A log whose column w is these cells again and again."""
+    rows = [f"{time(k)}{separator}1{separator}{cells[k % len(cells)]}" for k in range(90)]
+    return "\n".join([f"time{separator}tau{separator}w", *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("log", "message"),
+    [
+        (cells_of("998", "1,002"), "'w' has the cell '1,002', which may mean 1002 or 1.002"),
+        (cells_of("998.5", "1,002"), "'w' has the cells '1,002' and '998.5'; write numbers with"),
+        (cells_of("998,5", "1.002,5"), "has the cell '1.002,5'; write numbers without separators"),
+        (cells_of("998", '"1,002.5"', separator=","), "'w' has the cell '1,002.5'; write numbers"),
+        (cells_of("998,5", "1\u202f002,5"), r"has the cell '1\u202f002,5'; write numbers without"),
+        (cells_of("998", "999", "1.02 rad/s"), "'w' has the cell '1.02 rad/s' among numbers; "),
+        (cells_of("998", "999", "1.02", time=lambda k: f"{1000 + 10 * k:,}"), "'1,000', which"),
+    ],
+)
+def test_numbers_that_may_mean_others(tmp_path: Path, log: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        read(tmp_path, log)
+
+
+@pytest.mark.parametrize(
+    "cells", [("998", "1,25"), ("0,998", "1,002"), ("998", "999 #"), ("1", "2")]
+)
+def test_numbers_that_can_mean_one_thing_only(tmp_path: Path, cells: tuple[str, ...]) -> None:
+    (tmp_path / "log.csv").write_text(cells_of(*cells, *["1"] * 8), encoding="utf-8")
+    wanted = [float(cell.replace(",", ".").rstrip(" #")) for cell in cells]
+    found = read_log(tmp_path / "log.csv")["w"][:2]
+    assert [w for w, f in zip(wanted, found, strict=True) if np.isfinite(f)] == [
+        f for f in found if np.isfinite(f)]  # fmt: skip
+
+
+def test_an_unclear_column_that_nobody_uses(tmp_path: Path) -> None:
+    rows = written().splitlines()
+    log = "\n".join([rows[0] + ",id", *(f'{row},"{k},0.5"' if k % 2 else f"{row},{k}"
+                                        for k, row in enumerate(rows[1:]))])  # fmt: skip
+    same(read(tmp_path, log))
+
+
 def test_text_that_is_numbers_in_parquet_is_numbers(tmp_path: Path) -> None:
     read(tmp_path, written())
     table = pd.DataFrame({"time": TIMES, "tau": TORQUE, "w": [f"{x:.9g}" for x in SPEED]})
@@ -165,6 +211,7 @@ def test_text_that_is_numbers_in_parquet_is_numbers(tmp_path: Path) -> None:
          "column 'w' holds text: 90 of 90 cells"),
         (lambda: written().replace(",", ",1,").replace("time,1,tau,1,w", "time,tau,w"),
          "has 5 cells, but the head names 3 columns"),
+        (lambda: written() + "9,1,2,\n9.1,1,2,,4\n", "row 302 has 5 cells"),
         (lambda: b"time,tau,w\n0,1,2\0,\n", "is no text"),
     ],
 )  # fmt: skip
@@ -340,6 +387,15 @@ def test_steps_and_starts_that_do_not_fit_are_named(tmp_path: Path) -> None:
     passed = read(tmp_path, moving, TOP='[checks]\nallow = ["start"]')
     found = examine(simulator(passed))
     assert "start" in kinds(found, "warning") and not kinds(found)
+
+
+def test_a_variable_that_two_parameters_set(tmp_path: Path) -> None:
+    text = written()
+    again = '[[parameter]]\nname = "c"\nnominal = 0.9\nmin = 0.5\nmax = 2.0\ntargets = "load.b"\n'
+    with pytest.raises(ScenarioError, match="parameters 'b' and 'c' both set load"):
+        read(tmp_path, text, RUN=again)
+    with pytest.raises(ScenarioError, match=r"dataset\.toml: run one: .*two columns 'tau'"):
+        read(tmp_path, written("time,tau,tau"))  # named by the file that lists the runs
 
 
 def test_a_folder_that_does_not_exist_is_named(tmp_path: Path) -> None:

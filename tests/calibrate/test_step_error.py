@@ -14,6 +14,7 @@ from cosim.calibrate.calibration import TENTH, calibrated
 from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
 from cosim.cli.app import app
+from cosim.cli.calibrate import _far
 from cosim.errors import InputError, UnknownNameError
 from tests.tiny_fmus import V, tiny
 
@@ -187,6 +188,20 @@ def test_the_command_says_what_the_step_adds(folder: Path) -> None:
     assert content["exchange"]["corrected"] and content["exchange"]["moved"]["d"] > 10.0
     low, high = content["parameters"]["d"]["ci95"]
     assert low <= D <= high
+
+
+def test_what_does_not_hold_in_other_runs_is_said() -> None:
+    def channel(fitted: float, unused: float | None) -> dict[str, float | None]:
+        return {"noise_rms": 0.1, "identification": fitted, "validation": unused}
+
+    assert _far({"a": channel(0.11, 0.12), "b": channel(0.1, None)}) == []
+    [line] = _far({"a": channel(0.11, 0.12), "b": channel(0.1, 0.9)})
+    assert line.startswith(
+        "in runs that were not fitted it leaves 9 times the noise in b, in those"
+    )
+    [line] = _far({"a": channel(0.5, 0.6), "b": channel(0.1, 0.1)})
+    assert line.startswith("the model leaves 5 times the noise in a: it lacks something")
+    assert len(_far({"a": channel(0.5, 1.5), "b": channel(0.1, 0.1)})) == 2
 
 
 @pytest.mark.parametrize(

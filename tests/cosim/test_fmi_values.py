@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cosim
 from cosim import Constant, Master, Recording, System, Table, read_recording
-from cosim.errors import CosimError, GraphError, StepError, ValueRangeError
+from cosim.errors import CosimError, GraphError, ScenarioError, StepError, ValueRangeError
+from cosim.files import flatten
 from cosim.master import kernel
 from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
@@ -390,6 +392,40 @@ def test_arrays_are_connected_whole_and_by_element(tmp_path: Path) -> None:
 def test_matrices_take_rows(value: Any, expected: list[float], tmp_path: Path) -> None:
     system = alone(vectors(tmp_path), {"A": value, "u": [1.0, 1.0, 1.0]})
     assert short(system)["a.y"].tolist() == [expected] * 5
+
+
+@pytest.mark.parametrize("value", [[[1, 0, 0], [0, 1, 0]], [1, 0, 0, 0, 1, 0], np.eye(2, 3)])
+def test_an_element_after_the_whole(value: Any, tmp_path: Path) -> None:
+    system = alone(vectors(tmp_path), {"A": value, "u": [1.0, 1.0, 1.0]})
+    system.set("a.A[2,1]", 9.0)
+    assert short(system)["a.y"].tolist() == [[1.0, 10.0]] * 5
+    system.set("a.A", 2.0)  # one for all
+    system.set("a.A[1,3]", 0.0)
+    assert short(system)["a.y"].tolist() == [[4.0, 6.0]] * 5
+
+
+@pytest.mark.parametrize("written", [
+    ('"a.A[2,1]" = 9.0\na.A = [[1, 0, 0], [0, 1, 0]]', ""),  # elements count wherever they stand
+    ("a.A = [[1, 0, 0], [0, 1, 0]]", '"a.A[2,1]" = 9.0'),
+    ('a.A = 7.0\n"a.A[1,1]" = 7.0', 'a.A = [[1, 0, 0], [9, 1, 0]]'),  # a whole, for all of it
+])  # fmt: skip
+def test_elements_and_wholes_in_files(written: tuple[str, str], tmp_path: Path) -> None:
+    path = vectors(tmp_path)
+    (tmp_path / "s.toml").write_text(
+        f'[instances]\na = "{path}"\n[parameters]\n{written[0]}\n', encoding="utf-8"
+    )
+    (tmp_path / "run.toml").write_text(
+        'system = "s.toml"\nduration = 0.2\nstep = 0.1\n[inputs]\n"a.u" = 1.0\n[parameters]\n'
+        f"{written[1]}\n", encoding="utf-8",
+    )  # fmt: skip
+    recording = cosim.run(tmp_path / "run.toml").recording
+    assert recording["a.y"][-1].tolist() == [1.0, 10.0]
+
+
+def test_a_name_written_in_two_ways(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"a\.k is given twice, 1\.0 and 2\.0; keep one"):
+        flatten({"a": {"k": 1.0}, "a.k": 2.0})
+    assert flatten({"a": {"k": 1.0}, "a.l": 2.0}) == {"a.k": 1.0, "a.l": 2.0}
 
 
 def test_an_element_of_a_matrix(tmp_path: Path) -> None:

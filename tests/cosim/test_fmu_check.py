@@ -67,7 +67,7 @@ def nothing_is_loaded_or_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("xml", [
-    fmi2(), fmi3(),
+    fmi2(), fmi3(), fmi3().replace('causality="input"', 'causality="input" initial="exact"'),
     fmi2(U + Y + mode("3"), definitions=MODES),
     fmi2(U + Y + STATE, interface=BOTH, structure=f'{OUTPUTS}<Derivatives><Unknown index="4"/>'
          '</Derivatives><InitialUnknowns><Unknown index="2"/><Unknown index="4"/>'

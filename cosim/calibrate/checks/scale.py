@@ -84,6 +84,18 @@ def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: 
     return all(not found or float(np.median(found)) < FORETOLD for found in (here, others))
 
 
+def _size(follow: Mapping[str, tuple[float, float]]) -> float:
+    """How many times its signal a column is, in the median over the runs."""
+    return float(np.median([abs(slope) for slope, _ in follow.values()]))
+
+
+def _all_alike(problem: Problem, models: Mapping[str, Vector], size: float) -> bool:
+    """Whether all columns (two or more) are about as many times their signals."""
+    others = [_follow(problem, models, index) for index in range(len(problem.channels))]
+    sizes = [_size(follow) for follow in others if follow]
+    return len(sizes) > 1 and all(abs(np.log(one / size)) < 0.2 for one in sizes)
+
+
 def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> Iterator[Finding]:
     """Sign and size of a column in the runs in which it follows its signal.
 
@@ -104,11 +116,14 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
             if _foretold(problem, models, index, name):
                 text = f"follows {channel.signal} with the sign turned round in this run alone"
                 yield Finding("error", "sign", name, channel.name, text)
-    size = float(np.median([abs(slope) for slope, _ in follow.values()]))
+    size = _size(follow)
     if not 0.5 < size < 2.0:
         near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
         known = abs(np.log(size / FACTORS[near])) < 0.2
         reason = f"the unit looks wrong: {near}" if known else "unit or scale look wrong"
-        text = f"is {size:.4g} times what the model has [{channel.unit}]; {reason}"
+        unit = f" [{channel.unit}]" if channel.unit else ""
+        text = f"is {size:.4g} times what the model has{unit}; {reason}"
+        if _all_alike(problem, models, size):
+            text += ". All columns are, so look at the units of the inputs and of the clock first"
         sure = known or not 1.0 / STRANGE < size < STRANGE
         yield Finding("error" if sure else "warning", "unit", "", channel.name, text)

@@ -27,10 +27,12 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
     Of white Gaussian noise a sample passes for one once in 1e9. A jolt of the machine may last one
     sample, too (the impact at the end of a play), but it shows in another column within `NEAR`
     samples, which a fault of the log does by chance in one of 800 cases per column (7 samples
-    beyond 4 deviations); so columns are named of whose spikes most are alone.
+    beyond 4 deviations); so columns are named of whose spikes most are alone. A jolt moves
+    something: columns that stand out at the very same sample and go on as if nothing had been are a
+    row that was written or sent wrongly. So bends are those of the columns without their spikes.
     """
     bends = {
-        (run.name, index): _bend(run.data[:, index], channel.sigma)
+        (run.name, index): _bend(_without(run.data[:, index], channel.sigma), channel.sigma)
         for run in problem.runs for index, channel in enumerate(problem.channels)
     }  # fmt: skip
     for index, channel in enumerate(problem.channels):
@@ -52,6 +54,11 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
                 "despike = true (or limit) in [columns]"
             )
             yield Finding("error", "spikes", run.name, channel.name, text)
+
+
+def _without(values: Vector, sigma: float) -> Vector:
+    """A column whose spikes are gaps."""
+    return np.where(spikes(values, sigma), np.nan, values)
 
 
 def _bend(values: Vector, sigma: float) -> Vector:

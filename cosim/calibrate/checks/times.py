@@ -41,9 +41,40 @@ def interval(times: Vector) -> float:
 
 
 def check_times(problem: Problem) -> Iterator[Finding]:
-    """Faults of the clocks, run by run; none of these tests is of chance."""
+    """Faults of the clocks, run by run and between runs; none of these tests is of chance."""
     for run in problem.runs:
         yield from _run(problem, run)
+    if problem.source.rate is None:  # else each clock has been compared with that
+        yield from _units(problem)
+
+
+def _units(problem: Problem) -> Iterator[Finding]:
+    """Clocks that count in thousandths of the unit that the other runs or the step are in."""
+    each = {run.name: interval(run.times) for run in problem.runs if run.times.size >= SHORT}
+    if not each or min(each.values()) <= 0.0:
+        return
+    least = min(each.values())
+    for name, mean in each.items():
+        if _thousands(mean / least):
+            text = (
+                f"has samples every {mean:.6g} s, those of {min(each, key=lambda n: each[n])} are "
+                f"{least:.6g} s apart: the unit of one of the two clocks looks wrong; write the "
+                'unit into the head ("time [ms]"), or give scale of the clock in [columns]'
+            )
+            yield Finding("error", "rate", name, "time", text)
+    if _thousands(least / problem.step):
+        text = (
+            f"samples are {least:.6g} s apart, {least / problem.step:.6g} communication steps: if "
+            'the clock counts thousandths of a second, write the unit into its head ("time [ms]"), '
+            "or give its scale in [columns]"
+        )
+        yield Finding("warning", "rate", "", "time", text)
+
+
+def _thousands(ratio: float) -> bool:
+    """Whether a ratio is 1e3, 1e6 or 1e9 as exactly as clocks agree."""
+    power = round(float(np.log10(ratio)) / 3.0)
+    return power >= 1 and abs(ratio / 1e3**power - 1.0) < EVEN
 
 
 def _run(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:

@@ -33,6 +33,7 @@ _MACH = (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\xca\x
 def check_entries(archive: zipfile.ZipFile, findings: Findings) -> None:
     """Check the names of all entries and how they are packed."""
     names: dict[str, str] = {}
+    seen: set[str] = set()
     for info in archive.filelist:
         name = info.orig_filename
         shown = repr(name[:100])
@@ -53,6 +54,9 @@ def check_entries(archive: zipfile.ZipFile, findings: Findings) -> None:
                 "FMI allows stored and deflated entries",
             )  # fmt: skip
         plain = name.replace("\\", "/")
+        if plain in seen and not plain.endswith("/"):
+            findings.warning(f"its entry {shown} is there twice", "pack it once")
+        seen.add(plain)
         other = names.setdefault(plain.lower(), plain)
         if other != plain:
             findings.warning(

@@ -132,7 +132,9 @@ def _combination(variable: Declared, findings: Findings) -> None:
         )  # fmt: skip
         return
     given = variable.outer.get("initial")
-    if given is not None and causality in ("input", "independent"):
+    if given is not None and (
+        causality == "independent" or (causality == "input" and variable.fmi == 2)
+    ):
         findings.error(
             f"has causality {causality} and initial={given!r}", "leave initial out", *where
         )
@@ -151,7 +153,8 @@ def _one_of(names: object) -> str:
 
 
 def _initials(causality: str, variability: str) -> tuple[str, ...]:
-    if causality in ("parameter", "structuralParameter") or variability == "constant":
+    exact = ("parameter", "structuralParameter", "input")  # an input: FMI 3 only
+    if causality in exact or variability == "constant":
         return ("exact",)
     if causality == "calculatedParameter" or variability in ("fixed", "tunable"):
         return _CALCULATED

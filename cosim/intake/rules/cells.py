@@ -19,6 +19,8 @@ def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
         else:
             yield Finding("note", "gaps", topic.name, name, str(gaps))
     for name, held in topic.log.texts.items():
-        yield Finding("note", "reading", topic.name, name, f"holds text, {held.example!r} first")
+        text = held.fault or f"holds text, {held.example!r} first"
+        severity = "warning" if held.fault else "note"
+        yield Finding(severity, "reading", topic.name, name, text)
     for note in (*topic.log.notes, *topic.notes):
         yield Finding("note", "reading", topic.name, "", note)

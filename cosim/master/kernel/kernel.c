@@ -251,92 +251,102 @@ static Member *substep(Run *run, Member *m, int64_t code, int *status) {
 
 #include "newton.c"
 
-/* Instructions from first to before last; 0 or the status that ended them. */
+/* Instructions from first to before last; 0 or the status that ended them.
+
+   Each operation jumps to the next one by itself: so the processor foretells each jump from where it
+   is, and operations that cannot fail ask for no status. */
 static int execute(Run *run, int64_t first, int64_t last) {
-  const Instruction *const end = run->instructions + last;
+  static const void *const operations[] = {
+    [EXTERNAL] = &&external, [RECORD] = &&recorded, [COPY] = &&copy, [SCALE] = &&scale, [CALL2] = &&called2,
+    [CALL3] = &&called3, [CONVERT_SET] = &&converted, [CONVERT_GET] = &&converted, [STEP2] = &&stepped2,
+    [STEP3] = &&stepped3, [ENERGY] = &&energy, [SOLVE] = &&solved, [NOTE] = &&note,
+    [EXTRAPOLATE] = &&extrapolated, [SUBSTEP] = &&substepped, [HOLD] = &&hold,
+    [SET_DERIVATIVES] = &&derivatives, [WATCHED2] = &&watched2, [WATCHED3] = &&watched3,
+  };
+  const Instruction *in = run->instructions + first, *const end = run->instructions + last;
   Call *const calls = run->calls, *call = 0;
   Member *const members = run->members, *member = 0;
   const double now = run->now, size = run->size;
   const Derivatives *refused = 0;
-  for (const Instruction *in = run->instructions + first; in < end; in++) {
-    int status = 0;
-    switch (in->operation) {
-    case EXTERNAL:
-      for (int64_t i = 0; i < run->n_external; i++)
-        run->values[run->external_slot[i]] = run->external[run->index * run->n_external + i];
-      break;
-    case RECORD:
-      status = record(run);
-      break;
-    case COPY:
-      copy_plain(run->copies + in->first, run->copies + in->last, run->values);
-      break;
-    case SCALE:
-      copy_scaled(run->copies + in->first, run->copies + in->last, run->values);
-      break;
-    case CALL2:
-      call = call2(run, calls + in->first, calls + in->last, &status);
-      break;
-    case CALL3:
-      call = call3(run, calls + in->first, calls + in->last, &status);
-      break;
-    case CONVERT_SET:
-    case CONVERT_GET:
-      call = call_converted(run, calls + in->first, calls + in->last, in->operation == CONVERT_SET, &status);
-      break;
-    case STEP2:
-      member = step2(run, members + in->first, members + in->last, now, size, 0, &status);
-      break;
-    case STEP3:
-      member = step3(run, members + in->first, members + in->last, now, size, 0, &status);
-      break;
-    case WATCHED2:
-      member = step2(run, members + in->first, members + in->last, now, size, 1, &status);
-      break;
-    case WATCHED3:
-      member = step3(run, members + in->first, members + in->last, now, size, 1, &status);
-      break;
-    case ENERGY:
-      if (in->first == 1) add_energy(run, 1);
-      else add_energy(run, 0);
-      break;
-    case SOLVE:
-      status = solve(run, run->loops + in->first);
-      if (FAILED(status)) return status; /* the instruction inside has said what failed */
-      break;
-    case NOTE:
-      for (int64_t i = 0; i < run->n_means; i++) {
-        double *const h = run->history + 4 * i;
-        h[3] = h[2];
-        h[2] = h[1];
-        h[1] = h[0];
-        h[0] = run->values[run->means[i].source];
-      }
-      break;
-    case HOLD:
-      for (int64_t i = 0; i < run->n_terms; i++) {
-        Term *const t = run->terms + i;
-        t->held = t->mean >= 0 ? run->average[t->mean] : run->values[t->input];
-      }
-      break;
-    case EXTRAPOLATE:
-      extrapolate(run, in->first, in->last);
-      break;
-    case SET_DERIVATIVES:
-      refused = set_derivatives(run, run->derivatives + in->first, run->derivatives + in->last, &status);
-      break;
-    case SUBSTEP:
-      member = substep(run, members + in->first, in->last, &status);
-      break;
-    }
-    if (FAILED(status)) {
-      run->failed_call = call ? call - calls : -1;
-      run->failed_member = member ? member - members : -1;
-      run->failed_derivatives = refused ? refused - run->derivatives : -1;
-      return status;
-    }
+  int status = 0;
+#define GO if (in < end) goto *operations[in->operation]; else return 0
+#define NEXT in++; GO
+#define UNLESS(failed) if (failed) goto stopped; NEXT
+  GO;
+external:
+  for (int64_t i = 0; i < run->n_external; i++)
+    run->values[run->external_slot[i]] = run->external[run->index * run->n_external + i];
+  NEXT;
+recorded:
+  status = record(run);
+  UNLESS(status);
+copy:
+  copy_plain(run->copies + in->first, run->copies + in->last, run->values);
+  NEXT;
+scale:
+  copy_scaled(run->copies + in->first, run->copies + in->last, run->values);
+  NEXT;
+called2:
+  call = call2(run, calls + in->first, calls + in->last, &status);
+  UNLESS(call);
+called3:
+  call = call3(run, calls + in->first, calls + in->last, &status);
+  UNLESS(call);
+converted:
+  call = call_converted(run, calls + in->first, calls + in->last, in->operation == CONVERT_SET, &status);
+  UNLESS(call);
+stepped2:
+  member = step2(run, members + in->first, members + in->last, now, size, 0, &status);
+  UNLESS(member);
+stepped3:
+  member = step3(run, members + in->first, members + in->last, now, size, 0, &status);
+  UNLESS(member);
+watched2:
+  member = step2(run, members + in->first, members + in->last, now, size, 1, &status);
+  UNLESS(member);
+watched3:
+  member = step3(run, members + in->first, members + in->last, now, size, 1, &status);
+  UNLESS(member);
+energy:
+  if (in->first == 1) add_energy(run, 1);
+  else add_energy(run, 0);
+  NEXT;
+solved:
+  if (FAILED(status = solve(run, run->loops + in->first)))
+    return status; /* the instruction inside has said what failed */
+  NEXT;
+note:
+  for (int64_t i = 0; i < run->n_means; i++) {
+    double *const h = run->history + 4 * i;
+    h[3] = h[2];
+    h[2] = h[1];
+    h[1] = h[0];
+    h[0] = run->values[run->means[i].source];
   }
-  return 0;
+  NEXT;
+hold:
+  for (int64_t i = 0; i < run->n_terms; i++) {
+    Term *const t = run->terms + i;
+    t->held = t->mean >= 0 ? run->average[t->mean] : run->values[t->input];
+  }
+  NEXT;
+extrapolated:
+  extrapolate(run, in->first, in->last);
+  NEXT;
+derivatives:
+  refused = set_derivatives(run, run->derivatives + in->first, run->derivatives + in->last, &status);
+  UNLESS(refused);
+substepped:
+  member = substep(run, members + in->first, in->last, &status);
+  UNLESS(member);
+stopped:
+  run->failed_call = call ? call - calls : -1;
+  run->failed_member = member ? member - members : -1;
+  run->failed_derivatives = refused ? refused - run->derivatives : -1;
+  return status;
+#undef GO
+#undef NEXT
+#undef UNLESS
 }
 
 /* Communication steps from run->index up to `last`; 0 or the status that ended it. */
