@@ -1,4 +1,4 @@
-"""What the diagnosed model is made of, so that it can be run."""
+"""What the diagnosed model is made of, so that users can run it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What could be missing: every effect of the catalogue that fits a balance of the system."""
+"""What could be missing: every effect of the catalogue that fits a balance of the system.
+
+Besides, fidelities of which a declared one is a limit, and delays of the log's columns.
+"""
 
 from __future__ import annotations
 
@@ -48,8 +51,9 @@ class Candidate:
 
     Attributes:
         instance: of the system.
-        component: of the instance.
-        effect, port: of the catalogue.
+        component: what the instance is (`dc_motor`); what verdicts call component is the instance.
+        effect: of the catalogue.
+        port: balance of the instance, or group of balances, at which it acts.
         text: one line about the effect.
         refinement: the fidelity that it stands for, None for an effect.
         shift: the delay of columns of the log that it stands for, None for what is in the system.
@@ -176,6 +180,8 @@ def element_of(port: str) -> tuple[str, int] | None:
 
 def _twins(problem: Problem) -> set[tuple[str, str]]:
     """Balances that stand for the same shaft as one on the other end of a power bond.
+
+    (Not the twins of a `Signature`, which do the same to first order.)
 
     What acts on a shaft is left to the end that gives the motion: there it enters the equation of
     motion itself, and not a tick later through the exchange.

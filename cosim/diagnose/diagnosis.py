@@ -56,11 +56,11 @@ def diagnose(
     without: Iterable[str] = (),
     law_at: str = "",
 ) -> Diagnosis:
-    """Close the loop on one data set.
+    """Calibrate, look for what is missing, and judge: all that `cosim diagnose` does on a data set.
 
     Args:
         problem: the declared system and its data.
-        out: folder for the FMUs with the effects.
+        out: folder for the FMUs with what was found, none are written if not given.
         say: told what is done.
         workers: threads, one per core if not given.
         without: effects that are left out of the catalogue, to see what it says of data that have

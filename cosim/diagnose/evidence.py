@@ -6,8 +6,8 @@ calibration absorbs, a set S explains
     1/2 b_S^T G_S^-1 b_S  nats,    G = E^T E,  b = E^T w,
 
 so the best of thousands of sets are known without a simulation, and a small law beside a hundred
-times larger one is found. What is first order in one law is not in the shapes: each shape of a law
-is a direction of its own, of which a set holds one at most.
+times larger one is found. A law is linear in its strength, not in its shape: each shape of a law is
+a direction of its own, and a set holds one shape of a law at most.
 """
 
 from __future__ import annotations

@@ -1,4 +1,11 @@
-"""Choices that were made early, reconsidered in the model with all effects.
+"""One law in the place of another: how winners are compared with what may do as well.
+
+    challenged     at the end of a round, its winner: simpler laws, its law elsewhere, close ones
+    reconsidered   after later rounds, the winners of earlier ones in the model with all effects
+    simplified     before the verdict, each law of a set with its special cases
+    elsewhere      likewise, the same law where it does nothing of its own beside the set's
+
+Nothing here is about the exchange of values between FMUs.
 
 Where several effects are missing, a round ends far from the noise whichever of them it adds, and
 rivals of the added one are not told apart by models that lack the rest. With the rest added they

@@ -43,8 +43,8 @@ def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
 def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
     """The run of the library in which two fitted models differ most, and by how much per channel.
 
-    The distance leaves out what calibration of the first model could take back in that run without
-    doing worse in the runs at hand.
+    It is chosen by what they differ by as they are. The distance leaves out what calibration of the
+    first model could take back in that run without doing worse in the runs at hand.
 
     Args:
         first, second: models fitted to the same runs.

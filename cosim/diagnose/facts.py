@@ -60,7 +60,8 @@ class Law:
     """An effect at a place, with its parameters as fitted in a model.
 
     Attributes:
-        effect, component, port, text: of the catalogue.
+        effect, text: of the catalogue.
+        component, port: instance of the system, and its balance.
         strength: name of the parameter whose value `absent` makes the law absent.
         absent: see there.
         values: its fitted parameters, the strength among them.
@@ -135,7 +136,7 @@ class Force:
     """A free curve of an unknown force at a place, of what a model leaves in one run.
 
     Attributes:
-        component, port, element, unit: where it enters.
+        component, port, element, unit: where it enters: instance, balance, element of a vector.
         driver, run: what it is a curve of, and of which run if that is time.
         explained: share of the run's excess over the noise that it takes away.
         evidence: log evidence against none [nats].

@@ -108,7 +108,7 @@ class Fitter(Judge):
         return result
 
     def judged(self, estimate: Estimate) -> Fitted:
-        """A fit with its model values."""
+        """An estimate with its model values, as a model that can be judged (effects: none yet)."""
         simulator = estimate.simulator
         names = [run.name for run in self.checking.runs if run.purpose != "identification"]
         if self._own is None:

@@ -61,7 +61,7 @@ class Judge:
         return bool(self.raw.chosen(self.purpose))
 
     def note(self, fitted: Fitted) -> None:
-        """Remember a fit if it is the best one of its set of effects."""
+        """Remember a fit if none of its set of effects is better (`memo.SETTLED`)."""
         self.memo.note(fitted, lambda model: self.fitting.cost(self.fit_data - model))
 
     def better(self, first: Fitted, second: Fitted) -> Gain:

@@ -1,4 +1,7 @@
-"""Fits of models whose runs begin with values that matter only once an effect is known."""
+"""Fits of models whose runs begin with values that matter only once an effect is known.
+
+Columns of the log that are late are another matter: `calibrate.checks.late`, `candidates.delays`.
+"""
 
 from __future__ import annotations
 

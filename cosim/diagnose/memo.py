@@ -37,7 +37,7 @@ class Memo:
         return self._fits.get(labels)
 
     def note(self, fitted: Fitted, cost: Callable[[Vector], float]) -> None:
-        """Keep a fit if it is better than the one known.
+        """Keep a fit unless it is worse than the one known by `SETTLED` or more.
 
         Args:
             fitted: the fit.

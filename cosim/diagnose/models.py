@@ -19,8 +19,9 @@ Vector = NDArray[np.float64]
 LEVEL = 0.01
 """Family-wise probability of naming an effect on data that lack none."""
 GATE = math.log(1.0 / LEVEL)
-"""Log likelihood that unused data must gain [nats]. The likelihood ratio of two fixed models has
-mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most the probability LEVEL."""
+"""Log likelihood that unused data must gain where two models are compared [nats]. The likelihood
+ratio of two fixed models has mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most
+the probability LEVEL. A verdict asks for more, by the number of candidates: `verdict.gate`."""
 GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks."""
 OPEN = 4.0
@@ -98,7 +99,7 @@ class Gate:
 
     @property
     def passed(self) -> bool:
-        """Whether the second is better."""
+        """Whether the second is better, with no other to choose from."""
         return self.gain > GATE and self.z > GATE_Z
 
 

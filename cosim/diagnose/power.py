@@ -17,7 +17,11 @@ POWER = 0.9
 
 
 def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
-    """Label -> smallest detectable strength, or why the effect cannot be seen."""
+    """Label -> smallest detectable strength, or why the effect cannot be seen.
+
+    Detected is what the score test tells from nothing and what is `MATERIAL`, in the shape that was
+    simulated; the gate on unused runs is not in it.
+    """
     tests = max(len(current.signatures), 1)
     needed = float(-ndtri(LEVEL / tests / 2) - ndtri(1 - POWER))
     table: dict[str, dict[str, Any]] = {}

@@ -16,13 +16,15 @@ class Round:
 
     Attributes:
         base: model that the round began with.
-        signatures: scored candidates, best first.
+        signatures: candidates scored on all identification runs, best first; neither twins nor
+            those put aside are among them.
         corrected: p value by label, corrected for their number.
         aside: labels of those that one run ruled out.
         fitted: refitted candidates, best first.
-        winner: accepted one.
+        winner: fit that unused runs want, None if there is none.
         open: whether more was so evidently missing that the choice waits for it.
-        probes: all candidates that were simulated, with the systems they were simulated in.
+        probes: all candidates that were simulated, also those put aside, with the systems they
+            were simulated in.
         quick: what the best quick fit gained on all runs [nats].
         near: candidates whose quick fits gained nearly as much.
         compared: effects of the model in which its winner was last compared with others; empty if

@@ -117,7 +117,7 @@ class Bench:
             return [t for found in pool.map(one, items) for t in found]
 
     def begun(self, candidates: Sequence[Candidate], *, thorough: bool = False) -> list[Trials]:
-        """Every candidate simulated once, at a typical strength.
+        """Every candidate simulated at a typical strength, or one at which it runs and shows.
 
         Elements of a vector are simulated together where each shows in channels of its own.
 

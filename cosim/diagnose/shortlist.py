@@ -24,8 +24,8 @@ SHARED = 0.5
 this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""
 EXTRA = 2
 """Where something is evidently missing, so many that gain more than the best one are refitted
-though not significant: the blocks' variance is then that of what is missing. Half as much will do
-where the model is far off."""
+though not significant: the blocks' variance is then that of what is missing. A gain of `SHARED`
+times the best one's will do where the model is far off."""
 
 
 def able(judge: Judge, current: Round) -> list[Signature]:

@@ -1,4 +1,7 @@
-"""What candidates do to the model values, and which of them are worth a closer look."""
+"""What candidates do to the model values, and which of them are worth a closer look.
+
+`docs/method.md` calls a signature a trace.
+"""
 
 from __future__ import annotations
 
@@ -86,7 +89,7 @@ class Signature:
 
 
 def unscored(probe: Probe) -> Signature:
-    """A candidate of which only fits are judged."""
+    """A candidate of which only fits are judged; they begin at its value, a typical strength."""
     nothing = np.zeros(0, dtype=np.float32)
     none = ScoreTest(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     return Signature(probe, probe.strength.span, nothing, nothing, none, 0.0)

@@ -73,7 +73,7 @@ def table_of(
 
 
 def candidates_of(rounds: Sequence[Round]) -> int:
-    """Number of distinct candidates that there were to choose from."""
+    """Number of candidates that there were to choose from; known twins count once."""
     return max((len(r.signatures) + len(r.aside) for r in rounds), default=0)
 
 

@@ -1,9 +1,11 @@
 """The verdict: a pure function of the table of models.
 
     bad_data         the data cannot be used
-    effect_found     the best set of laws stands up: unused runs want it, each of its laws is there
-                     and is missed if left out, and it leaves noise, or so little that no law does
-    confounded       so does another set that the data do not tell from it
+    effect_found     the best set of laws stands up: unused runs want it, each of its laws is there,
+                     is missed if left out and matters, and what it leaves is noise, or so little
+                     that it asks for no further law (`stands`)
+    confounded       it does, and the data do not tell another set from it that has no more laws,
+                     each of them there; the other set is not asked whether it stands up
     nothing_missing  no set stands up, and the declared model leaves noise
     unexplained      anything else, with the nearest laws as hints; a hint is not a name
 
@@ -65,7 +67,9 @@ def decide(table: Table) -> Verdict:
 
 
 def proposal(table: Table) -> int | None:
-    """The best set of those that unused runs want and whose laws are all there and missed.
+    """Place in the table of the best set that unused runs want, its laws all there and missed.
+
+    None if there is none. What it leaves is not asked here, see `stands`.
 
     A law whose other parameters show nothing gives way to its special case, and several laws to
     fewer that the data do not tell from them: two sensors that are late by as much are one late
@@ -166,6 +170,10 @@ def stands(table: Table, place: int) -> bool:
     That is: its RMS is a tenth of what was explained, and no more in unused runs than in fitted
     ones; no free force at a port would have left less of the declared model's rest, and none
     explains half of its own.
+
+    Args:
+        table: of all models.
+        place: of the set in it.
     """
     model, declared = table.models[place], table.models[0]
     if not above(model):
