@@ -131,7 +131,7 @@ def test_isolated_runs_survive_anything(
 ) -> None:
     if (mode, how) == ("hang", "fork"):
         pytest.skip("a guard has no time limit")
-    begin = time.monotonic()
+    before, begin = children(), time.monotonic()  # tests that came before may have workers left
     with pytest.raises(StepError, match=text) as caught:
         Master(pair(faulty, mode), step=0.1, executor=executor, **HOW[how]).run(1.0)
     assert time.monotonic() - begin < 30.0  # 1 s of waiting, the rest is the start of Python
@@ -139,7 +139,7 @@ def test_isolated_runs_survive_anything(
     assert caught.value.time == pytest.approx(0.4 if mode == "nan" else 0.3)
     assert recording is not None
     np.testing.assert_allclose(recording["good.y"], [0.0, 0.1, 0.2, 0.3], atol=1e-12)
-    assert not children()
+    assert children() <= before
 
 
 def test_isolated_runs_give_the_same_bits(faulty: Path, provider) -> None:
