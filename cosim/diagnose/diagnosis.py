@@ -37,7 +37,7 @@ from .result import PURPOSES, Diagnosis
 from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of
-from .together import together
+from .together import ahead, together
 from .unstable import ends
 from .verdict import above, decide, proposal, unasked
 from .whiteness import WhitenessTest, whiteness_tests
@@ -155,7 +155,7 @@ def _searched(
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
-        if stage.open and not proposed:
+        if stage.open and not proposed and ahead(search):
             proposed, found = True, _together(result, current)
             if found is not current and not search.lacking(found):
                 whole = found

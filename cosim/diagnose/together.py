@@ -38,6 +38,9 @@ the best family that are: first orders leave errors of a per cent, within which 
 nearly it (friction, friction that falls with speed) change places."""
 TURNS = 2
 """Times that sets are proposed, the second time with the parameters of a better set."""
+AHEAD = 1000
+"""Laws times runs up to which sets are compared before the rounds: a round simulates about as many
+runs. A motor has some 400, an arm and a base with arm 1400 and more, of ten times the cost each."""
 BEYOND = 0.02
 """Share of what a model leaves beyond noise that a better set must take from it."""
 ROUGHLY = Effort("near", "draft", share=QUICKLY)
@@ -66,6 +69,15 @@ class Draft:
             n: v for n, v in self.held.items()
             if hints[n].cycles or hints[n].visits or hints[n].tries or hints[n].lattice
         }  # fmt: skip
+
+
+def ahead(search: Search) -> bool:
+    """Whether sets are compared as soon as a round ends far from the noise.
+
+    All laws are simulated in all fitted runs for that. Where these are many, rounds go on first,
+    and sets are only compared if they end with more than noise.
+    """
+    return len(search.known) * len(search.fitting.runs) <= AHEAD
 
 
 def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitted:
