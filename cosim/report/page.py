@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from ..diagnose import Diagnosis
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-LEAST_WIDTH = 0.62
-"""Of the drawing's own width, below which it scrolls instead of getting smaller."""
+LEAST_WIDTH, MOST_WIDTH = 0.62, 1.3
+"""Of the drawing's own width, below which it scrolls instead of getting smaller; and above which
+the box of a system of one part would fill the screen."""
 
 
 def write_page(result: Diagnosis, path: Path) -> None:
@@ -149,7 +150,7 @@ def _drawing(material: Material, facts: Facts) -> Html:
     return join(
         tag("h2", "Where in the system"),
         tag("div", Html(drawn), class_="drawing", tabindex="0",
-            style=f"--least:{LEAST_WIDTH * width:.0f}px"),
+            style=f"--least:{LEAST_WIDTH * width:.0f}px;--most:{MOST_WIDTH * width:.0f}px"),
         tag("ul", *(tag("li", tag("b", mark), text) for mark, text in legend), class_="legend")
         if legend else tag("p", "Boxes are parts of the model, lines are what they exchange.",
                            class_="note"),
