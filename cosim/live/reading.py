@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ..calibrate.parts import MeasuredRun
 from ..calibrate.problem import Problem
 from ..data.signals import Table
 from ..errors import InputError, ScenarioError, UnknownNameError, listing
+from ..files import read_toml
 from ..installation import places
 from ..master.master import Master
 from ..master.twin import Twin
@@ -264,6 +265,19 @@ def read_calibrated(path: Path | str) -> dict[str, float]:
         ) from error
 
 
+def _data(content: Any) -> Iterator[str]:
+    """Folders that a scenario takes columns from."""
+    if isinstance(content, list):
+        for item in content:
+            yield from _data(item)
+    elif isinstance(content, dict):
+        for key, value in content.items():
+            if key == "data" and isinstance(value, str):
+                yield value
+            else:
+                yield from _data(value)
+
+
 def read_reading(
     name: Path | str,
     *,
@@ -274,7 +288,8 @@ def read_reading(
     """The reading of a data set, or of a scenario that has one.
 
     Args:
-        name: folder of the data set; or a scenario of the library with one set in its `data`.
+        name: folder of the data set; or a scenario of the library, for the set in its `data` that
+            it is compared with.
         mapping: a `dataset.toml`, looked for if not given.
         calibrated: file of `cosim calibrate` with values of the parameters.
         variants: changes of the system, as of `cosim run --set`.
@@ -286,6 +301,9 @@ def read_reading(
     if not folder.is_dir():
         place = places.scenarios() / str(name)
         sets = sorted(place.glob("data/*/set.toml"))
+        if len(sets) > 1:
+            own = set(_data(read_toml(place / "scenario.toml")))
+            sets = [file for file in sets if file.parent.relative_to(place).as_posix() in own]
         if len(sets) != 1:
             known = {p.parents[2].name for p in places.scenarios().glob("*/data/*/set.toml")}
             raise UnknownNameError(

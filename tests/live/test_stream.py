@@ -434,6 +434,11 @@ def test_a_mapping_that_looks_ahead_is_refused(reading, tmp_path: Path) -> None:
         read_reading(tmp_path / "disc")
 
 
+def test_a_scenario_is_followed_by_the_set_that_it_is_compared_with() -> None:
+    """Of the two that lie in its `data`."""
+    assert read_reading("motor_bench").problem.name == "MB-12"
+
+
 def test_an_unknown_set_is_refused_with_near_names() -> None:
     with pytest.raises(UnknownNameError, match="'motor_bench'"):
         read_reading("motor_bensch")
