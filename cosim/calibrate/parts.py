@@ -249,6 +249,21 @@ class Target(NamedTuple):
     factor: float
     least: float | None
 
+    def of(self, values: Sequence[float]) -> float:
+        """Its value, where the parameters have these."""
+        value = values[self.place]
+        return self.factor * (value if self.least is None else 1.0 / max(value, self.least))
+
+
+def targets_of(parameters: Sequence[Parameter], run: str | None = None) -> list[Target]:
+    """What parameters set, those of all runs and of this one; of any run if none is given."""
+    return [
+        Target(name, index, factor, p.minimum if p.inverse else None)
+        for index, p in enumerate(parameters)
+        if run is None or p.run in ("", run)
+        for name, factor in p.targets
+    ]
+
 
 class Assigned(NamedTuple):
     """What is set in one run, sorted once for thousands of simulations.
@@ -277,12 +292,7 @@ class Assigned(NamedTuple):
         given: Mapping[str, float],
     ) -> Assigned:
         """What these parameters set, over what is known of variables and given of clocks."""
-        targets = [
-            Target(name, index, factor, p.minimum if p.inverse else None)
-            for index, p in enumerate(parameters)
-            if p.run in ("", run.name)
-            for name, factor in p.targets
-        ]
+        targets = targets_of(parameters, run.name)
         return cls(
             run,
             {name: value for name, value in known.items() if not name.startswith(CLOCK)},
@@ -303,10 +313,7 @@ class Assigned(NamedTuple):
         if not targets:
             return {}
         values = theta.tolist()
-        return {
-            name: factor * (values[index] if least is None else 1.0 / max(values[index], least))
-            for name, index, factor, least in targets
-        }
+        return {target.name: target.of(values) for target in targets}
 
 
 class Sensitivity(NamedTuple):

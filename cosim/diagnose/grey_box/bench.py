@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity, Target
+from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity, Target, targets_of
 from ...calibrate.problem import Problem
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError, UnknownNameError, VariantError, listing
@@ -103,10 +103,9 @@ class LawProblem(Problem):
     def _coefficients(self) -> tuple[Target, ...]:
         """What sets them, in order."""
         return tuple(
-            Target(name, index, factor, p.minimum if p.inverse else None)
-            for index, p in enumerate(self.parameters)
-            if p.targets[0][0].startswith(self.coefficient)
-            for name, factor in p.targets
+            target
+            for target in targets_of(self.parameters)
+            if self.parameters[target.place].targets[0][0].startswith(self.coefficient)
         )
 
     def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
@@ -115,9 +114,8 @@ class LawProblem(Problem):
         found = super().values(theta, run)
         sums: dict[str, float] = {}
         values = theta.tolist()
-        for name, index, factor, least in self._coefficients:
-            value = values[index] if least is None else 1.0 / max(values[index], least)
-            sums[name] = sums.get(name, 0.0) + factor * value
+        for target in self._coefficients:
+            sums[target.name] = sums.get(target.name, 0.0) + target.of(values)
         for name, value in sums.items():
             if value == 0.0 and name not in self.constants:  # as the FMU has it
                 del found[name]
