@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.motor_plant import COUNT, Bench, Drive, draw, driven, drives
+from benchmarks.bench import Bench
+from benchmarks.motor_plant import COUNT, Drive, draw, driven, drives
 
 Vector = NDArray[np.float64]
 FIRST = datetime.date(2025, 1, 7)

@@ -18,6 +18,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from benchmarks.bench import Bench
+
 Vector = NDArray[np.float64]
 TICK = 5e-5
 COUNT = 2 * np.pi / 65536  # of the encoder [rad]
@@ -58,22 +60,8 @@ SHAPES: dict[str, tuple[float, float]] = {
 }  # fmt: skip
 """Name -> range of its shape; whole numbers for cycles per turn."""
 WHOLE = ("cogging", "torque_ripple")
-
-
-@dataclass(frozen=True)
-class Bench:
-    """One bench: its parameters, and one or two effects that its sheet does not declare."""
-
-    parameters: dict[str, float]
-    effect: str = "none"
-    size: float = 0.0
-    second: str = "none"
-    second_size: float = 0.0
-    shape: float = 0.0
-
-    def form(self, name: str) -> float:
-        """Shape of one of its effects, the usual one of an effect that it does not have."""
-        return self.shape if self.shape and self.effect == name else USUAL.get(name, 0.0)
+SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml"
+SECONDS = 5.0
 
 
 def draw(
@@ -137,12 +125,10 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
         return np.array([b.parameters[name] for b in benches])
 
     def size(name: str) -> Vector:
-        return np.array(
-            [b.size * (b.effect == name) + b.second_size * (b.second == name) for b in benches]
-        )
+        return np.array([b.of(name) for b in benches])
 
     def form(name: str) -> Vector:
-        return np.array([b.form(name) for b in benches])
+        return np.array([b.form(name, USUAL) for b in benches])
 
     resistance, k_t, eta, b = of("R_a"), of("K_t"), of("eta"), of("b")
     kp, ki, acc = of("Kp_v"), of("Ki_v"), of("acc_max")

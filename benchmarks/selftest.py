@@ -4,15 +4,17 @@
     python -m benchmarks.selftest --wide --repeats 4 --out out/wide
     python -m benchmarks.selftest --pairs 20 --repeats 0 --clean 0 --out out/pairs
     python -m benchmarks.selftest --wide --withheld --clean 0 --out out/withheld
+    python -m benchmarks.selftest --rig crawler --repeats 1 --clean 4 --out out/crawler
     python -m benchmarks.selftest --example DATASET --out out/mirror
 
 Every effect is put into rigs with other parameters and sizes; some of the data sets have none.
 Prints the confusion matrix, false alarms and the coverage of the 95 % intervals, and writes them as
 a table. An effect is hidden if what calibration cannot absorb of it stays below the least size that
 the diagnosis names; being quiet about it is right. With `--example` the data come from our own
-FMUs, for any rig that has a mapping. Of two effects in one bench, all that the data show must be
-named, and nothing else. With `--withheld` the catalogue lacks what the data have: another name is
-wrong, unless its law leaves the noise in runs that were not used.
+FMUs, for any rig that has a mapping. Of several effects in one bench, all that the data show must
+be named, and nothing else. With `--withheld`, and for a law that no catalogue has, another name is
+wrong unless it leaves the noise in runs that were not used (it counts as confounded then);
+`unexplained` is right.
 
 Each set's row is kept in `--out` as soon as it is there; the same command goes on after them.
 """
@@ -32,7 +34,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.motor_plant import EFFECTS, WHOLE, Bench, changes, draw, write_sets
+from benchmarks import crawler_plant, motor_plant
+from benchmarks.bench import Bench, Law
 from benchmarks.own_plant import Made, catalogue, example, made
 from cosim.calibrate.differences import jacobian
 from cosim.calibrate.mapping import read_problem
@@ -46,42 +49,55 @@ from cosim.files import atomic
 
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
-SHEET = Path(__file__).parents[1] / "scenarios/motor_bench/data/motor_bench.toml"
-PAIR = "two effects"
+PLANTS: dict[str, Any] = {"motor": motor_plant, "crawler": crawler_plant}
+"""Rigs that are played by code of their own, written from their sheets."""
+SHEET, SECONDS = motor_plant.SHEET, motor_plant.SECONDS
+SEVERAL = {2: "two effects", 3: "three effects"}
+QUIET = 1.1
+"""RMS over the noise up to which another law does what one does that the catalogue lacks."""
 EXTREME = 300.0
 """RMS over the noise from which an effect is made smaller: a machine that oscillates is no test."""
 
 
 def benches(
-    repeats: int, clean: int, seed: int, pairs: int = 0, *, wide: bool = False
+    repeats: int,
+    clean: int,
+    seed: int,
+    pairs: int = 0,
+    *,
+    triples: int = 0,
+    wide: bool = False,
+    plant: Any = motor_plant,
 ) -> list[Bench]:
-    """Effects at 0.5, 1 and 2 times their size, clean ones, and some with two effects.
+    """Effects at 0.5, 1 and 2 times their size, clean ones, and some with several effects.
 
     Args:
         repeats: benches of each effect.
         clean: benches without any.
         seed: of all that is drawn.
         pairs: benches with two effects.
+        triples: benches with three.
         wide: shapes are drawn over their whole range (`SHAPES`), and ripples are among the effects.
+        plant: the module that plays the rig.
     """
     random = np.random.default_rng(seed)
-    found = [draw(random) for _ in range(clean)]
-    kinds = [name for name in EFFECTS if name != "none" and (wide or name not in WHOLE)]
+    found = [plant.draw(random) for _ in range(clean)]
+    kinds = [name for name in plant.EFFECTS if name != "none" and (wide or name not in plant.WHOLE)]
     for name in kinds:
         for index in range(repeats):
-            found.append(draw(random, name, (1.0, 2.0, 0.5)[index % 3], wide=wide))
-    for _ in range(pairs):
-        first, second = random.choice(kinds, 2, replace=False).tolist()
-        sizes = random.choice([0.5, 1.0, 2.0], 2)
-        bench = draw(random, first, float(sizes[0]))
-        found.append(replace(bench, second=second, second_size=sizes[1] * EFFECTS[second][0]))
+            found.append(plant.draw(random, name, (1.0, 2.0, 0.5)[index % 3], wide=wide))
+    known = [name for name in kinds if plant.EFFECTS[name][1]]
+    for count in [2] * pairs + [3] * triples:
+        names = random.choice(known, count, replace=False).tolist()
+        sizes = random.choice([0.5, 1.0, 2.0], count)
+        bench = plant.draw(random, names[0], float(sizes[0]))
+        others = []
+        for name, size in zip(names[1:], sizes[1:], strict=True):
+            turned = plant.SHAPES.get(name, (0.0,))[0] < 0.0  # a direction has no usual value
+            shape = plant.draw(random, name).shape if turned else 0.0
+            others.append(Law(name, float(size) * plant.EFFECTS[name][0], shape))
+        found.append(replace(bench, others=tuple(others)))
     return found
-
-
-def parts(bench: Bench) -> list[Bench]:
-    """The bench with each of its effects alone."""
-    one = replace(bench, second="none", second_size=0.0)
-    return [one, replace(one, effect=bench.second, size=bench.second_size)]
 
 
 def over_noise(problem: Problem, change: Change, stack: SampleStack) -> Vector:
@@ -151,50 +167,57 @@ def judged(
     }  # fmt: skip
 
 
-def judged_pair(row: dict[str, Any], bench: Bench, sizes: list[float]) -> dict[str, Any]:
-    """The row of a bench with two effects: right if those that show are named, and no others."""
+def judged_several(
+    row: dict[str, Any], bench: Bench, sizes: list[float], names: dict[str, Any]
+) -> dict[str, Any]:
+    """The row of a bench with several effects: right if those that show are named, no others."""
     wanted = [
-        set(EFFECTS[part.effect][1])
-        for part, size in zip(parts(bench), sizes, strict=True)
+        set(names[law.name][1])
+        for law, size in zip(bench.laws, sizes, strict=True)
         if size >= MATERIAL
     ]
     named = row["named"]
     right = len(named) == len(wanted) and all(names & set(named) for names in wanted)
-    found = {"truth": PAIR, "pair": [bench.effect, bench.second], "right": right, "rival": right}
-    return {**row, **found, "sizes": [bench.size, bench.second_size], "shown": max(sizes)}
+    return {
+        **row, "truth": SEVERAL[len(bench.laws)], "right": right, "rival": right,
+        "laws": [[law.name, law.size, law.shape] for law in bench.laws], "sizes": sizes,
+        "shown": max(sizes),
+    }  # fmt: skip
 
 
 def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[str, Any]]:
-    """Rows of sets from the independent motor bench."""
+    """Rows of sets from a plant that shares no code with the components."""
+    plant = PLANTS[arguments.rig]
+    seconds = arguments.seconds or plant.SECONDS
     chosen = benches(
-        arguments.repeats, arguments.clean, arguments.seed, arguments.pairs, wide=arguments.wide
-    )
-    places = write_sets(folder, chosen, SHEET, arguments.seed, arguments.seconds)
-    alone = [part for bench in chosen for part in parts(bench)]
-    effects = iter(changes(alone, arguments.seed, arguments.seconds))
+        arguments.repeats, arguments.clean, arguments.seed, arguments.pairs,
+        triples=arguments.triples, wide=arguments.wide, plant=plant,
+    )  # fmt: skip
+    places = plant.write_sets(folder, chosen, plant.SHEET, arguments.seed, seconds)
+    alone = [part for bench in chosen for part in bench.alone()]
+    effects = iter(plant.changes(alone, arguments.seed, seconds))
     for number, (bench, place) in enumerate(zip(chosen, places, strict=True)):
-        both = [next(effects), next(effects)]
+        each = [next(effects) for _ in bench.alone()]
         if number < arguments.done:
             continue
         problem = read_problem(place)
-        size = shown(problem, bench.parameters, both[0])
+        sizes = [shown(problem, bench.parameters, change) for change in each]
+        accepted = plant.EFFECTS[bench.effect][1]
         without: set[str] = set()
         if arguments.withheld:
             known = {candidate.effect for candidate in catalogue(problem)}
-            without = known & {n for p in parts(bench) for n in EFFECTS[p.effect][1]}
+            without = known & {n for law in bench.laws for n in plant.EFFECTS[law.name][1]}
         result = diagnose(problem, workers=arguments.workers, without=without)
-        row = judged(result, bench.effect, bench.size, EFFECTS[bench.effect][1], bench.parameters)
-        row["shape"] = bench.shape
-        if bench.second != "none":
-            other = shown(problem, bench.parameters, both[1])
-            yield judged_pair(row, bench, [size, other])
-        else:
-            yield {**row, "shown": size}
+        row = judged(result, bench.effect, bench.size, accepted, bench.parameters)
+        row |= {"shape": bench.shape, "shown": sizes[0]}
+        if bench.effect != "none":
+            row["foreign"] = arguments.withheld or not accepted
+        yield row if not bench.others else judged_several(row, bench, sizes, plant.EFFECTS)
 
 
 def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[str, Any]]:
     """Rows of sets from our own FMUs."""
-    rig = example(example_set, arguments.seconds)
+    rig = example(example_set, arguments.seconds or SECONDS)
     jobs: list[tuple[Candidate | None, float]] = [(None, 0.0)] * arguments.clean
     for repeat in range(arguments.repeats):
         jobs += [(item, (1.0, 2.0, 0.5)[repeat % 3]) for item in catalogue(rig)]
@@ -224,6 +247,10 @@ def summary(rows: list[dict[str, Any]]) -> str:
         for row in mine:
             if truth == "none":
                 counts["other" if row["named"] else "right"] += 1
+            elif row.get("foreign") and row["shown"] >= MATERIAL:
+                near = "confounded" if row["left"] <= QUIET else "other"
+                quiet = "missed" if row["verdict"] == "nothing_missing" else "right"
+                counts[near if row["named"] else quiet] += 1
             elif not row["named"]:
                 counts["hidden" if row["shown"] < MATERIAL else "missed"] += 1
             elif row["verdict"] == "effect_found" and row["right"]:
@@ -258,12 +285,14 @@ def main() -> None:
     """Run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--example", type=Path, help="data set whose rig our own FMUs play; else the bench of "
-        "benchmarks/motor_plant.py, which shares nothing with them",
+        "--example", type=Path, help="data set whose rig our own FMUs play; else a plant of "
+        "--rig, which shares nothing with them",
     )  # fmt: skip
+    parser.add_argument("--rig", choices=list(PLANTS), default="motor", help="independent plant")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clean", type=int, default=20)
     parser.add_argument("--pairs", type=int, default=0, help="benches with two effects")
+    parser.add_argument("--triples", type=int, default=0, help="benches with three effects")
     parser.add_argument(
         "--wide", action="store_true", help="shapes of laws over their whole range, ripples too"
     )
@@ -271,7 +300,7 @@ def main() -> None:
         "--withheld", action="store_true", help="without the laws that the data have"
     )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--seconds", type=float, help="duration of the runs")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/selftest"))
     arguments = parser.parse_args()

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.motor_plant import Bench, write_sets
+from benchmarks.bench import Bench
+from benchmarks.motor_plant import write_sets
 from benchmarks.selftest import SHEET, benches
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.motor_plant import Bench, draw, write_sets
+from benchmarks.bench import Bench
+from benchmarks.motor_plant import draw, write_sets
 from benchmarks.own_plant import catalogue, example, made
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.motor_plant import Bench, draw, write_sets
+from benchmarks.bench import Bench
+from benchmarks.motor_plant import draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.localise import localise, regressed

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.motor_plant import Bench, draw, write_sets
+from benchmarks.bench import Bench
+from benchmarks.motor_plant import draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
 from cosim.cli.diagnose import _value

@@ -1,0 +1,324 @@
+"""A tracked robot written from its rig sheet alone, to make data sets with undeclared effects.
+
+It shares no code with the components: loads from static equilibrium, dry friction at each road
+wheel, steps of 50 us, many robots and runs at once as arrays. Effects are written down here once
+more, and some of them no catalogue has.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from benchmarks.bench import Bench
+
+Vector = NDArray[np.float64]
+STEP = 5e-5
+SAMPLE = 0.02
+COUNT = 2 * np.pi / 25600
+MASS, YAW_INERTIA, GRAVITY, LINEAR_BELOW = 15.0, 0.43, 9.81, 1e-3
+MARKERS = np.array([[0.0, 0.0], [0.19, 0.13], [0.19, -0.13], [-0.19, 0.13], [-0.19, -0.13]])
+CAMERA, SPEED_NOISE = 1e-4, 1.5e-3
+RAMP = 0.6  # from rest to speed and back [s]
+SHEET = Path(__file__).parents[1] / "scenarios/crawler_bench/data/crawler.toml"
+RIG = "crawler"
+SECONDS = 16.0
+DECLARED = {"r": (0.0541, 0.0559), "B": (0.275, 0.285), "a": (0.145, 0.175), "mu": (0.5, 0.8)}
+EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
+    "none": (0.0, ()),
+    "friction_asymmetry": (0.05, ("friction_asymmetry",)),
+    "friction_anisotropy": (0.15, ("friction_anisotropy",)),
+    "mass_shift_x": (6e-3, ("load_shift",)),
+    "mass_shift_y": (4e-3, ("load_shift",)),
+    "payload": (1.5, ("payload",)),
+    "left_radius": (3e-3, ("gain", "radius_offset")),
+    "encoders_late": (0.04, ("delay",)),
+    "left_encoder_late": (0.04, ("delay",)),
+    "camera_late": (0.06, ("delay",)),
+    "camera_skew": (2e-3, ("clock_skew",)),
+    "camera_scale": (2e-3, ("scale_error",)),
+    "marker_offset": (2e-3, ("marker_offset",)),
+    "slope": (0.03, ("floor_slope",)),
+    "cable": (4.0, ("cable_force",)),
+    "pivot_torque": (1.0, ("pivot_torque",)),
+    "patch": (0.3, ("low_friction_patch",)),
+    "belt_slip": (0.02, ()),
+    "sprocket_runout": (0.01, ("wheel_runout",)),
+    "one_marker_moved": (2e-3, ()),
+    "speed_friction": (0.3, ()),
+    "load_transfer": (0.15, ()),
+}
+"""Name -> size, and the names of the catalogue that are the same law; none: no catalogue has it.
+
+friction_asymmetry: the right track has mu (1 + d), the left mu (1 - d). friction_anisotropy: less
+across. payload: [kg] at (0.1, 0.06) m. slope, cable: [rad], [N] at x = -0.19 m, in a direction of
+the floor. pivot_torque: against turning, whatever the speed [N.m]. patch: friction is lower by
+this share within 0.5 m around (0.3, 0.2). belt_slip: a track is slower by this share of its speed
+times what it pulls over mu N. speed_friction: mu falls by this share per m/s of sliding.
+load_transfer: height of the mass centre [m] over which accelerations move the load.
+"""
+USUAL: dict[str, float] = {}
+WHOLE: tuple[str, ...] = ()
+SHAPES: dict[str, tuple[float, float]] = {
+    "encoders_late": (0.25, 4.0), "left_encoder_late": (0.25, 4.0), "camera_late": (0.25, 8.0),
+    "slope": (-np.pi, np.pi), "cable": (-np.pi, np.pi), "sprocket_runout": (-np.pi, np.pi),
+}  # fmt: skip
+"""Name -> range of its shape: factor on a lateness, direction or phase [rad]."""
+RUNS = (
+    ("SET1_1", (19.5, 0.0)), ("SET1_2", (0.0, 19.5)), ("SET2_1", (31.5, 12.2)),
+    ("SET2_2", (12.2, 31.5)), ("SET3_1", (30.9, 5.05)), ("SET3_2", (5.05, 30.9)),
+    ("TL_1", (-15.0, 15.0)), ("TR_1", (15.0, -15.0)), ("STR", (30.0, 29.0)),
+    ("SET4_1", (38.6, 4.98)), ("SET5_1", (45.9, 5.5)), ("SET5_2", (5.5, 45.9)),
+    ("TL_2", (-20.0, 20.0)), ("SLA", (25.0, 25.0)),
+)  # fmt: skip
+FITTED = ("SET1", "SET2", "SET3", "TL_1", "TR_1", "STR")
+
+
+def draw(
+    random: np.random.Generator, effect: str = "none", factor: float = 1.0, *, wide: bool = False
+) -> Bench:
+    """A robot with parameters within the sheet's bounds; directions are drawn anyway."""
+    values = {}
+    for name, (low, high) in DECLARED.items():
+        margin = 0.15 * (high - low)
+        values[name] = float(random.uniform(low + margin, high - margin))
+    low, high = SHAPES.get(effect, (0.0, 0.0))
+    shape = 0.0
+    if low < 0.0:
+        shape = float(random.uniform(low, high))
+    elif high and wide:
+        shape = float(np.exp(random.uniform(np.log(low), np.log(high))))
+    return Bench(values, effect, factor * EFFECTS[effect][0], shape)
+
+
+def profile(t: Vector, seconds: float) -> Vector:
+    """Share of the speed at times: smooth from rest within the ramp, and back at the end."""
+    rise = np.clip((t - 0.5) / RAMP, 0.0, 1.0)
+    fall = np.clip((seconds - 0.7 - t) / RAMP, 0.0, 1.0)
+    x = np.minimum(rise, fall)
+    return np.asarray(x * x * (3.0 - 2.0 * x))
+
+
+def speeds(t: Vector, seconds: float) -> tuple[Vector, Vector]:
+    """Speeds of the left and right sprockets [rad/s], one column per run of `RUNS`."""
+    share = profile(t, seconds)[:, None]
+    pairs = np.array([pair for _, pair in RUNS]) * 2 * np.pi / 60.0
+    swing = np.array([0.35 if name == "SLA" else 0.0 for name, _ in RUNS])
+    wave = swing * np.sin(2 * np.pi * 0.25 * t)[:, None]
+    return share * (pairs[:, 0] * (1.0 + wave)), share * (pairs[:, 1] * (1.0 - wave))
+
+
+def loads(weight: Vector, x: Vector, y: Vector, at_x: Vector, half: Vector) -> Vector:
+    """Load of each road wheel from equilibrium, (12, n): equal springs under a stiff body."""
+    side = np.repeat([1.0, -1.0], 6)[:, None]
+    return np.asarray(weight / 12.0 * (1.0 + x * at_x / np.mean(at_x**2, axis=0) + side * y / half))
+
+
+def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, Vector]:
+    """Markers and counted speeds at 50 Hz, without noise: name -> (times, runs x benches).
+
+    Args:
+        benches: individuals.
+        seconds: duration of each run.
+        starts: pose of each run at time 0, (runs, 3).
+    """
+    count, runs = len(benches), len(RUNS)
+
+    def of(name: str) -> Vector:
+        return np.tile([b.of(name) for b in benches], runs)
+
+    def form(name: str) -> Vector:
+        return np.tile([b.form(name, USUAL) for b in benches], runs)
+
+    def parameter(name: str) -> Vector:
+        return np.tile([b.parameters[name] for b in benches], runs)
+
+    def late(name: str) -> Vector:
+        factor = form(name)
+        return of(name) * np.where(factor > 0.0, factor, 1.0)
+
+    r, half, a, mu = parameter("r"), parameter("B") / 2, parameter("a"), parameter("mu")
+    at_x = np.linspace(-1.0, 1.0, 6)[:, None] * a
+    at_x = np.concatenate([at_x, at_x])
+    side = np.repeat([1.0, -1.0], 6)[:, None]
+    at_y = side * half
+    extra = of("payload")
+    mass = MASS + extra
+    x_g = of("mass_shift_x") + extra * 0.1 / mass
+    y_g = of("mass_shift_y") + extra * 0.06 / mass
+    inertia = YAW_INERTIA + extra * (0.1**2 + 0.06**2)  # small against the friction's torques
+    load = loads(mass * GRAVITY, x_g, y_g, at_x, half)
+    grip = mu * (1.0 - side * of("friction_asymmetry"))
+    across = 1.0 - of("friction_anisotropy")
+    slope, heading = of("slope"), form("slope")
+    pull, towards = of("cable"), form("cable")
+    push_x = mass * GRAVITY * slope * np.cos(heading), pull * np.cos(towards)
+    push_y = mass * GRAVITY * slope * np.sin(heading), pull * np.sin(towards)
+    pivot, patch, slip = of("pivot_torque"), of("patch"), of("belt_slip")
+    runout, phase = of("sprocket_runout"), form("sprocket_runout")
+    fading, height = of("speed_friction"), of("load_transfer")
+    ahead_l = late("encoders_late") + late("left_encoder_late")
+    ahead_r = late("encoders_late")
+    left_radius = 1.0 + of("left_radius")
+
+    steps = round(seconds / STEP)
+    fine = np.arange(steps + 1) * STEP
+    left, right = speeds(fine, seconds)
+
+    def driven(values: Vector, ahead: Vector) -> list[Vector]:
+        """Speeds of one side: each column is a run, read ahead by what the encoder is late."""
+        shift = np.rint(ahead / STEP).astype(int)
+        index = np.repeat(np.arange(runs), count)
+        return [values, shift, index]
+
+    table_l, table_r = driven(left, ahead_l), driven(right, ahead_r)
+
+    def at(table: list[Vector], step: int) -> Vector:
+        values, shift, index = table
+        return np.asarray(values[np.minimum(step + shift, steps), index])
+
+    pose = np.repeat(starts, count, axis=0).T.copy()
+    x, y, yaw = pose
+    v_x, v_y, rate = np.zeros(runs * count), np.zeros(runs * count), np.zeros(runs * count)
+    angle_l, angle_r = np.zeros(runs * count), np.zeros(runs * count)
+    pulled_l = pulled_r = a_x = a_y = np.zeros(runs * count)
+    every = round(SAMPLE / STEP)
+    kept: list[Vector] = []
+    for step in range(steps + 1):
+        if step % every == 0:
+            kept.append(np.array([x, y, yaw]))
+        w_l, w_r = at(table_l, step), at(table_r, step)
+        t_l, t_r = r * left_radius * w_l, r * w_r
+        if np.any(runout):
+            t_l = t_l * (1.0 + runout * np.cos(angle_l + phase))
+        if np.any(slip):
+            t_l, t_r = t_l * (1.0 - slip * pulled_l), t_r * (1.0 - slip * pulled_r)
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        # velocity of the mass centre is the state, in floor axes; contacts in body axes
+        f, s = v_x * cos + v_y * sin + rate * y_g, -v_x * sin + v_y * cos - rate * x_g
+        track = np.concatenate([np.tile(t_l, (6, 1)), np.tile(t_r, (6, 1))])
+        u = f - rate * at_y - track
+        w = s + rate * at_x
+        speed = np.sqrt(u * u + w * w)
+        n = load
+        if np.any(height):
+            f_a, s_a = a_x * cos + a_y * sin, -a_x * sin + a_y * cos
+            moved = -height * f_a / GRAVITY, -height * s_a / GRAVITY
+            n = loads(mass * GRAVITY, x_g + moved[0], y_g + moved[1], at_x, half)
+            n = np.maximum(n, 0.0)
+        m = grip
+        if np.any(fading):
+            m = m * (1.0 - fading * speed)
+        if np.any(patch):
+            there_x = x + at_x * cos - at_y * sin - 0.3
+            there_y = y + at_x * sin + at_y * cos - 0.2
+            m = m * (1.0 - patch * (there_x**2 + there_y**2 < 0.25))
+        share = m * n / np.maximum(speed, LINEAR_BELOW)
+        g_x, g_y = -share * u, -share * w * across
+        pulled = g_x.reshape(2, 6, -1).sum(axis=1)
+        if np.any(slip):
+            held = (mu * load).reshape(2, 6, -1).sum(axis=1)
+            pulled_l, pulled_r = pulled / held
+        sum_x, sum_y = pulled.sum(axis=0), g_y.sum(axis=0)
+        torque = np.sum((at_x - x_g) * g_y - (at_y - y_g) * g_x, axis=0)
+        torque = torque - pivot * np.tanh(rate / 0.02)
+        to_x, to_y = push_x[0] + push_x[1], push_y[0] + push_y[1]
+        arm = -0.19 - x_g, -y_g  # where the cable pulls
+        torque = torque + (arm[0] * (-push_x[1] * sin + push_y[1] * cos)
+                           - arm[1] * (push_x[1] * cos + push_y[1] * sin))  # fmt: skip
+        a_x = (sum_x * cos - sum_y * sin + to_x) / mass
+        a_y = (sum_x * sin + sum_y * cos + to_y) / mass
+        v_x, v_y, rate = v_x + STEP * a_x, v_y + STEP * a_y, rate + STEP * torque / inertia
+        # the origin of the body moves with its point
+        o_x = v_x + rate * (x_g * sin + y_g * cos)
+        o_y = v_y - rate * (x_g * cos - y_g * sin)
+        x, y, yaw = x + STEP * o_x, y + STEP * o_y, yaw + STEP * rate
+        angle_l, angle_r = angle_l + STEP * w_l, angle_r + STEP * w_r
+    poses = np.array(kept)  # (times, 3, runs x benches)
+    seen = _camera(poses, of("camera_skew"), late("camera_late"))
+    found = {}
+    scale = 1.0 + of("camera_scale")
+    for k, (m_x, m_y) in enumerate(MARKERS):
+        m_x = m_x + of("marker_offset") + (k == 2) * of("one_marker_moved")
+        cos, sin = np.cos(seen[:, 2]), np.sin(seen[:, 2])
+        found[f"m{k + 1}_x"] = scale * (seen[:, 0] + m_x * cos - m_y * sin)
+        found[f"m{k + 1}_y"] = scale * (seen[:, 1] + m_x * sin + m_y * cos)
+    # what is logged is the command, of which late encoders know an earlier part
+    for name, values in (("sprocket_speed_l", left), ("sprocket_speed_r", right)):
+        angle = np.vstack([np.zeros(runs), np.cumsum(values[:-1], axis=0) * STEP])[::every]
+        counts = np.floor(angle / COUNT)
+        found[name] = np.repeat(np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE,
+                                count, axis=1)  # fmt: skip
+    return found
+
+
+def _camera(poses: Vector, skew: Vector, late: Vector) -> Vector:
+    """Poses at the times that the camera's clock shows, in between linearly."""
+    times = np.arange(poses.shape[0]) * SAMPLE
+    if not np.any(skew) and not np.any(late):
+        return poses
+    seen = np.empty_like(poses)
+    for column in range(poses.shape[2]):
+        when = times * (1.0 + skew[column]) - late[column]
+        for k in range(3):
+            seen[:, k, column] = np.interp(when, times, poses[:, k, column])
+    return seen
+
+
+def _starts(seed: int) -> Vector:
+    """Start poses of the runs."""
+    random = np.random.default_rng([seed, 2])
+    return np.asarray(random.uniform([-0.1, -0.1, -np.pi], [0.1, 0.1, np.pi], (len(RUNS), 3)))
+
+
+def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:
+    """What each robot's effects change, without noise: run -> channel -> values."""
+    twins = [Bench(bench.parameters) for bench in benches]
+    values = simulate([*benches, *twins], seconds, _starts(seed))
+    count = 2 * len(benches)
+    return [
+        {
+            run: {
+                name: table[:, k * count + column] - table[:, k * count + column + len(benches)]
+                for name, table in values.items() if name.startswith("m")
+            }
+            for k, (run, _) in enumerate(RUNS)
+        }
+        for column in range(len(benches))
+    ]  # fmt: skip
+
+
+def write_sets(
+    folder: Path, benches: list[Bench], sheet: Path, seed: int, seconds: float
+) -> list[Path]:
+    """Write one data set per robot, with the sheet's noise; return their folders."""
+    random = np.random.default_rng([seed, 1])
+    starts = _starts(seed)
+    values = simulate(benches, seconds, starts)
+    names = ["sprocket_speed_l", "sprocket_speed_r"]
+    names += [f"m{k}_{axis}" for k in range(1, 6) for axis in "xy"]
+    places = []
+    for column, _ in enumerate(benches):
+        place = folder / f"{RIG}_{column:03d}"
+        (place / "runs").mkdir(parents=True, exist_ok=True)
+        listed = ", ".join(f'"{n}"' for n in ["time", *names])
+        text = (f'rig = "{RIG}"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
+                f"sample_rate_hz = 50\ncolumns = [{listed}]\n")  # fmt: skip
+        for k, (run, _) in enumerate(RUNS):
+            table = {"time": np.arange(values["m1_x"].shape[0]) * SAMPLE}
+            for name in names:
+                clean = values[name][:, k * len(benches) + column]
+                sigma = CAMERA if name.startswith("m") else SPEED_NOISE
+                table[name] = clean + sigma * random.standard_normal(clean.size)
+            pd.DataFrame(table).to_parquet(place / "runs" / f"{run}.parquet")
+            near = starts[k] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
+            purpose = "identification" if run.startswith(FITTED) else "validation"
+            text += (f'\n[[run]]\nname = "{run}"\nfile = "runs/{run}.parquet"\n'
+                     f'purpose = "{purpose}"\nduration_s = {seconds}\n'
+                     f"initial_pose = {[round(float(v), 4) for v in near]}\n")  # fmt: skip
+        (place / "set.toml").write_text(text, encoding="utf-8")
+        places.append(place)
+    return places
