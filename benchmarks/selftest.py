@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import crawler_plant, motor_plant
+from benchmarks import crawler_plant, motor_plant, omni_plant
 from benchmarks.bench import Bench, Law
 from benchmarks.own_plant import Made, catalogue, example, made
 from cosim.calibrate.differences import jacobian
@@ -49,7 +49,9 @@ from cosim.files import atomic
 
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
-PLANTS: dict[str, Any] = {"motor": motor_plant, "crawler": crawler_plant}
+PLANTS: dict[str, Any] = {
+    "motor": motor_plant, "crawler": crawler_plant, "omni": omni_plant
+}  # fmt: skip
 """Rigs that are played by code of their own, written from their sheets."""
 SHEET, SECONDS = motor_plant.SHEET, motor_plant.SECONDS
 SEVERAL = {2: "two effects", 3: "three effects"}
@@ -157,9 +159,10 @@ def judged(
             away[name] = round((last["value"] - truth[name]) / max(0.5 * (high - low), 1e-300), 3)
     left = [channel["after"].get("validation") for channel in table["channels"].values()]
     over = [c["noise_rms"] for c in table["channels"].values()]
+    sizes = [a / b for a, b in zip(left, over, strict=True) if a is not None]
     return {
         "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
-        "left": round(max(a / b for a, b in zip(left, over, strict=True) if a is not None), 3),
+        "left": round(max(sizes), 3) if sizes else None,
         "right": bool(named) and bool(set(names) & {named[0], *same}),
         "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
         "half_intervals_off": away,

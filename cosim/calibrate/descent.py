@@ -70,6 +70,7 @@ class Descent:
         self.loss: Loss = Squares()
         self.uneven = False
         self.promised = math.inf
+        self.unkept = 0.0
         self.damping = FIRM
         self.begun = simulator.evaluations if begun is None else begun
         self.drawn = drawn(problem)
@@ -208,7 +209,10 @@ class Descent:
             self.jacobian = known.extended(self.simulator, self.theta, self.purpose)
             normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
             before = self.cost
-            if self.settle(normal, 1, damping) or before - self.cost <= self.enough(share):
+            settled = self.settle(normal, 1, damping)
+            fall = before - self.cost
+            self.unkept = 0.0 if settled else max(self.promised - fall, 0.0)
+            if settled or fall <= self.enough(share):
                 return
             damping = max(0.1 * self.damping, FIRM)
 

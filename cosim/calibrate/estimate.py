@@ -17,7 +17,7 @@ from .normal import BOUNDS, KNOWN, WIDER, Normal, cost_of
 from .parts import Sensitivity
 from .problem import Problem
 from .simulator import Simulator
-from .valley import profiled
+from .valley import profiled, stretch
 from .weak import WEAK, confirmed
 
 Vector = NDArray[np.float64]
@@ -57,6 +57,7 @@ class Estimate:
         count: residuals.
         evaluations: simulated runs of the fit.
         jacobian, residuals: at the solution, by run.
+        unkept: what the last step of a quick fit promised and did not gain [nats]; it has stalled.
     """
 
     simulator: Simulator
@@ -73,6 +74,7 @@ class Estimate:
     evaluations: int
     jacobian: list[Sensitivity] = field(repr=False)
     residuals: list[tuple[str, Vector]] = field(repr=False)
+    unkept: float = 0.0
 
     @property
     def problem(self) -> Problem:
@@ -156,8 +158,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     white, correlated = np.diag(inverse) * spread, np.diag(sandwich)
     factor = np.sqrt(np.maximum(white, correlated) / np.maximum(correlated, 1e-300))
     known = sandwich * np.outer(factor, factor)
-    unknown = (turned[:, poor] * (spread / (values[poor] + BOUNDS))) @ turned[:, poor].T
-    wider = turned[:, poor] ** 2 @ (spread / (values[poor] + BOUNDS / WIDER**2))
+    unknown = spread * _open(values[poor], turned[:, poor], widths(problem))
+    wider = spread * np.diag(_open(values[poor], turned[:, poor], WIDER * widths(problem)))
     scaled = known + unknown
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
@@ -175,7 +177,13 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         # nuisance values of runs that were not fitted are no finding
         if float(np.sum(directions[concerned, i] ** 2)) > 0.5
     )
-    half = float(stdtrit(freedom, 0.975)) * np.sqrt(np.diag(covariance))
+    deviations = float(stdtrit(freedom, 0.975))
+    half = deviations * np.sqrt(np.diag(covariance))
+    ways = scaled - known
+    below, above = (
+        np.minimum(half, scale * (deviations * np.sqrt(np.diag(known)) + _rooms(run, ways, sign)))
+        for sign in (-1.0, 1.0)
+    )
     near = 1e-6 * scale
     at_bound = [
         p.name
@@ -186,8 +194,8 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         simulator=run.simulator,
         theta=run.theta,
         covariance=covariance,
-        low=np.maximum(run.theta - half, problem.lower),
-        high=np.minimum(run.theta + half, problem.upper),
+        low=np.maximum(run.theta - below, problem.lower),
+        high=np.minimum(run.theta + above, problem.upper),
         identifiable=determined(np.diag(covariance) / scale**2, np.diag(unknown), wider),
         combinations=combinations,
         at_bound=tuple(at_bound),
@@ -197,7 +205,42 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         evaluations=run.simulator.evaluations - run.begun,
         jacobian=run.jacobian,
         residuals=run.residuals,
+        unkept=run.unkept,
     )
+
+
+def widths(problem: Problem) -> Vector:
+    """How far apart the bounds of the parameters are, in spans: 1 for those of a sheet."""
+    return np.asarray((problem.upper - problem.lower) / problem.scale)
+
+
+def _open(values: Vector, directions: Vector, width: Vector) -> Vector:
+    """Covariance along directions that the data leave open: bounds are what is known there.
+
+    Args:
+        values: information of the data on each direction.
+        directions: in spans, as columns.
+        width: of the bounds [spans].
+    """
+    bounds = directions.T @ (directions * (BOUNDS / width**2)[:, None])
+    return np.asarray(directions @ np.linalg.pinv(np.diag(values) + bounds) @ directions.T)
+
+
+def _rooms(run: Descent, ways: Vector, sign: float) -> Vector:
+    """How far each parameter can go until one of those that make up for it meets its bound [spans].
+
+    Args:
+        run: at its minimum.
+        ways: covariance along what is open, whose columns say who makes up for whom.
+        sign: up or down.
+    """
+    p = run.problem
+    rooms = np.full(run.theta.size, np.inf)
+    for k in np.flatnonzero(np.diag(ways) > 0.0):
+        way = ways[:, k] / ways[k, k]
+        way[k] = 0.0
+        rooms[k] = stretch(p, run.theta, sign * way)
+    return rooms
 
 
 def determined(whole: Vector, bounds: Vector, wider: Vector) -> NDArray[np.bool_]:

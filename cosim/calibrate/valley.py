@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FmuCallError
 from .descent import Descent
 from .normal import KNOWN, Normal, gradient
+from .problem import Problem
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
@@ -114,18 +115,18 @@ def _followed(run: Descent, normal: Normal, k: int, claimed: float) -> tuple[flo
             best = way
             if told > SURE / claimed**2 or rise - floor > SEEN:
                 break
-        room = min(room, _stretch(run, side * way))
+        room = min(room, stretch(p, run.theta, side * way))
         if length >= room:
             break
         before, length = rise, min(2.0 * length, room)
     return (told, best) if told < SURE / claimed**2 else None
 
 
-def _stretch(run: Descent, way: Vector) -> float:
-    """How far a direction goes until a parameter that it moves meets its bound."""
-    p = run.problem
+def stretch(problem: Problem, theta: Vector, way: Vector) -> float:
+    """How far a direction goes until a parameter that it moves meets its bound [spans]."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        rooms = np.where(way > 0.0, p.upper - run.theta, p.lower - run.theta) / (way * p.scale)
+        rooms = np.where(way > 0.0, problem.upper - theta, problem.lower - theta)
+        rooms /= way * problem.scale
     return float(np.min(rooms, where=np.abs(way) > SHARED, initial=np.inf))
 
 

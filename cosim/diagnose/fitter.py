@@ -196,10 +196,12 @@ class Fitter(Judge):
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
             costs = [self.cost(simulator, theta) for theta in starts]
-            start = starts[int(np.argmin(costs))]
+            first, *rest = [starts[i] for i in np.argsort(costs, kind="stable")]
             if is_open(base.estimate):
-                start = self._doubled(simulator, start, min(costs), item.strength.name)
-            result = self.fitted(simulator, start, base.estimate)
+                first = self._doubled(simulator, first, min(costs), item.strength.name)
+            result = self.fitted(simulator, first, base.estimate)
+            if result.estimate.unkept > GATE:
+                result = self._elsewhere(simulator, rest, result)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
@@ -212,6 +214,21 @@ class Fitter(Judge):
         result.effects = (*base.effects, item.candidate)
         result.signature = item
         return result
+
+    def _elsewhere(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
+        """A fit with derivatives of its own from other starts, where a quick one has stalled.
+
+        The start of least cost may be it since it hardly has the effect, and derivatives of the
+        model without the effect may be those of limits that it meets and the machine does not.
+        """
+        best, before = stalled, stalled.estimate
+        for start in starts:
+            found = self.judged(fit(simulator, start, effort=DRAFT))
+            if found.estimate.robust < best.estimate.robust:
+                best = found
+            if found.estimate.robust < before.robust - before.unkept:
+                break
+        return best
 
     def _doubled(self, simulator: Simulator, theta: Vector, cost: float, name: str) -> Vector:
         """A place to begin with a larger strength, as long as that is better.

@@ -52,6 +52,9 @@ gains to first order are no rivals."""
 UNEVEN = 10.0
 """Runs that are farther off than this many times the mean square of the one that is least off do
 not choose candidates: linear signatures are wrong there, or an unstable moment decides."""
+TELLING = 0.5
+"""Share of what the model lacks that the runs must hold which choose candidates: what does nothing
+in them is not what is missing, or not most of it. One run, where it is in one."""
 ROUNDS = 4
 CHECK = "validation"
 
@@ -174,7 +177,7 @@ class Search(LateFitter):
         return Bench(simulator, base.estimate.theta, stack, model, residual, absorber, root, seen)
 
     def telling(self, base: Fitted) -> SampleStack:
-        """The run with most of what the model lacks; all, if no channel exceeds its noise.
+        """The fewest runs with `TELLING` of what the model lacks; all, if no channel exceeds noise.
 
         Where runs may turn unstable, those much farther off than others do not count: first orders
         say little there.
@@ -188,11 +191,14 @@ class Search(LateFitter):
             stack = SampleStack(self.raw, [run])
             vector = stack.vector([values])
             if any(s.structured for s in whiteness_tests(vector, stack)):
-                found.append((float(np.mean(vector**2)), vector.size, stack))
+                found.append((float(np.mean(vector**2)), vector.size, run))
         least = min((size for size, _, _ in found), default=0.0)
         most = UNEVEN * least if self.raw.unstable else np.inf
-        near = [(n * (size - 1.0), stack) for size, n, stack in found if size < most]
-        return max(near, key=lambda item: item[0])[1] if near else self.fitting
+        near = [(n * (size - 1.0), run) for size, n, run in found if size < most]
+        near.sort(key=lambda item: -item[0])
+        shares = np.cumsum([lack for lack, _ in near]) / max(sum(lack for lack, _ in near), 1e-300)
+        few = int(np.searchsorted(shares, TELLING)) + 1
+        return SampleStack(self.raw, [run for _, run in near[:few]]) if near else self.fitting
 
     def scored(self, base: Fitted) -> Round:
         """Score all candidates against a model's residual.
@@ -215,7 +221,8 @@ class Search(LateFitter):
             kept = worthy(signatures, stated)
             labels = {s.candidate.label for s in kept}
             aside = tuple(s.candidate.label for s in signatures if s.candidate.label not in labels)
-            self.say(f"run {stack.names[0]} leaves {len(kept)} of {len(signatures)} candidates")
+            runs = ", ".join(stack.names)
+            self.say(f"{runs}: {len(kept)} of {len(signatures)} candidates are left")
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
             self.evaluations += bench.evaluations

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 OFF = 1.5
-"""Mean square over the noise's above which a fit leaves something to explain."""
+"""Mean square over the noise's above which a fit leaves something to explain: before a shift, or
+else there is none to look for; after that of a column, or else it is not all that is wrong, and
+laws are asked, delays of columns among them."""
 REACH, PART = 64, 8
 """Samples by which columns are shifted, and the share of a run that this may take at most."""
 LEAVES = 0.2
@@ -54,11 +56,12 @@ def check_late(estimate: Estimate) -> Iterator[Finding]:
         |r(s)|^2 - r(s)' J (J' J)^-1 J' r(s)
 
     A shift that leaves less than `LEAVES` of its excess over the noise is tried in a fit. It is
-    named if that leaves less than `LEFT` of it: one number that takes n residuals of variance `OFF`
-    and more to within a tenth of the noise's 1 is not of chance (the excess has a deviation of
-    sqrt(2 / n)). A physical cause that shifts one column and does nothing else is the same in the
-    data, and is mended or let pass in the same way. All channels together are named only if they
-    come before the inputs, which no machine does: one that answers late is a machine.
+    named if that leaves less than `LEFT` of it, and of one column no more than `OFF`: one number
+    that takes n residuals of variance `OFF` and more to within a tenth of the noise's 1 is not of
+    chance (the excess has a deviation of sqrt(2 / n)). A physical cause that shifts one column and
+    does nothing else is the same in the data, and is mended or let pass in the same way. All
+    channels together are named only if they come before the inputs, which no machine does: one that
+    answers late is a machine.
     """
     problem = estimate.problem
     before = 2.0 * estimate.cost / max(estimate.count, 1)
@@ -79,10 +82,11 @@ def check_late(estimate: Estimate) -> Iterator[Finding]:
         if shift.excess > LEAVES or abs(shift.samples) < 0.25:
             continue
         late, after = _fitted(estimate, shift, steps[0])
-        if after - 1.0 > LEFT * (before - 1.0):
+        single = len(shift.channels) == 1
+        if (single and after > OFF) or after - 1.0 > LEFT * (before - 1.0):
             continue
         gain = f"the mean square over the noise's falls from {before:.3g} to {after:.3g}"
-        if len(shift.channels) == 1:
+        if single:
             name = problem.channels[shift.channels[0]].name
             text = (
                 f"is {'late' if late > 0 else 'early'} by {abs(late):.4g} s against the other "
