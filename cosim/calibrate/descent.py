@@ -37,12 +37,17 @@ RENEWALS, DRAFTED = 5, 3
 """Jacobians that a fit from close by takes at most, and that a draft takes."""
 FIRM = 1e-9
 """Damping of a Gauss-Newton step, relative to the information, with which a quick fit begins."""
-PARTS = (1.0, 0.3, 0.1)
-"""Shares of a step that are tried."""
+PARTS = (0.3, 0.1)
+"""Shares of a step that are tried where the whole step is none."""
+RESTORED = 3
+"""Steps after a step that has left a curved valley, to come back to its floor."""
 SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
+SHRUNK, SHORTEST, VALLEY = 0.1, 1e-4, 15
+"""Factor on the steps of differences where a quadratic keeps nothing, the shortest, over the span
+(below, what a solver's tolerance leaves is in the differences), and the Jacobians from then on."""
 LOWER = 1.0
 """Fall of the cost [nats] from which a point that was met on another errand is worth going to: the
 data prefer it by a factor of e, and fits end that near to their minima."""
@@ -149,28 +154,65 @@ class Descent:
         (self.theta, self.residuals, self.cost), self._met = self._met, None
         return True
 
-    def step(self, normal: Normal, damping: float) -> Vector:
+    def restored(self, normal: Normal, theta: Vector, damping: float) -> bool:
+        """Go there if it is better, or to where further steps with the same derivatives lead.
+
+        A step along a curved valley ends on its slope, which costs more than was gained; the
+        derivatives across it are good enough to come back down.
+        """
+        p, promised, before = self.problem, self.promised, math.inf
+        for _ in range(1 if p.unstable else 1 + RESTORED):
+            try:
+                residuals = self.simulator.residuals(theta, self.purpose)
+            except FmuCallError:
+                break
+            cost = self.total(theta, residuals)
+            if cost < self.cost:
+                self.theta, self.residuals, self.cost = theta, residuals, cost
+                return True
+            if not cost < before:
+                break
+            before = cost
+            slope = gradient(p, theta, self.jacobian, residuals, self.loss)
+            theta = self.step(normal, damping, theta, slope)
+        self.promised = promised
+        return False
+
+    def step(
+        self,
+        normal: Normal,
+        damping: float,
+        theta: Vector | None = None,
+        gradient: Vector | None = None,
+    ) -> Vector:
         """Damped Gauss-Newton step inside the bounds; `promised` says what it should gain.
 
         It goes to the minimum of the quadratic within the bounds: cutting off parameters that would
         leave them spoils the step along collinear ones.
+
+        Args:
+            normal: equations.
+            damping: relative to the mean information on a parameter.
+            theta, gradient: another point and the gradient there, if it is not that of `normal`.
         """
         p = self.problem
-        size = self.theta.size
+        theta = self.theta if theta is None else theta
+        gradient = normal.gradient if gradient is None else gradient
+        size = theta.size
         whole = normal.matrix + np.diag(BOUNDS * self.drawn)
-        gradient = normal.gradient - BOUNDS * self.drawn * (self.theta - p.nominal) / p.scale
+        gradient = gradient - BOUNDS * self.drawn * (theta - p.nominal) / p.scale
         ridge = damping * np.trace(whole) / size + 1e-9
         values, vectors = np.linalg.eigh(whole)
         # information taken off for jumps may leave a direction with none at all
         root = np.sqrt(np.maximum(values, 0.0) + ridge)
         along = (vectors.T @ gradient) / root
         change = vectors @ (along / root)
-        low, high = (p.lower - self.theta) / p.scale, (p.upper - self.theta) / p.scale
+        low, high = (p.lower - theta) / p.scale, (p.upper - theta) / p.scale
         if np.any(change < low) or np.any(change > high):
             matrix = root[:, None] * vectors.T
             change = lsq_linear(matrix, along, (low, high), method="bvls").x
         self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
-        return np.asarray(np.clip(self.theta + change * p.scale, p.lower, p.upper))
+        return np.asarray(np.clip(theta + change * p.scale, p.lower, p.upper))
 
     def descend(self, relative: float, limit: int, tolerance: float) -> None:
         """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
@@ -233,7 +275,9 @@ class Descent:
             if abs(self.promised) < SETTLED:
                 return True
             # a limit or a threshold is passed: the direction is right, but not so far
-            if not any(self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS):
+            if not (self.restored(normal, whole, damping) or any(
+                self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS
+            )):  # fmt: skip
                 for _ in range(SHORTER):
                     damping = self.damping = max(damping, 1e-7) * 30.0
                     if self.attempt(self.step(normal, damping)):
@@ -247,14 +291,24 @@ class Descent:
     def correct(self, *, draft: bool = False) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far.
 
+        Where no step keeps anything of what the quadratic promises, differences were too long for
+        what many parameters undo of each other: they are taken again, shorter. In the valley in
+        which that happens, more Jacobians are needed.
+
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
-        for _ in range(DRAFTED if draft else RENEWALS):
-            before = self.cost
-            normal = self.normal(STEPS[-1], central=not draft)
-            enough = self.enough(ROUGHLY if draft else EVEN)
-            if self.settle(normal, CORRECTIONS) or before - self.cost < enough:
+        size, left = STEPS[-1], DRAFTED if draft else RENEWALS
+        while True:
+            before, left = self.cost, left - 1
+            normal = self.normal(size, central=not draft)
+            if self.settle(normal, CORRECTIONS):
+                break
+            if before - self.cost < self.enough(ROUGHLY if draft else EVEN):
+                if draft or self.cost < before or size <= SHORTEST or self.problem.unstable:
+                    break
+                size, left = SHRUNK * size, VALLEY
+            elif not left:
                 break
         return normal
 

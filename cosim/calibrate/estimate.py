@@ -164,9 +164,10 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
         scaled = profiled(run, normal, scaled, vectors[:, doubtful])
-    covariance = scaled * np.outer(scale, scale)
     # any value between two of a lattice may do as well
-    covariance += np.diag([p.hints.lattice**2 / 12.0 for p in problem.parameters])
+    lattice = np.array([p.hints.lattice**2 / 12.0 for p in problem.parameters]) / scale**2
+    scaled += np.diag(lattice)
+    covariance = scaled * np.outer(scale, scale)
     variances, directions = np.linalg.eigh(scaled)
     combinations = tuple(
         Combination(
@@ -178,10 +179,10 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         if float(np.sum(directions[concerned, i] ** 2)) > 0.5
     )
     deviations = float(stdtrit(freedom, 0.975))
-    half = deviations * np.sqrt(np.diag(covariance))
-    ways = scaled - known
+    half = deviations * np.sqrt(np.diag(scaled))
+    own = deviations * np.sqrt(np.diag(known) + lattice)
     below, above = (
-        np.minimum(half, scale * (deviations * np.sqrt(np.diag(known)) + _rooms(run, ways, sign)))
+        scale * np.minimum(half, own + _rooms(run, scaled - known, half, sign))
         for sign in (-1.0, 1.0)
     )
     near = 1e-6 * scale
@@ -226,20 +227,20 @@ def _open(values: Vector, directions: Vector, width: Vector) -> Vector:
     return np.asarray(directions @ np.linalg.pinv(np.diag(values) + bounds) @ directions.T)
 
 
-def _rooms(run: Descent, ways: Vector, sign: float) -> Vector:
-    """How far each parameter can go until one of those that make up for it meets its bound [spans].
+def _rooms(run: Descent, ways: Vector, half: Vector, sign: float) -> Vector:
+    """How far each parameter can go until one of those that make up for it meets its bound.
 
     Args:
         run: at its minimum.
         ways: covariance along what is open, whose columns say who makes up for whom.
+        half: how far the data would let each go; all in spans.
         sign: up or down.
     """
-    p = run.problem
-    rooms = np.full(run.theta.size, np.inf)
+    rooms = np.full(half.size, np.inf)
     for k in np.flatnonzero(np.diag(ways) > 0.0):
-        way = ways[:, k] / ways[k, k]
+        way = sign * half[k] * ways[:, k] / ways[k, k]
         way[k] = 0.0
-        rooms[k] = stretch(p, run.theta, sign * way)
+        rooms[k] = half[k] * stretch(run.problem, run.theta, way)
     return rooms
 
 
