@@ -216,17 +216,13 @@ class Fitter(Judge):
         return result
 
     def _elsewhere(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
-        """A fit with derivatives of its own from other starts, where a quick one has stalled.
-
-        The start of least cost may be it since it hardly has the effect, and derivatives of the
-        model without the effect may be those of limits that it meets and the machine does not.
-        """
-        best, before = stalled, stalled.estimate
+        """The best fit from other starts, by derivatives taken there: those that stalled are of a
+        model without the effect, which may meet limits that the machine does not."""
+        best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:
             found = self.judged(fit(simulator, start, effort=DRAFT))
-            if found.estimate.robust < best.estimate.robust:
-                best = found
-            if found.estimate.robust < before.robust - before.unkept:
+            best = min(best, found, key=lambda f: f.estimate.robust)
+            if best.estimate.robust < enough:
                 break
         return best
 
