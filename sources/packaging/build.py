@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -150,18 +150,18 @@ def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
     identifier = variant.name.identifier
     template = native.model_source(variant.functions, variant.entries, identifier)
     fixed = native.c_files(fmi)
-    arguments = (variant.model, variant.functions, variant.entries)
-    describe = partial(
-        description.describe_fmi2 if fmi == 2 else description.describe_fmi3,
-        *arguments,
-        identifier=identifier,
-        name=str(variant.name),
-        **({"kind": "native"} if fmi == 2 else {}),
-    )
-    blank = describe(token="").decode()
+
+    def described(token: str) -> bytes:
+        arguments = (variant.model, variant.functions, variant.entries)
+        names = {"identifier": identifier, "name": str(variant.name), "token": token}
+        if fmi == 2:
+            return description.describe_fmi2(*arguments, **names, kind="native")
+        return description.describe_fmi3(*arguments, **names)
+
+    blank = described("").decode()
     token = _token(template, *(fixed[name] for name in sorted(fixed)), blank)
     source = native.with_token(template, token)
-    files = {"modelDescription.xml": describe(token=token)}
+    files = {"modelDescription.xml": described(token)}
     if fmi == 3:
         files["sources/buildDescription.xml"] = description.build_description(identifier)
         if (terminals := description.terminals(variant.model)) is not None:
