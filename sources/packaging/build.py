@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -151,12 +151,13 @@ def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
     template = native.model_source(variant.functions, variant.entries, identifier)
     fixed = native.c_files(fmi)
 
+    describe: Callable[..., bytes] = description.describe_fmi3
+    if fmi == 2:
+        describe = partial(description.describe_fmi2, kind="native")
+
     def described(token: str) -> bytes:
         arguments = (variant.model, variant.functions, variant.entries)
-        names = {"identifier": identifier, "name": str(variant.name), "token": token}
-        if fmi == 2:
-            return description.describe_fmi2(*arguments, **names, kind="native")
-        return description.describe_fmi3(*arguments, **names)
+        return describe(*arguments, identifier=identifier, name=str(variant.name), token=token)
 
     blank = described("").decode()
     token = _token(template, *(fixed[name] for name in sorted(fixed)), blank)
