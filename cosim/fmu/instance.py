@@ -43,7 +43,7 @@ from .messages import STATUS, forget, new_key, status_name, tail, take
 from .surroundings import MODES, kept, modes
 
 Vector = NDArray[np.float64]
-WARNING = STATUS.index("warning")
+WARNING, FATAL = STATUS.index("warning"), STATUS.index("fatal")
 WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
 """How messages begin that are more than information."""
 
@@ -342,7 +342,7 @@ class Instance:
             self.changed(MODES, "a step")
         if status in (0, WARNING):
             status = self.binding.ending(time + size, size) or status
-        if moved is not None and moved.failed:
+        if moved is not None and moved.failed and status != FATAL:
             status = REFUSED
         if status:
             if status != WARNING:

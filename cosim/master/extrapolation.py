@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import need_table
 from ..errors import UnknownNameError, ValueRangeError, listing
+from ..fmu.description import Description, Variable
 from ..system.system import System
 from .plan import PARTS, Layout, Mean, Op
 
@@ -23,16 +24,16 @@ Rows = list[tuple[int, ...]]
 
 def smooth(system: System, layout: Layout) -> NDArray[np.bool_]:
     """Per copy, whether both ends are continuous in time."""
-
-    def continuous(full: str) -> bool:
-        found = system.declaration(full)
-        return found.type in ("Float64", "Float32") and found.variability == "continuous"
-
     ends = zip(layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True)
     return np.array(
-        [continuous(layout.names[a]) and continuous(layout.names[b]) for a, b in ends],
+        [all(continuous(system.declaration(layout.names[end])) for end in pair) for pair in ends],
         dtype=np.bool_,
     )
+
+
+def continuous(variable: Variable) -> bool:
+    """Whether a variable is a number that is continuous in time."""
+    return variable.type in ("Float64", "Float32") and variable.variability == "continuous"
 
 
 def means(
@@ -49,8 +50,7 @@ def means(
         raise ValueRangeError(f"extrapolation of order {order!r}: must be 0, 1 or 2")
     position = {name: index for index, name in enumerate(layout.instances)}
     rank = {name: index for index, name in enumerate(stepped or ())}
-    continuous = smooth(system, layout)
-    moving = {name: interpolates(system, name) for name in layout.instances}
+    followed = smooth(system, layout)
     bonded = set(layout.bond_input.tolist())
     found: list[Mean] = []
     spans: dict[int, tuple[int, int]] = {}
@@ -65,37 +65,40 @@ def means(
                 variable, description.dependencies.get(variable.rpartition("[")[0], ())
             )
             # an output with direct feedthrough is that of the inputs at the end if these move there
-            ahead = bool(rank) and rank[giver] < rank[name] and (moving[giver] or not passed)
-            if order and continuous[index]:
+            ahead = bool(rank) and rank[giver] < rank[name] and all_move(description, passed)
+            taker, target = system.members[name].description, int(layout.copy_target[index])
+            if order and followed[index]:
                 found.append(
                     Mean(
                         source,
-                        int(layout.copy_target[index]),
+                        target,
                         float(layout.copy_gain[index]),
                         float(layout.copy_offset[index]),
                         order,
                         ahead,
                         position[name],
-                        moving[name],
-                        int(layout.copy_target[index]) in bonded,
+                        taker.moves(taker.whole(layout.names[target][len(name) + 1 :])),
+                        taker.fmi == 2,
+                        target in bonded,
                     )
                 )
         spans[position[name]] = (begin, len(found))
     return found, spans
 
 
-def interpolates(system: System, instance: str) -> bool:
-    """Whether an instance's inputs can move within a step (FMI 2's canInterpolateInputs)."""
-    description = system.members[instance].description
-    return description.fmi == 2 and description.can("canInterpolateInputs")
+def all_move(description: Description, inputs: Sequence[str]) -> bool:
+    """Whether an FMU's inputs can move within a step; of FMI 3 those that are continuous."""
+    variables = [description.whole(name) for name in inputs]
+    return all(description.moves(v) for v in variables if description.fmi == 2 or continuous(v))
 
 
 def set_derivatives(
     found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int
 ) -> Rows:
-    """The operation that tells an instance how its inputs move, if it can use it."""
+    """The operation that tells an instance of FMI 2 how its inputs move, if it can use it."""
     first, last = spans[index]
-    return [(Op.SET_DERIVATIVES, first, last)] if first < last and found[first].moving else []
+    able = first < last and found[first].moving and found[first].told
+    return [(Op.SET_DERIVATIVES, first, last)] if able else []
 
 
 def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int]:

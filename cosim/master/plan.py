@@ -114,8 +114,9 @@ class Mean:
         order: of the polynomial.
         ahead: the source is at the end of the step already (interpolation).
         instance: whose input it is.
-        moving: the instance takes value and derivatives at the begin of the step; else it takes the
-            mean over the step, held.
+        moving: the instance follows value and derivatives at the begin of the step; else it takes
+            the mean over the step, held.
+        told: it is told the derivatives (FMI 2); else it asks for inputs within the step (FMI 3).
         bonded: the input belongs to a power bond, whose energy needs the mean in any case.
     """
 
@@ -127,6 +128,7 @@ class Mean:
     ahead: bool
     instance: int
     moving: bool
+    told: bool
     bonded: bool
 
 
