@@ -121,7 +121,8 @@ def test_arrays_and_single_precision_move_element_by_element(tmp_path: Path, exe
     ]
     step = """
       ask(m, t + 0.25 * h, false);
-      v->r[3][0] = v->r[0][0], v->r[3][1] = v->r[0][1], v->r[3][2] = v->r[1][0], v->r[3][3] = v->r[2][0];
+      v->r[3][0] = v->r[0][0], v->r[3][1] = v->r[0][1];
+      v->r[3][2] = v->r[1][0], v->r[3][3] = v->r[2][0];
     """
     clock = tiny(tmp_path, CLOCK, "v->r[0][0] = v->t;", name="clock")
     system = System("arrays")
@@ -162,9 +163,10 @@ def test_updates_against_the_standard_end_the_run(
 
 @EXECUTORS
 def test_what_the_standard_allows_is_no_error(tmp_path: Path, executor: str) -> None:
-    """The same time twice, back within what is not finished, both ends, and an end said to be early."""
+    """A time twice, back within what is not finished, both ends, an end that is called early."""
     step = """
-      ask(m, t + h, false), ask(m, t, false), ask(m, t + 0.5 * h, false), ask(m, t + 0.5 * h, false);
+      ask(m, t + h, false), ask(m, t, false);
+      ask(m, t + 0.5 * h, false), ask(m, t + 0.5 * h, false);
       v->r[1][0] = v->r[0][0];
       ask(m, t + h, true);
       v->soon = true, v->last = t + h;
@@ -271,7 +273,7 @@ def run_held(algorithm: str, options: dict[str, int]) -> Recording:
 
 def test_twins_of_version_3_return_and_fork() -> None:
     master = Master(drive(Built(3)), "gauss_seidel", 1e-3, options={"extrapolation": 2})
-    with Twin(master, inputs=INPUTS, record=SIGNALS) as twin:
+    with Twin(master, 0.02, inputs=INPUTS, record=SIGNALS) as twin:
         for _ in range(10):
             twin.step()
         saved = twin.save()
