@@ -73,6 +73,15 @@ def versions(system: System, folder: Path) -> dict[str, System]:
     }
 
 
+def inner(system: System, count: int) -> dict[str, int]:
+    """So many inner steps of all whose inputs cannot move."""
+    return {
+        name: count
+        for name, member in system.members.items()
+        if not any(member.description.moves(v) for v in member.description.of("input"))
+    }
+
+
 def cost(case: Case, algorithm: str, options: dict[str, Any], step: float) -> float:
     """Least processor time of a communication step [s]."""
     master = Master(case.system, algorithm, step, options=options)
@@ -98,8 +107,12 @@ def table(name: str, case: Case, folder: Path) -> None:
     print(f"  {'FMUs':<14s}{'step':>8s}{head}{'order':>7s}{'us/step':>9s}{'from FMI 2':>12s}")
     steps = [step for step in case.steps if step <= 2 * usual]
     second = {}
-    for label, system in versions(case.system, folder).items():
+    rows = [(label, system, 1) for label, system in versions(case.system, folder).items()]
+    rows += [(f"held, {count} inner", rows[-1][1], count) for count in (2, 4, 8)]
+    plain = dict(options)
+    for label, system, count in rows:
         other, last = replace(case, system=system), None
+        options = plain if count == 1 else {**plain, "inner_steps": inner(system, count)}
         for step in steps:
             values = run(other, algorithm, options, step, signals)[0].values
             apart = errors(case, signals, values, exact)

@@ -37,7 +37,7 @@ def asked_for(plan: Plan, system: System) -> list[list[Variable]]:
     """Per instance the whole inputs for which it may ask within a step."""
     found: list[dict[str, Variable]] = [{} for _ in plan.layout.instances]
     for mean in plan.means:
-        if mean.moving and not mean.told:
+        if mean.moving and not mean.told and mean.parts == 1:
             owner, _, name = plan.layout.names[mean.target].partition(".")
             variable = system.members[owner].description.whole(name)
             found[mean.instance][variable.name] = variable

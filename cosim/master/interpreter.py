@@ -19,7 +19,7 @@ from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from ..fmu.intermediate import Moved
-from .extrapolation import derivatives_at_begin, mean_of_step
+from .extrapolation import derivatives_at_begin, mean_of_part, mean_of_step
 from .input_derivatives import InputDerivatives, asked_for
 from .newton import Newton
 from .objects import ObjectPassing
@@ -242,6 +242,8 @@ class Interpreter:
                     self.extrapolate(index, self.plan.means[index])
             case Op.SET_DERIVATIVES:
                 self.derivatives.tell(a, b)
+            case Op.MOVE:
+                self.move(a, *divmod(b, PARTS))
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 time = self.instants[self.index] + part * self.step / parts
@@ -261,6 +263,13 @@ class Interpreter:
         self.values[mean.target] = past[0] * mean.gain + mean.offset
         self.derivatives.slope[index] = slope * mean.gain
         self.derivatives.curve[index] = curve * mean.gain
+
+    def move(self, index: int, parts: int, part: int) -> None:
+        """Let an input take its mean over a part of the step."""
+        mean, derivatives = self.plan.means[index], self.derivatives
+        begin = float(self.history[index, 0]) * mean.gain + mean.offset
+        slope, curve = float(derivatives.slope[index]), float(derivatives.curve[index])
+        self.values[mean.target] = mean_of_part(begin, slope, curve, self.step, parts, part)
 
     def record(self) -> None:
         """Keep observed values if it is their turn; note outputs for the energy of bonds.

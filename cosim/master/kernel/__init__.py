@@ -61,6 +61,7 @@ class _Code(IntEnum):
     SET_DERIVATIVES = 16
     WATCHED2 = 17
     WATCHED3 = 18
+    MOVE = 19
 
 
 _STEPS = {2: _Code.STEP2, 3: _Code.STEP3}

@@ -277,6 +277,15 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   }
 }
 
+/* An input takes its mean over a part of the step: see cosim/master/extrapolation.py. */
+static void move(Run *run, int64_t index, int64_t code) {
+  const Mean *m = run->means + index;
+  const double width = run->step / (double)(code / PARTS), middle = ((double)(code % PARTS) + 0.5) * width;
+  const double begin = run->history[4 * index] * m->gain + m->offset;
+  run->values[m->target] =
+      begin + middle * run->slope[index] + (0.5 * middle * middle + width * width / 24.0) * run->curve[index];
+}
+
 static const Derivatives *set_derivatives(Run *run, const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
     run->at = r;
@@ -305,6 +314,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
     [STEP3] = &&stepped3, [ENERGY] = &&energy, [SOLVE] = &&solved, [NOTE] = &&note,
     [EXTRAPOLATE] = &&extrapolated, [SUBSTEP] = &&substepped, [HOLD] = &&hold,
     [SET_DERIVATIVES] = &&derivatives, [WATCHED2] = &&watched2, [WATCHED3] = &&watched3,
+    [MOVE] = &&moved,
   };
   const Instruction *in = run->instructions + first, *const end = run->instructions + last;
   Call *const calls = run->calls, *call = 0;
@@ -379,6 +389,9 @@ extrapolated:
 derivatives:
   refused = set_derivatives(run, run->derivatives + in->first, run->derivatives + in->last, &status);
   UNLESS(refused);
+moved:
+  move(run, in->first, in->last);
+  NEXT;
 substepped:
   member = substep(run, members + in->first, in->last, &status);
   UNLESS(member);

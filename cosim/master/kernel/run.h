@@ -7,7 +7,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3 };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3, MOVE };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE, REFUSED, EARLY };
 enum { OUTSIDE = 1001 }; /* why an update was refused, beside UNFIT and statuses of FMI */
