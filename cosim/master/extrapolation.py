@@ -144,7 +144,7 @@ def inner_factors(
     found = factors(system, inner_steps, "inner_steps")
     if max(found.values(), default=1) > 1 and order == 0:
         raise ValueRangeError(
-            "inner_steps without extrapolation: held inputs stay; add extrapolation"
+            "inner_steps without extrapolation would move no input; add extrapolation = 1 or 2"
         )
     for name, parts in found.items():
         if parts > 1 and (substeps or {}).get(name, 1) > 1:

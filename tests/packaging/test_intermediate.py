@@ -174,3 +174,13 @@ def test_descriptions_say_so() -> None:
     for variable in root.iterfind("ModelVariables/*"):
         declared = variable.get("intermediateUpdate") == "true"
         assert declared == (variable.get("causality") == "input"), variable.get("name")
+
+
+def test_fmus_of_version_2_carry_nothing_of_it() -> None:
+    found = {}
+    for fmi in (2, 3):
+        with zipfile.ZipFile(fmu(NAME, fmi=fmi)) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".c")]
+            found[fmi] = "".join(archive.read(name).decode() for name in names)
+        assert "INTERMEDIATE" not in found[fmi]  # neither has both
+    assert "UPDATING" in found[3] and "UPDATING" not in found[2]
