@@ -48,13 +48,15 @@ static void outputs(Model *m) {
   OUTPUTS;
 }
 
-/* Ask for the inputs of time t within a step (FMI 3). */
-static void ask(Model *m, double t, bool finished) {
+/* Say within a step that it is at time t, with a wish for inputs or without (FMI 3). */
+static void tell(Model *m, double t, bool wanted, bool finished) {
   bool early = true;
   double when = -1;
-  if (m->update) m->update(m->environment, t, true, false, finished, false, &early, &when);
+  if (m->update) m->update(m->environment, t, wanted, false, finished, false, &early, &when);
   if (m->update && early) abort(); /* nobody wants this FMU to return early */
 }
+
+static void ask(Model *m, double t, bool finished) { tell(m, t, true, finished); }
 
 /* The same from another thread. */
 extern int pthread_create(unsigned long *, const void *, void *(*)(void *), void *) __attribute__((weak));

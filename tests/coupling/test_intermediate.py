@@ -194,6 +194,14 @@ def test_warnings_within_a_step_are_notes(tmp_path: Path, executor: str) -> None
 
 
 @EXECUTORS
+def test_who_wants_no_inputs_keeps_them(tmp_path: Path, executor: str) -> None:
+    step = "tell(m, t + 0.5 * h, false, false), tell(m, t + 9 * h, false, true);"
+    found = run(pair(tmp_path, taker(tmp_path, step + "v->r[1][0] = v->r[0][0];")), executor)
+    np.testing.assert_allclose(found["taker.y"][1:], found.time[:-1], rtol=1e-13, atol=1e-15)
+    assert found.notes == ()
+
+
+@EXECUTORS
 def test_an_environment_that_is_lost_is_nobodys(tmp_path: Path, executor: str) -> None:
     """Asked without the pointer, the master cannot know who asks: the input stays where it was."""
     step = "void *mine = m->environment; m->environment = 0; ask(m, t + h, false);"
