@@ -72,6 +72,8 @@ class Slave:
         initialize: bool = True,
         token: str | None = None,
         event_mode: bool = False,
+        update: Callable[..., None] | None = None,
+        required: Iterable[str] = (),
     ) -> None:
         self.description, folder = _unpacked(path)
         self.version = 3 if self.description.fmiVersion.startswith("3") else 2
@@ -111,6 +113,8 @@ class Slave:
             self.fmu = FMU3Slave(**arguments)
             self.fmu.instantiate(
                 eventModeUsed=event_mode,
+                intermediateUpdate=update,
+                requiredIntermediateVariables=[self.vr[name] for name in required],
                 logMessage=lambda _env, _status, _category, text: self.messages.append(
                     text.decode()
                 ),

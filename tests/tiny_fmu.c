@@ -19,12 +19,16 @@ typedef struct {
   char s[VARIABLES][TEXT];
   size_t length[VARIABLES];
   bool final, end, begun; /* final: noSetFMUStatePriorToCurrentPoint of the present step */
+  bool soon;    /* the step returns early, at `last` (FMI 3) */
+  int set_code; /* status of all set calls */
 } Values;
 
 typedef struct {
   Values v;
   void *environment;
   void (*log)();
+  void (*update)(void *, double, bool, bool, bool, bool, bool *, double *);
+  size_t required; /* number of inputs that the master sets within steps */
 } Model;
 
 typedef uint32_t Ref;
@@ -42,6 +46,35 @@ static void outputs(Model *m) {
   Values *v = &m->v;
   (void)v;
   OUTPUTS;
+}
+
+/* Say within a step that it is at time t, with a wish for inputs or without (FMI 3). */
+static void tell(Model *m, double t, bool wanted, bool finished) {
+  bool early = true;
+  double when = -1;
+  if (m->update) m->update(m->environment, t, wanted, false, finished, false, &early, &when);
+  if (m->update && early) abort(); /* nobody wants this FMU to return early */
+}
+
+static void ask(Model *m, double t, bool finished) { tell(m, t, true, finished); }
+
+/* The same from another thread. */
+extern int pthread_create(unsigned long *, const void *, void *(*)(void *), void *) __attribute__((weak));
+extern int pthread_join(unsigned long, void **) __attribute__((weak));
+typedef struct {
+  Model *m;
+  double t;
+} Question;
+static void *ask_it(void *question) {
+  const Question *const q = question;
+  ask(q->m, q->t, false);
+  return 0;
+}
+static void ask_in_thread(Model *m, double t) {
+  Question question = {m, t};
+  unsigned long thread;
+  if (pthread_create(&thread, 0, ask_it, &question)) abort();
+  pthread_join(thread, 0);
 }
 
 static int do_step(Model *m, double t, double h) {
@@ -71,7 +104,7 @@ static size_t size(Ref v) { return SIZE[v] ? SIZE[v] : 1; }
   EXPORT int set(Model *m, const Ref *v, size_t nv, const type *in LENGTH) { \
     for (size_t i = 0; i < nv; i++) \
       for (size_t k = 0; k < size(v[i]); k++) m->v.field[v[i]][k] = *in++; \
-    return 0; \
+    return m->v.set_code; \
   }
 
 static void keep(Model *m, Ref v, const void *text, size_t length) {
@@ -115,6 +148,8 @@ EXPORT Model *fmi3InstantiateCoSimulation(const char *n, const char *g, const ch
   Model *m = create();
   m->log = log;
   m->environment = environment;
+  m->update = (void (*)(void *, double, bool, bool, bool, bool, bool *, double *))update;
+  m->required = nr;
   return m;
 }
 EXPORT int fmi3EnterInitializationMode(Model *m, bool d, double tol, double start, bool has, double stop) {
@@ -127,7 +162,8 @@ EXPORT int fmi3DoStep(Model *m, double t, double h, bool final, bool *event, boo
   *event = *early = false;
   const int status = do_step(m, t, h);
   *end = m->v.end;
-  *last = m->v.end ? m->v.last : t + h;
+  *early = m->v.soon;
+  *last = m->v.end || m->v.soon ? m->v.last : t + h;
   return status;
 }
 NUMBERS(fmi3GetFloat64, fmi3SetFloat64, double, r)

@@ -54,6 +54,8 @@ class Variable:
         index: of an element of an array, its position among the array's values; else None.
         relative: a difference, so that the offset of its unit does not count (FMI 2's
             relativeQuantity).
+        intermediate: an FMU of FMI 3 lets its importer set or get it within a step
+            (intermediateUpdate).
         items: of an enumeration, what its values are called.
         alias: of an alias of FMI 3, the variable whose second name it is; else "".
     """
@@ -73,6 +75,7 @@ class Variable:
     dimensions: tuple[int, ...] = ()
     index: int | None = None
     relative: bool = False
+    intermediate: bool = False
     items: Mapping[int, str] | None = None
     alias: str = ""
 
@@ -162,6 +165,16 @@ class Description:
             capability.replace("Derivatives", "Derivative"),
         )
         return any(self.capabilities.get(spelling) in ("true", "1") for spelling in spellings)
+
+    def moves(self, variable: Variable) -> bool:
+        """Whether an input can be moved while a step is under way.
+
+        By derivatives that the FMU is told (FMI 2's canInterpolateInputs), or because it asks for
+        values (FMI 3's intermediateUpdate).
+        """
+        if self.fmi == 2:
+            return self.can("canInterpolateInputs")
+        return self.can("providesIntermediateUpdate") and variable.intermediate
 
     def of(self, causality: Causality) -> list[Variable]:
         """The variables of one causality, each under its first name."""
@@ -307,6 +320,7 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
                 text=element.get("description", ""),
                 dimensions=dimensions,
                 relative=types.get(element, "relativeQuantity") in _TRUE,
+                intermediate=element.get("intermediateUpdate") in _TRUE,
                 items=types.items(element) if type_ == "Enumeration" else None,
             )
         )

@@ -111,8 +111,15 @@ class Fmi2:
         self.free_ = library.fmi2FreeInstance
         self.free_.argtypes, self.free_.restype = [_P], None
 
-    def instantiate(self, fmu: Fmu, name: str, key: int, logging: bool) -> tuple[int | None, Any]:
-        """Create an instance; returns its address and what must be kept alive."""
+    def instantiate(
+        self, fmu: Fmu, name: str, key: int, logging: bool, moved: object
+    ) -> tuple[int | None, Any]:
+        """Create an instance; returns its address and what must be kept alive.
+
+        Args:
+            fmu, name, key, logging: as in `fmi3`.
+            moved: not used; FMI 2 is told derivatives of inputs.
+        """
         calloc, free = _allocator()
         callbacks = _Callbacks(LOGGER2, calloc, free, None, environment(key))
         proxy = _format_in_c(callbacks)
@@ -147,9 +154,9 @@ class Fmi2:
         return (int(final),)
 
     @staticmethod
-    def stopped() -> bool:
-        """Whether the last step ended the simulation (FMI 2 says so by its status)."""
-        return False
+    def ending(end: float, size: float) -> int:
+        """How the last step ended other than by its status: FMI 2 says all by that."""
+        return 0
 
     @staticmethod
     def reached() -> float | None:

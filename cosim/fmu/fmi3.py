@@ -6,7 +6,10 @@ import ctypes as ct
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
+
 from .archive import Fmu
+from .intermediate import Moved
 from .messages import LOGGER3, environment
 
 _P, _D, _S, _B, _Z = ct.c_void_p, ct.c_double, ct.c_char_p, ct.c_bool, ct.c_size_t
@@ -15,6 +18,11 @@ NUMERIC = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
     "Boolean",
 )  # fmt: skip
+SAME = 1e-9
+"""Part of a step by which the time that an FMU has reached may differ from the end of the step."""
+ENDED, EARLY = 1000, 1007
+"""Far from FMI's statuses: a step that asked to end the simulation; one that ended before its end
+although early returns are not allowed."""
 
 
 class Fmi3:
@@ -60,15 +68,27 @@ class Fmi3:
         self._event, self._stop, self._early = ct.c_bool(), ct.c_bool(), ct.c_bool()
         self._last = ct.c_double()
 
-    def instantiate(self, fmu: Fmu, name: str, key: int, logging: bool) -> tuple[int | None, Any]:
-        """Create an instance; returns its address and what must be kept alive."""
+    def instantiate(
+        self, fmu: Fmu, name: str, key: int, logging: bool, moved: Moved | None
+    ) -> tuple[int | None, Any]:
+        """Create an instance; returns its address and what must be kept alive.
+
+        Args:
+            fmu, name: whose, and its name.
+            key: of its messages; the address of `moved` if there is one.
+            logging: see `Instance`.
+            moved: inputs for which it may ask within steps.
+        """
         # The resource path ends with a separator, as the standard asks for.
         resources = str((fmu.folder / "resources").resolve() / "x")[:-1]
+        required = moved.references if moved is not None else np.zeros(0, dtype=np.uint32)
+        update = moved.callback if moved is not None else None
         address = self.instantiate_(
             name.encode(), fmu.description.token.encode(), resources.encode(), False, logging,
-            False, False, None, 0, environment(key), ct.cast(LOGGER3, _P), None,
+            False, False, required.ctypes.data if required.size else None, required.size,
+            environment(key), ct.cast(LOGGER3, _P), update,
         )  # fmt: skip
-        return address, None
+        return address, moved
 
     @staticmethod
     def enter_calls(
@@ -97,9 +117,16 @@ class Fmi3:
             ct.addressof(self._last),
         )
 
-    def stopped(self) -> bool:
-        """Whether the last step ended the simulation."""
-        return bool(self._stop.value)
+    def ending(self, end: float, size: float) -> int:
+        """How the last step ended other than by its status: 0, ENDED or EARLY.
+
+        Args:
+            end: time at which it should have ended [s].
+            size: how long it was [s].
+        """
+        if self._stop.value:
+            return ENDED
+        return EARLY if self._early.value and self._last.value < end - SAME * size else 0
 
     def reached(self) -> float | None:
         """The time that the last step has reached, where steps say so."""

@@ -22,7 +22,7 @@ import ctypes as ct
 import math
 import os
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -36,17 +36,14 @@ from .assignment import Assignment
 from .calls import announce
 from .exchange import Block, Objects, Part
 from .fmi2 import Fmi2
-from .fmi3 import Fmi3
+from .fmi3 import EARLY, ENDED, SAME, Fmi3
+from .intermediate import REFUSED, Moved
 from .library import WORK, bind
-from .messages import STATUS, forget, new_key, status_name, take
+from .messages import STATUS, forget, new_key, status_name, tail, take
 from .surroundings import MODES, kept, modes
 
 Vector = NDArray[np.float64]
-ENDED = 1000
-"""Far from FMI's statuses: a step of FMI 3 that asked to end the simulation."""
-SAME = 1e-9
-"""Part of a step by which the time that an FMU has reached may differ from the end of the step."""
-WARNING = STATUS.index("warning")
+WARNING, FATAL = STATUS.index("warning"), STATUS.index("fatal")
 WARNINGS = tuple(f"{name}: " for name in STATUS[1:])
 """How messages begin that are more than information."""
 
@@ -68,6 +65,7 @@ class Instance:
         fmu: an opened FMU, or the path of one.
         name: its name in messages.
         logging: let the FMU log everything, not errors alone.
+        moved: inputs for which an FMU of FMI 3 may ask within steps.
 
     Attributes:
         watched: whether it is looked up what its calls leave changed in this process.
@@ -77,10 +75,11 @@ class Instance:
         FmuCallError: the FMU refused to be created.
     """
 
-    def __init__(self, fmu: Fmu | str | os.PathLike[str], name: str = "", *, logging: bool = False):
-        if not isinstance(fmu, Fmu):
-            fmu = open_fmu(os.fspath(fmu))
-        self.fmu = fmu
+    def __init__(
+        self, fmu: Fmu | str | os.PathLike[str], name: str = "", *, logging: bool = False,
+        moved: Moved | None = None,
+    ):  # fmt: skip
+        self.fmu = fmu = fmu if isinstance(fmu, Fmu) else open_fmu(os.fspath(fmu))
         self.description = fmu.description
         self.name = name or fmu.path.stem
         self.label = f"{self.name} ({self.description.name})"
@@ -98,18 +97,22 @@ class Instance:
         self._step = self._functions[f"fmi{self.binding.version}DoStep"]
         self._step_arguments = self.binding.step_arguments(True)
         self._warned: dict[str, float] = {}
-        self._key = new_key()
+        self.moved = moved
+        self._key = new_key(moved.address if moved else 0)
         announce(self.name, "creation")
         self._notes: dict[str, None] = {}
         with self._putting_back("its creation"):
-            address, self._alive = self.binding.instantiate(fmu, self.name, self._key, logging)
+            made = self.binding.instantiate(fmu, self.name, self._key, logging, moved)
+        address, self._alive = made
         if not address:
             messages = take(self._key)
             forget(self._key)
             raise FmuCallError(
-                f"{self.label}: the FMU could not be created" + _tail(messages), messages
+                f"{self.label}: the FMU could not be created" + tail(messages), messages
             )
         self.address: int = address
+        if moved is not None:
+            moved.bind(address, self._functions, self.binding.SET)
         if once:
             _single.add(fmu.digest)
         self._terminable = False
@@ -157,8 +160,7 @@ class Instance:
         messages = take(self._key)
         when = "" if math.isnan(self.time) else f" at t = {self.time:.9g} s"
         return FmuCallError(
-            f"{self.label}: {what}{when} failed with status {status_name(status)}"
-            + _tail(messages),
+            f"{self.label}: {what}{when} failed with status {status_name(status)}" + tail(messages),
             messages,
         )
 
@@ -191,6 +193,8 @@ class Instance:
             when = "" if math.isnan(time) else f", first at t = {time:.9g} s"
             found.append(f"{self.label}: {what} returned status 'warning'{when}")
         self._warned.clear()
+        if self.moved is not None:
+            found += [f"{self.label}: {text}" for text in self.moved.warnings()]
         found += [f"{self.label}: {text}" for text in self._notes]
         self._notes.clear()
         return found
@@ -329,12 +333,19 @@ class Instance:
             raise FmuCallError(f"{self.label}: is freed; create a new instance")
         self.time = time
         before = modes.get() if self.watched else 0
+        moved = self.moved
+        if moved is not None:
+            moved.begin(time, size)
         status = self._step(self.address, time, size, *self._step_arguments)
         if self.watched and modes.get() != before:
             modes.put(before)
             self.changed(MODES, "a step")
-        if status or self.binding.stopped():
-            if status != WARNING or self.binding.stopped():
+        if status in (0, WARNING):
+            status = self.binding.ending(time + size, size) or status
+        if moved is not None and moved.failed and status != FATAL:
+            status = REFUSED
+        if status:
+            if status != WARNING:
                 raise self.failed_step(size, status, self.binding.reached())
             self.warned("a step")
         self.time = time + size
@@ -351,7 +362,11 @@ class Instance:
             status: what it returned.
             reached: the time at which the FMU of FMI 3 says that it stands [s].
         """
-        asked, last = status in (0, WARNING, ENDED), reached
+        if self.moved is not None and status == REFUSED:
+            return self.moved.refusal(self)
+        if status == EARLY:
+            return self.refusal(f"a step of {size:.9g} s ended early, at {reached:.9g} s, unasked")
+        asked, last = status == ENDED, reached
         if status == STATUS.index("discard"):
             asked, last = self.binding.terminated(self._functions, self.address)
         if not asked:
@@ -378,6 +393,8 @@ class Instance:
         self._call("reset", f"fmi{self.binding.version}Reset")
         self._terminable = False
         self.time = math.nan
+        if self.moved is not None:
+            self.moved.restart()
 
     def free(self) -> None:
         """End it; calling it again does nothing."""
@@ -469,10 +486,6 @@ class Instance:
             ),
         )
         return result
-
-
-def _tail(messages: Sequence[str]) -> str:
-    return ": " + "; ".join(messages) if messages else " (the FMU logged nothing)"
 
 
 def _free(

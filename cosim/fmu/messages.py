@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes as ct
 import itertools
 from collections import deque
+from collections.abc import Sequence
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 _LIMIT = 50
@@ -23,15 +24,15 @@ def status_name(status: int) -> str:
     return f"{status}, which FMI does not know"
 
 
-def new_key() -> int:
-    """A key under which an instance's messages are kept."""
-    key = next(_keys)
+def new_key(address: int = 0) -> int:
+    """A key under which an instance's messages are kept; an address of its own where it has one."""
+    key = address or next(_keys)
     _messages[key] = deque(maxlen=_LIMIT)
     return key
 
 
 def environment(key: int) -> int:
-    """The key as FMI's instance environment, a pointer that is only compared."""
+    """The key as FMI's instance environment, a pointer that loggers only compare."""
     return key
 
 
@@ -43,6 +44,11 @@ def take(key: int) -> tuple[str, ...]:
     found = tuple(kept)
     kept.clear()
     return found
+
+
+def tail(messages: Sequence[str]) -> str:
+    """The end of an error text: what the FMU logged."""
+    return ": " + "; ".join(messages) if messages else " (the FMU logged nothing)"
 
 
 def forget(key: int) -> None:

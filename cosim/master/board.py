@@ -151,15 +151,15 @@ class Board:
             mine.slot.enter()
             mine.slot.say(name, what)
 
-    def _interpreter(self, outline: Outline, stack: ExitStack) -> Interpreter:
+    def _interpreter(self, outline: Outline, stack: ExitStack, update: int) -> Interpreter:
         holder = _Holder()
         slot = self._slot(holder)
         if slot is None:
-            return Interpreter(outline, stack)
+            return Interpreter(outline, stack, update)
         slot.begin({name: m.reference for name, m in outline.system.members.items()})
         slot.enter()
         stack.callback(lambda: holder)  # as long as the instances live
-        return Told(outline, stack, slot)
+        return Told(outline, stack, update, slot)
 
     def _slot(self, owner: object) -> _Slot | None:
         with self._lock:

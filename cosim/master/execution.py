@@ -14,12 +14,13 @@ from .initialization import initialize
 from .interpreter import Interpreter
 from .invented import invented
 from .kernel.stepper import Compiled
+from .kernel.updates import update
 from .outline import Outline
 from .plan import Stepper, decoded
 from .startup import find_past
 
 EXECUTORS = ("auto", "c", "python")
-Maker = Callable[[Outline, ExitStack], Interpreter]
+Maker = Callable[[Outline, ExitStack, int], Interpreter]
 _usual: Maker = Interpreter
 
 
@@ -88,7 +89,7 @@ class Execution:
                 f"{EXECUTORS[-1]}"
             )
         self.outline = outline
-        self.run = (interpreter or _usual)(outline, stack)
+        self.run = (interpreter or _usual)(outline, stack, update(outline.executor))
         self.stepper: Stepper | None = None
         self.ended = ""
         self.lost: list[str] = []

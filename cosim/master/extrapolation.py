@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import need_table
 from ..errors import UnknownNameError, ValueRangeError, listing
+from ..fmu.description import Description, Variable
 from ..system.system import System
 from .plan import PARTS, Layout, Mean, Op
 
@@ -23,20 +24,24 @@ Rows = list[tuple[int, ...]]
 
 def smooth(system: System, layout: Layout) -> NDArray[np.bool_]:
     """Per copy, whether both ends are continuous in time."""
-
-    def continuous(full: str) -> bool:
-        found = system.declaration(full)
-        return found.type in ("Float64", "Float32") and found.variability == "continuous"
-
     ends = zip(layout.copy_source.tolist(), layout.copy_target.tolist(), strict=True)
     return np.array(
-        [continuous(layout.names[a]) and continuous(layout.names[b]) for a, b in ends],
+        [all(continuous(system.declaration(layout.names[end])) for end in pair) for pair in ends],
         dtype=np.bool_,
     )
 
 
+def continuous(variable: Variable) -> bool:
+    """Whether a variable is a number that is continuous in time."""
+    return variable.type in ("Float64", "Float32") and variable.variability == "continuous"
+
+
 def means(
-    system: System, layout: Layout, order: int, stepped: Sequence[str] | None = None
+    system: System,
+    layout: Layout,
+    order: int,
+    stepped: Sequence[str] | None = None,
+    inner: Mapping[str, int] | None = None,
 ) -> tuple[list[Mean], dict[int, tuple[int, int]]]:
     """The extrapolated inputs, and per instance which of them are its own.
 
@@ -44,13 +49,14 @@ def means(
         system, layout: what is run.
         order: of the polynomial.
         stepped: instances in the order in which they step, None if they step side by side.
+        inner: instances whose inputs do not move and that go several inner steps instead.
     """
     if order not in (0, 1, 2) or isinstance(order, bool):
         raise ValueRangeError(f"extrapolation of order {order!r}: must be 0, 1 or 2")
     position = {name: index for index, name in enumerate(layout.instances)}
+    parts = inner or {}
     rank = {name: index for index, name in enumerate(stepped or ())}
-    continuous = smooth(system, layout)
-    moving = {name: interpolates(system, name) for name in layout.instances}
+    followed = smooth(system, layout)
     bonded = set(layout.bond_input.tolist())
     found: list[Mean] = []
     spans: dict[int, tuple[int, int]] = {}
@@ -65,56 +71,103 @@ def means(
                 variable, description.dependencies.get(variable.rpartition("[")[0], ())
             )
             # an output with direct feedthrough is that of the inputs at the end if these move there
-            ahead = bool(rank) and rank[giver] < rank[name] and (moving[giver] or not passed)
-            if order and continuous[index]:
+            ahead = bool(rank) and rank[giver] < rank[name] and all_move(description, passed)
+            taker, target = system.members[name].description, int(layout.copy_target[index])
+            if order and followed[index]:
                 found.append(
                     Mean(
                         source,
-                        int(layout.copy_target[index]),
+                        target,
                         float(layout.copy_gain[index]),
                         float(layout.copy_offset[index]),
                         order,
                         ahead,
                         position[name],
-                        moving[name],
-                        int(layout.copy_target[index]) in bonded,
+                        taker.moves(taker.whole(layout.names[target][len(name) + 1 :]))
+                        or parts.get(name, 1) > 1,
+                        taker.fmi == 2 and parts.get(name, 1) == 1,
+                        target in bonded,
+                        parts.get(name, 1),
                     )
                 )
         spans[position[name]] = (begin, len(found))
     return found, spans
 
 
-def interpolates(system: System, instance: str) -> bool:
-    """Whether an instance's inputs can move within a step (FMI 2's canInterpolateInputs)."""
-    description = system.members[instance].description
-    return description.fmi == 2 and description.can("canInterpolateInputs")
+def all_move(description: Description, inputs: Sequence[str]) -> bool:
+    """Whether an FMU's inputs can move within a step; of FMI 3 those that are continuous."""
+    variables = [description.whole(name) for name in inputs]
+    return all(description.moves(v) for v in variables if description.fmi == 2 or continuous(v))
 
 
 def set_derivatives(
     found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int
 ) -> Rows:
-    """The operation that tells an instance how its inputs move, if it can use it."""
+    """The operation that tells an instance of FMI 2 how its inputs move, if it can use it."""
     first, last = spans[index]
-    return [(Op.SET_DERIVATIVES, first, last)] if first < last and found[first].moving else []
+    able = first < last and found[first].moving and found[first].told
+    return [(Op.SET_DERIVATIVES, first, last)] if able else []
 
 
-def factors(system: System, substeps: Mapping[str, int] | None) -> dict[str, int]:
+def factors(
+    system: System, given: Mapping[str, int] | None, option: str = "substeps"
+) -> dict[str, int]:
     """Steps per communication step of each instance.
 
     Raises:
         UnknownNameError, ValueRangeError: what was asked for makes no sense.
     """
     found = dict.fromkeys(system.members, 1)
-    need_table("substeps", substeps or {}, "substeps = { motor = 4 }")
-    for name, factor in (substeps or {}).items():
+    need_table(option, given or {}, f"{option} = {{ motor = 4 }}")
+    for name, factor in (given or {}).items():
         if name not in found:
             raise UnknownNameError(
-                f"substeps: there is no instance {name!r}; {listing(found, name)}"
+                f"{option}: there is no instance {name!r}; {listing(found, name)}"
             )
         if not isinstance(factor, int) or isinstance(factor, bool) or not 1 <= factor < 1000:
-            raise ValueRangeError(f"substeps of {name}: {factor!r} is not a number from 1 to 999")
+            raise ValueRangeError(f"{option} of {name}: {factor!r} is not a number from 1 to 999")
         found[name] = factor
     return found
+
+
+def inner_factors(
+    system: System,
+    inner_steps: Mapping[str, int] | None,
+    order: int,
+    substeps: Mapping[str, int] | None = None,
+) -> dict[str, int]:
+    """Inner steps of each instance, between which it exchanges nothing.
+
+    Raises:
+        UnknownNameError, ValueRangeError: what was asked for makes no sense.
+    """
+    found = factors(system, inner_steps, "inner_steps")
+    if max(found.values(), default=1) > 1 and order == 0:
+        raise ValueRangeError(
+            "inner_steps without extrapolation would move no input; add extrapolation = 1 or 2"
+        )
+    for name, parts in found.items():
+        if parts > 1 and (substeps or {}).get(name, 1) > 1:
+            raise ValueRangeError(f"{name} has substeps and inner_steps; take one of them")
+        description = system.members[name].description
+        moving = [v.name for v in description.of("input") if continuous(v) and description.moves(v)]
+        if parts > 1 and moving:
+            raise ValueRangeError(
+                f"inner_steps of {name}: its FMU lets inputs move within a step "
+                f"({', '.join(moving[:3])}); leave it out"
+            )
+    return found
+
+
+def inner_rows(
+    found: Sequence[Mean], spans: Mapping[int, tuple[int, int]], index: int, parts: int
+) -> Rows:
+    """An instance's step in inner steps, each with the mean of its inputs over it."""
+    rows: Rows = []
+    for part in range(parts):
+        rows += [(Op.MOVE, place, parts * PARTS + part) for place in range(*spans[index])]
+        rows += [(Op.SET, index), whole_or_part(index, parts, part)]
+    return rows
 
 
 def side_by_side(
@@ -122,6 +175,7 @@ def side_by_side(
     parts: Mapping[str, int],
     found: Sequence[Mean],
     spans: Mapping[int, tuple[int, int]],
+    inner: Mapping[str, int],
 ) -> Rows:
     """One communication step in which instances step with inputs from where the others stand.
 
@@ -147,7 +201,10 @@ def side_by_side(
                 rows += set_derivatives(found, spans, index)
         for index in starting:
             n = parts[layout.instances[index]]
-            rows.append(whole_or_part(index, n, int(instant * n)))
+            if (m := inner[layout.instances[index]]) > 1:
+                rows += inner_rows(found, spans, index, m)
+            else:
+                rows.append(whole_or_part(index, n, int(instant * n)))
             ends[index] = instant + Fraction(1, n)
     return rows
 
@@ -221,6 +278,15 @@ def derivatives_at_begin(
         return (2.0 * (now - past[0]) - second) * half, second * square
     second = bend(*past[:4])
     return (2.0 * (past[0] - past[1]) + second) * half, second * square
+
+
+def mean_of_part(
+    begin: float, slope: float, curve: float, step: float, parts: int, part: int
+) -> float:
+    """Mean over one of equal parts of a step of the parabola with these values at its begin."""
+    width = step / parts
+    middle = (part + 0.5) * width
+    return begin + middle * slope + (0.5 * middle * middle + width * width / 24.0) * curve
 
 
 def bend(a: float, b: float, c: float, d: float) -> float:

@@ -18,8 +18,9 @@ from ..fmu.attributes import INTEGERS
 from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
-from .extrapolation import derivatives_at_begin, mean_of_step
-from .input_derivatives import InputDerivatives
+from ..fmu.intermediate import Moved
+from .extrapolation import derivatives_at_begin, mean_of_part, mean_of_step
+from .input_derivatives import InputDerivatives, asked_for
 from .newton import Newton
 from .objects import ObjectPassing
 from .outline import Outline
@@ -51,6 +52,8 @@ class Interpreter:
     Args:
         outline: of the run.
         stack: ends the FMUs' instances.
+        update: address of compiled code that answers FMUs which ask for inputs within a step, 0:
+            the answers are made in Python.
 
     Attributes:
         values, objects: one per slot of the plan's layout.
@@ -70,7 +73,7 @@ class Interpreter:
     witness: Shared | None = None
     """What another process learns of the run."""
 
-    def __init__(self, outline: Outline, stack: ExitStack) -> None:
+    def __init__(self, outline: Outline, stack: ExitStack, update: int = 0) -> None:
         self.outline, self.system, self.step = outline, outline.system, outline.step
         self.plan, self.layout = outline.plan, outline.plan.layout
         self.external, self.times, self.every = outline.external, outline.times, outline.every
@@ -79,10 +82,14 @@ class Interpreter:
         self.instances: list[Instance] = []
         self.outputs: list[Block] = []
         self.inputs: list[Block] = []
+        asked = asked_for(self.plan, self.system)
         for index, member in enumerate(self.system.members.values()):
             # interpreted FMUs report their exceptions only when they may log
             chatty = member.description.can("needsExecutionTool")
-            instance = stack.enter_context(Instance(member.fmu, member.name, logging=chatty))
+            moved = Moved(asked[index], update) if asked[index] else None
+            instance = stack.enter_context(
+                Instance(member.fmu, member.name, logging=chatty, moved=moved)
+            )
             instance.set(member.parameters)
             self.instances.append(instance)
             for blocks, spans, names in (
@@ -110,7 +117,7 @@ class Interpreter:
         self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
         self.history = np.zeros((len(self.plan.means), 4))
         self.past = np.zeros(1, dtype=np.int64)
-        self.derivatives = InputDerivatives(self.plan, self.instances)
+        self.derivatives = InputDerivatives(self.plan, self.instances, self.values)
         self.held = np.zeros(len(self.layout.bond_input))
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
@@ -235,6 +242,8 @@ class Interpreter:
                     self.extrapolate(index, self.plan.means[index])
             case Op.SET_DERIVATIVES:
                 self.derivatives.tell(a, b)
+            case Op.MOVE:
+                self.move(a, *divmod(b, PARTS))
             case Op.SUBSTEP:
                 parts, part = divmod(b, PARTS)
                 time = self.instants[self.index] + part * self.step / parts
@@ -254,6 +263,13 @@ class Interpreter:
         self.values[mean.target] = past[0] * mean.gain + mean.offset
         self.derivatives.slope[index] = slope * mean.gain
         self.derivatives.curve[index] = curve * mean.gain
+
+    def move(self, index: int, parts: int, part: int) -> None:
+        """Let an input take its mean over a part of the step."""
+        mean, derivatives = self.plan.means[index], self.derivatives
+        begin = float(self.history[index, 0]) * mean.gain + mean.offset
+        slope, curve = float(derivatives.slope[index]), float(derivatives.curve[index])
+        self.values[mean.target] = mean_of_part(begin, slope, curve, self.step, parts, part)
 
     def record(self) -> None:
         """Keep observed values if it is their turn; note outputs for the energy of bonds.

@@ -22,6 +22,7 @@ from ..errors import StepError
 from ..fmu import calls
 from .execution import Execution
 from .interpreter import Interpreter
+from .kernel.updates import update
 from .outline import Outline
 from .plan import Op
 from .witness import Witness
@@ -64,9 +65,9 @@ class Outcome:
 class Told(Interpreter):
     """An interpreter that says what it is about to do."""
 
-    def __init__(self, outline: Outline, stack: ExitStack, witness: Witness) -> None:
+    def __init__(self, outline: Outline, stack: ExitStack, update: int, witness: Witness) -> None:
         self.witness = self.shared = witness
-        super().__init__(outline, stack)
+        super().__init__(outline, stack, update)
         if witness.rows.shape == self.rows.shape:
             self.rows = witness.rows
 
@@ -97,7 +98,7 @@ def execute(order: Order, witness: Witness) -> Outcome:
     try:
         with ExitStack() as stack:
             calls.listen(witness.say)
-            told = Told(order.outline, stack, witness)
+            told = Told(order.outline, stack, update(order.outline.executor), witness)
             execution = Execution(order.outline, stack, lambda *_: told)
             try:
                 recording = execution.execute()

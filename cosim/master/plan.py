@@ -41,6 +41,7 @@ class Op(IntEnum):
     SET_DERIVATIVES = (
         12  # tell an instance how its inputs move: means a <= i < b, all of them its own
     )
+    MOVE = 13  # mean a: values[target] = mean over part `b % PARTS` of `b // PARTS` of the step
 
 
 _OPS = tuple(Op)
@@ -114,8 +115,10 @@ class Mean:
         order: of the polynomial.
         ahead: the source is at the end of the step already (interpolation).
         instance: whose input it is.
-        moving: the instance takes value and derivatives at the begin of the step; else it takes the
-            mean over the step, held.
+        moving: the instance follows value and derivatives at the begin of the step; else it takes
+            the mean over the step, held.
+        told: it is told the derivatives (FMI 2); else it asks for inputs within the step (FMI 3).
+        parts: inner steps of the instance, which gets the mean over each; 1: it goes one step.
         bonded: the input belongs to a power bond, whose energy needs the mean in any case.
     """
 
@@ -127,7 +130,9 @@ class Mean:
     ahead: bool
     instance: int
     moving: bool
+    told: bool
     bonded: bool
+    parts: int = 1
 
 
 class Stepper(Protocol):
@@ -176,7 +181,7 @@ class Plan:
         loops: what SOLVE solves.
         solving: makes outputs consistent at one instant, in the order of direct feedthrough, with
             loops solved.
-        means: what EXTRAPOLATE and SET_DERIVATIVES set.
+        means: what EXTRAPOLATE, SET_DERIVATIVES and MOVE set.
         stepper: for algorithms whose steps are more than operations, what makes a stepper of an
             `interpreter.Interpreter`; None if the operations of `step` are all there is.
     """

@@ -88,7 +88,7 @@ def make(
         paths = _built(names, kept, fmi, platform, told)
         for name, path in zip(names, paths, strict=True):
             packed.setdefault(_group(name), []).append((f"{fmi}/{path.stem}", path))
-    for fmus in packed.values():  # both versions of a variant share their library
+    for fmus in packed.values():  # both versions of a variant share most
         fmus.sort(key=lambda fmu: fmu[1].stem)
     jobs = [
         (out / "packs" / f"{group}.{first // PACKED}.tar.xz", fmus[first : first + PACKED])

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -149,29 +149,21 @@ def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
     """All files but the libraries, and the generated C source that these are compiled from."""
     identifier = variant.name.identifier
     template = native.model_source(variant.functions, variant.entries, identifier)
-    fixed = {path.name: path.read_text(encoding="utf-8") for path in native.C_SOURCES.glob("*.c")}
-    xml2 = description.describe_fmi2(
-        variant.model,
-        variant.functions,
-        variant.entries,
-        identifier=identifier,
-        name=str(variant.name),
-        token="",
-        kind="native",
-    )
-    # one token for both versions, so that one binary serves both
-    token = _token(template, *(fixed[name] for name in sorted(fixed)), xml2.decode())
-    source = native.with_token(template, token)
-    files: dict[str, bytes] = {}
-    arguments = (variant.model, variant.functions, variant.entries)
+    fixed = native.c_files(fmi)
+
+    describe: Callable[..., bytes] = description.describe_fmi3
     if fmi == 2:
-        files["modelDescription.xml"] = description.describe_fmi2(
-            *arguments, identifier=identifier, name=str(variant.name), token=token, kind="native"
-        )
-    else:
-        files["modelDescription.xml"] = description.describe_fmi3(
-            *arguments, identifier=identifier, name=str(variant.name), token=token
-        )
+        describe = partial(description.describe_fmi2, kind="native")
+
+    def described(token: str) -> bytes:
+        arguments = (variant.model, variant.functions, variant.entries)
+        return describe(*arguments, identifier=identifier, name=str(variant.name), token=token)
+
+    blank = described("").decode()
+    token = _token(template, *(fixed[name] for name in sorted(fixed)), blank)
+    source = native.with_token(template, token)
+    files = {"modelDescription.xml": described(token)}
+    if fmi == 3:
         files["sources/buildDescription.xml"] = description.build_description(identifier)
         if (terminals := description.terminals(variant.model)) is not None:
             files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals
@@ -182,7 +174,7 @@ def _native_files(variant: Variant, fmi: int) -> tuple[dict[str, bytes], str]:
 
 def _libraries(source: str, identifier: str, fmi: int, platforms: list[str]) -> dict[str, bytes]:
     with ThreadPoolExecutor(len(platforms)) as pool:
-        compiled = pool.map(lambda p: native.compile_library(source, identifier, p), platforms)
+        compiled = pool.map(lambda p: native.compile_library(source, identifier, p, fmi), platforms)
         made = dict(zip(platforms, compiled, strict=True))
     files = {}
     for platform, library in made.items():

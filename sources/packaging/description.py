@@ -264,7 +264,11 @@ def describe_fmi3(
         providesDirectionalDerivatives=True,
     )
     ET.SubElement(root, "ModelExchange", common)
-    simulation = _attributes(canHandleVariableCommunicationStepSize=True, hasEventMode=True)
+    simulation = _attributes(
+        canHandleVariableCommunicationStepSize=True,
+        hasEventMode=True,
+        providesIntermediateUpdate=True,
+    )
     ET.SubElement(root, "CoSimulation", common | simulation)
     listed = [entries[0], *(entry for _, entry in shown_entries(entries))]
     _units(root, listed)
@@ -285,6 +289,7 @@ def describe_fmi3(
             causality=_CAUSALITY[entry.part],
             variability=_variability(entry),
             initial=_initial(entry),
+            intermediateUpdate=True if entry.part == "input" else None,
         )
         if entry.name == "solver.method":
             attributes |= _attributes(

@@ -191,14 +191,36 @@ def universal(libraries: Sequence[bytes]) -> bytes:
     return header.ljust(page, b"\0") + body
 
 
-def compile_library(source: str, identifier: str, platform: str) -> bytes:
-    """Compile a variant for one platform.
+def c_files(fmi: int) -> dict[str, str]:
+    """The C files that all FMUs of a version of FMI have in common, by name.
+
+    Lines between `#if INTERMEDIATE` and `#else` are those of FMI 3, which asks for inputs within a
+    step, the ones behind it those of FMI 2.
+    """
+    found = {}
+    for path in C_SOURCES.glob("*.c"):
+        kept, mine, branching = [], True, False
+        for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
+            match line.strip():
+                case "#if INTERMEDIATE":
+                    branching, mine = True, fmi == 3
+                case "#else" if branching:
+                    mine = fmi != 3
+                case "#endif" if branching:
+                    branching, mine = False, True
+                case _ if mine:
+                    kept.append(line)
+        found[path.name] = "".join(kept)
+    return found
+
+
+def compile_library(source: str, identifier: str, platform: str, fmi: int) -> bytes:
+    """Compile a variant for one platform and version of FMI.
 
     Raises:
         CompilerError: with the compiler's message.
     """
-    files = {path.name: path.read_text(encoding="utf-8") for path in C_SOURCES.glob("*.c")}
-    return compile_c({**files, "model.c": source}, "all.c", identifier, platform)
+    return compile_c({**c_files(fmi), "model.c": source}, "all.c", identifier, platform)
 
 
 def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) -> bytes:

@@ -188,6 +188,11 @@ BAD2 = {
     "cannot be read: ": fmi2()[:-10],
 }  # fmt: skip
 BAD3 = {
+    "variable 'u' has intermediateUpdate and variability discrete": fmi3(
+        T3 + U3.replace("/>", ' variability="discrete" intermediateUpdate="true"/>') + Y3),
+    "declares canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate": fmi3(
+        interface='<CoSimulation modelIdentifier="m" '
+        'canReturnEarlyAfterIntermediateUpdate="true"/>'),
     "has no independent variable": fmi3(U3 + Y3),
     "is a second independent variable beside 'time'": fmi3(
         T3 + U3 + Y3 + T3.replace('"time"', '"t2"').replace('"0"', '"8"')),

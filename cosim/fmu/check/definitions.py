@@ -77,6 +77,11 @@ def _interfaces(model: Model, findings: Findings) -> None:
                 f"{item.tag} declares canSerialize{spelling} without canGetAndSet{spelling}",
                 "declare both or none", line,
             )  # fmt: skip
+        early, asks = "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"
+        if item.get(early) in ("true", "1") and item.get(asks) not in ("true", "1"):
+            findings.error(
+                f"{item.tag} declares {early} without {asks}", "declare both or none", line
+            )
 
 
 def _units(model: Model, findings: Findings) -> dict[str, set[str]]:

@@ -146,6 +146,12 @@ def _combination(variable: Declared, findings: Findings) -> None:
         )  # fmt: skip
     elif variable.type != "Clock":
         _has_start(variable, findings)
+    declared = variable.fmi == 3 and variable.outer.get("intermediateUpdate") in ("true", "1")
+    if declared and variability != "continuous":
+        findings.error(
+            f"has intermediateUpdate and variability {variability}: only what is continuous may "
+            "change within a step", "leave intermediateUpdate out", *where,
+        )  # fmt: skip
 
 
 def _one_of(names: object) -> str:

@@ -12,6 +12,9 @@ Options:
         own inputs within the step), its new value counts too. Second order. FMUs that cannot
         interpolate inputs get the mean of the polynomial over the step (weights of Adams and
         Bashforth, of Adams and Moulton).
+    inner_steps: instance -> n, with extrapolation, for instances whose inputs cannot move: they go
+        n steps per communication step, with their inputs at the mean of the polynomial over each,
+        and exchange nothing in between.
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (sequential scheme); Busch,
 Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
@@ -19,21 +22,27 @@ Continuous approximation techniques for co-simulation methods, 2016 (extrapolati
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops, reached
-from ..extrapolation import means, set_derivatives
+from ..extrapolation import inner_factors, inner_rows, means, set_derivatives
 from ..plan import Op, Plan, exchange, final_operations, initial_sweep, lay_out, operations
 
 
 def compile_plan(
-    system: System, external: Sequence[str], observed: Sequence[str], *, extrapolation: int = 0
+    system: System,
+    external: Sequence[str],
+    observed: Sequence[str],
+    *,
+    extrapolation: int = 0,
+    inner_steps: Mapping[str, int] | None = None,
 ) -> Plan:
     """Compile a system."""
     layout = lay_out(system, external, observed)
     position = {name: index for index, name in enumerate(layout.instances)}
-    extrapolated, spans = means(system, layout, extrapolation, system.order())
+    inner = inner_factors(system, inner_steps, extrapolation)
+    extrapolated, spans = means(system, layout, extrapolation, system.order(), inner)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
     # extrapolation: outputs are fetched anew at the end of the step, where their energy counts too.
@@ -49,12 +58,11 @@ def compile_plan(
         step.append(copy)
         if spans[index][0] < spans[index][1]:
             step.append((Op.EXTRAPOLATE, *spans[index]))
-        step += [
-            set_,
-            *set_derivatives(extrapolated, spans, index),
-            (Op.STEP, index),
-            (Op.GET, index),
-        ]
+        if inner[name] > 1:
+            step += inner_rows(extrapolated, spans, index, inner[name])
+        else:
+            step += [set_, *set_derivatives(extrapolated, spans, index), (Op.STEP, index)]
+        step.append((Op.GET, index))
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "gauss_seidel",

@@ -7,11 +7,11 @@ point as long as it contracts, else Newton's method with a Jacobian by differenc
 which is kept from step to step. Held signals (integers, booleans, discrete ones) are those of t_k.
 Needs FMUs that can return to a saved state.
 
-With interpolation = 1 the inputs of FMUs that can follow (FMI 2's canInterpolateInputs) go in a
-line from L y_k to L y_{k+1} within the step, with the same mean, and outputs at its end are those
-of these inputs. A stiff contact, which follows its velocity within the step, then has no slip from
-half of the step's change of velocity, and its own solver sees no jumps. The first guess is that
-values change as in the step before.
+With interpolation = 1 the inputs of FMUs that can follow (FMI 2's canInterpolateInputs, FMI 3's
+intermediate update) go in a line from L y_k to L y_{k+1} within the step, with the same mean, and
+outputs at its end are those of these inputs. A stiff contact, which follows its velocity within the
+step, then has no slip from half of the step's change of velocity, and its own solver sees no jumps.
+The first guess is that values change as in the step before.
 
 Options:
     tolerance: relative change of exchanged values at which a step counts as settled.

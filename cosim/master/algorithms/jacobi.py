@@ -14,6 +14,9 @@ Options:
     substeps: instance -> n, for instances that go n steps per communication step and exchange at
         each; what comes from slower instances is held. The energy of their power bonds is not
         accounted for.
+    inner_steps: instance -> n, with extrapolation, for instances whose inputs cannot move: they go
+        n steps per communication step, with their inputs at the mean of the polynomial over each,
+        and exchange nothing in between.
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (parallel scheme); Busch,
 Continuous approximation techniques for co-simulation methods, 2016 (extrapolation).
@@ -25,7 +28,15 @@ from collections.abc import Mapping, Sequence
 
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops, reached, relayed
-from ..extrapolation import factors, means, set_derivatives, side_by_side, without_parts
+from ..extrapolation import (
+    factors,
+    inner_factors,
+    inner_rows,
+    means,
+    set_derivatives,
+    side_by_side,
+    without_parts,
+)
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 
 
@@ -36,12 +47,14 @@ def compile_plan(
     *,
     extrapolation: int = 0,
     substeps: Mapping[str, int] | None = None,
+    inner_steps: Mapping[str, int] | None = None,
 ) -> Plan:
     """Compile a system."""
     parts = factors(system, substeps)
     layout = without_parts(lay_out(system, external, observed), parts)
     everyone = range(len(layout.instances))
-    extrapolated, spans = means(system, layout, extrapolation)
+    inner = inner_factors(system, inner_steps, extrapolation, substeps)
+    extrapolated, spans = means(system, layout, extrapolation, inner=inner)
     loops = find_loops(system, layout)
     fresh = consistent(system, layout, loops, only_loops=extrapolation == 0)
     if extrapolation == 0:
@@ -53,7 +66,7 @@ def compile_plan(
     if extrapolated:
         step.append((Op.NOTE,))
     if max(parts.values()) > 1:
-        step += side_by_side(layout, parts, extrapolated, spans)
+        step += side_by_side(layout, parts, extrapolated, spans, inner)
     else:
         step.append((Op.COPY, 0, len(layout.copy_source)))
         if extrapolated:
@@ -61,7 +74,10 @@ def compile_plan(
         step += [(Op.SET, index) for index in everyone]
         for index in everyone:
             step += set_derivatives(extrapolated, spans, index)
-        step += [(op, index) for op in (Op.STEP, Op.GET) for index in everyone]
+        for index, factor in enumerate(inner[name] for name in layout.instances):
+            in_parts = inner_rows(extrapolated, spans, index, factor)
+            step += in_parts if factor > 1 else [(Op.STEP, index)]
+        step += [(Op.GET, index) for index in everyone]
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
         "jacobi",

@@ -61,6 +61,7 @@ class _Code(IntEnum):
     SET_DERIVATIVES = 16
     WATCHED2 = 17
     WATCHED3 = 18
+    MOVE = 19
 
 
 _STEPS = {2: _Code.STEP2, 3: _Code.STEP3}
@@ -124,7 +125,8 @@ def cache_folder() -> Path:
 
 
 @lru_cache(maxsize=1)
-def _load(path: str) -> Any:
+def load(path: str) -> Any:
+    """The library of a path."""
     library = ct.CDLL(path)
     library.cosim_run.argtypes, library.cosim_run.restype = [structures.P, structures.I64], ct.c_int
     library.cosim_run_within.argtypes = [structures.P, structures.I64, structures.D, structures.D]
@@ -180,7 +182,7 @@ class Kernel:
         path = find()
         if path is None:
             raise FileNotFoundError(library_name())
-        self._library = _load(str(path))
+        self._library = load(str(path))
         plan = bound.plan
         layout, instances = plan.layout, bound.instances
         self._keep: list[Any] = [bound]
@@ -430,7 +432,9 @@ def _member(instance: Instance) -> structures.Member:
         functions.get(f"fmi{binding.version}{verb}{binding.STATE}", 0)
         for verb in ("Get", "Set", "Free")
     ]
-    return structures.Member(instance.address, step, functions.get(WORK, 0), 0.0, 0, 0, *states)
+    update = instance.moved.address if instance.moved is not None else 0
+    kept = (*states, 0, update)
+    return structures.Member(instance.address, step, functions.get(WORK, 0), 0.0, 0, 0, *kept)
 
 
 def _instructions(

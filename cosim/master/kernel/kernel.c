@@ -17,6 +17,8 @@
 
 /* Whether a number is whole up to rounding, and fits: see cosim/fmu/values.py. */
 #define ROUNDING 1e-9
+#define MISSED 1e-9 /* as in cosim/fmu/intermediate.py */
+#define SAME 1e-9   /* as in cosim/fmu/fmi3.py */
 #define WHOLE(v) (fabs((v) - rint(v)) <= 1e-9 + 4.0 * DBL_EPSILON * fabs(v))
 #define SIGNED(bits, v) (WHOLE(v) && rint(v) >= -ldexp(1.0, bits - 1) && rint(v) < ldexp(1.0, bits - 1))
 #define UNSIGNED(bits, v) (WHOLE(v) && rint(v) >= 0.0 && rint(v) < ldexp(1.0, bits))
@@ -129,17 +131,58 @@ static inline Member *step2(Run *run, Member *m, const Member *end, double t, do
   return 0;
 }
 
+/* An FMU of FMI 3 asks for inputs within its step: see cosim/fmu/intermediate.py. */
+EXPORT void cosim_update(void *environment, double time, bool requested, bool allowed, bool finished, bool can,
+                         bool *early, double *when) {
+  Update *const u = environment;
+  if (early) *early = false;
+  if (when) *when = time;
+  if (!u) return;
+  const double missed = MISSED * (1.0 + fabs(u->end));
+  if (time < u->finished - missed) u->back = time;
+  if (finished) u->finished = time;
+  if (!requested || u->status || time == u->last) return;
+  if (!(u->begin - missed <= time && time <= u->end + missed)) {
+    u->status = OUTSIDE;
+    u->wrong = time;
+    return;
+  }
+  u->last = time;
+  const double dt = time - u->begin, half = 0.5 * dt * dt;
+  for (Group *g = u->groups; g < u->groups + u->n_groups; g++) {
+    int status = 0;
+    for (size_t i = 0; i < g->n_values; i++) {
+      const int64_t k = g->first + (int64_t)i, m = u->means[k];
+      const double moved = u->values[u->slots[k]] + dt * (m < 0 ? 0.0 : u->slope[m]) + half * (m < 0 ? 0.0 : u->curve[m]);
+      if (!g->single) ((double *)g->buffer)[i] = moved;
+      else if (!(fabs(moved) > FLT_MAX)) ((float *)g->buffer)[i] = (float)moved;
+      else status = UNFIT;
+    }
+    if (!status) status = ((Access3)g->function)(u->component, g->references, g->n_references, g->buffer, g->n_values);
+    if (status == 1) g->warned = 1;
+    else if (status) {
+      u->status = status;
+      u->wrong = time;
+      u->failed = g - u->groups;
+      return;
+    }
+  }
+}
+
 static inline Member *step3(Run *run, Member *m, const Member *end, double t, double h, int watched, int *status) {
   bool event = false, stop = false, early = false;
   const unsigned modes = watched ? MODES() : 0;
   for (; m < end; m++) {
+    Update *const u = m->update;
     run->at = m;
+    if (u) u->begin = u->last = u->finished = t, u->end = t + h;
     *status = ((Step3)m->step)(m->component, t, h, run->final, &event, &stop, &early, &m->reached);
     if (watched && MODES() != modes) undo_modes(m, modes);
-    if (!*status && !stop) continue;
-    if (!FAILED(*status) && stop) *status = TERMINATED;
+    if (u && u->status && *status != FATAL) *status = REFUSED;
+    if (!*status && !stop && !early) continue;
+    if (!FAILED(*status) && (stop || (early && m->reached < t + h - SAME * h))) *status = stop ? TERMINATED : EARLY;
     if (FAILED(*status)) return m;
-    m->warned = 1;
+    if (*status) m->warned = 1;
   }
   return 0;
 }
@@ -234,6 +277,15 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   }
 }
 
+/* An input takes its mean over a part of the step: see cosim/master/extrapolation.py. */
+static void move(Run *run, int64_t index, int64_t code) {
+  const Mean *m = run->means + index;
+  const double width = run->step / (double)(code / PARTS), middle = ((double)(code % PARTS) + 0.5) * width;
+  const double begin = run->history[4 * index] * m->gain + m->offset;
+  run->values[m->target] =
+      begin + middle * run->slope[index] + (0.5 * middle * middle + width * width / 24.0) * run->curve[index];
+}
+
 static const Derivatives *set_derivatives(Run *run, const Derivatives *r, const Derivatives *end, int *status) {
   for (; r < end; r++) {
     run->at = r;
@@ -262,6 +314,7 @@ static int execute(Run *run, int64_t first, int64_t last) {
     [STEP3] = &&stepped3, [ENERGY] = &&energy, [SOLVE] = &&solved, [NOTE] = &&note,
     [EXTRAPOLATE] = &&extrapolated, [SUBSTEP] = &&substepped, [HOLD] = &&hold,
     [SET_DERIVATIVES] = &&derivatives, [WATCHED2] = &&watched2, [WATCHED3] = &&watched3,
+    [MOVE] = &&moved,
   };
   const Instruction *in = run->instructions + first, *const end = run->instructions + last;
   Call *const calls = run->calls, *call = 0;
@@ -336,6 +389,9 @@ extrapolated:
 derivatives:
   refused = set_derivatives(run, run->derivatives + in->first, run->derivatives + in->last, &status);
   UNLESS(refused);
+moved:
+  move(run, in->first, in->last);
+  NEXT;
 substepped:
   member = substep(run, members + in->first, in->last, &status);
   UNLESS(member);
@@ -421,6 +477,6 @@ EXPORT int cosim_run_within(Run *run, int64_t last, double limit, double most) {
 /* The layout that this library was compiled for, to be compared with the caller's. */
 EXPORT int64_t cosim_size(int what) {
   const size_t sizes[] = {sizeof(Run), sizeof(Member), sizeof(Call), sizeof(Instruction), sizeof(Copy), sizeof(Term),
-                          sizeof(Loop), sizeof(Mean), sizeof(Derivatives)};
+                          sizeof(Loop), sizeof(Mean), sizeof(Derivatives), sizeof(Update), sizeof(Group)};
   return (int64_t)sizes[what];
 }

@@ -7,12 +7,14 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3 };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3, MOVE };
 /* beyond the statuses of FMI */
-enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE };
+enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE, REFUSED, EARLY };
+enum { OUTSIDE = 1001 }; /* why an update was refused, beside UNFIT and statuses of FMI */
 enum { SAVE, RESTORE, FORGET }; /* what `cosim_states` does */
 /* FMI knows 0 (ok), 1 (warning) and more that are errors; what it does not know is one, too. */
 #define FAILED(status) ((unsigned)(status) > 1)
+enum { FATAL = 4 };
 enum { LOOK = 50, CHECK = 100 }; /* as in cosim/master/session.py */
 enum { PARTS = 1 << 16 };        /* as in cosim/master/plan.py */
 
@@ -28,6 +30,27 @@ typedef struct {
   int64_t warned; /* whether the FMU has returned a warning */
 } Call;
 
+/* Inputs that move while an FMU of FMI 3 steps: see cosim/fmu/intermediate.py. A group is one set call. */
+typedef struct {
+  void *function;
+  const uint32_t *references;
+  void *buffer;
+  size_t n_references, n_values;
+  int64_t first, single; /* place of the first value; whether they are Float32 */
+  int64_t warned;
+} Group;
+
+typedef struct {
+  void *component;
+  double begin, end, last, finished; /* of the step under way; time of the values that are set; finished by the FMU */
+  double wrong, back;                /* a time that was refused, or before one that was finished */
+  int64_t status, failed;            /* why it was refused, and the group that was */
+  const double *values, *slope, *curve; /* at the begin of the step */
+  const int64_t *slots, *means;         /* per input where they stand; means < 0: it is held */
+  Group *groups;
+  int64_t n_groups;
+} Update;
+
 typedef struct {
   void *component, *step;
   void *work;     /* function that counts the steps of its solver; null: it has none */
@@ -35,6 +58,7 @@ typedef struct {
   int64_t warned;
   int64_t modes;  /* whether a step has left the rounding of numbers changed; it was undone */
   void *get_state, *set_state, *free_state, *state; /* functions, and the state that is kept */
+  Update *update; /* what answers an FMU of FMI 3 that asks for inputs within its step, or null */
 } Member;
 
 /* What one operation does: with calls, members, copies from first to before last. */

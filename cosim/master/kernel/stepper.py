@@ -86,11 +86,12 @@ class Compiled:
     def _raise_step(self, instance: Instance, error: FmuCallError) -> NoReturn:
         """Raise; if an FMU asked to end, the interpreter first brings the others to its time."""
         run = self.run
-        if isinstance(error, EndRequest) and error.time >= run.instants[run.index + 1]:
+        steps, row = decoded(run.plan.step), (Op.STEP, run.instances.index(instance), 0)
+        ended = isinstance(error, EndRequest) and error.time >= run.instants[run.index + 1]
+        if isinstance(error, EndRequest) and ended and row in steps:  # not in parts of a step
             self.kernel.hand_over()
-            steps, member = decoded(run.plan.step), run.instances.index(instance)
             try:
-                run.communication_step(steps, steps.index((Op.STEP, member, 0)) + 1)
+                run.communication_step(steps, steps.index(row) + 1)
             except EndRequest as other:  # of another one, too
                 if not other.complete:
                     raise

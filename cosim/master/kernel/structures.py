@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes as ct
 
+from ...fmu.intermediate import Group, Update
+
 P, I64, I32, D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
 
 
@@ -23,6 +25,7 @@ class Member(ct.Structure):
     _fields_ = (
         ("component", P), ("step", P), ("work", P), ("reached", D), ("warned", I64),
         ("modes", I64), ("get_state", P), ("set_state", P), ("free_state", P), ("state", P),
+        ("update", P),
     )  # fmt: skip
 
 
@@ -95,4 +98,4 @@ class Run(ct.Structure):
 
 
 RUN_SIZE = ct.sizeof(Run)
-ALL = (Run, Member, Call, Instruction, Copy, Term, Loop, Mean, Derivatives)
+ALL = (Run, Member, Call, Instruction, Copy, Term, Loop, Mean, Derivatives, Update, Group)

@@ -27,7 +27,11 @@ enum { IX = 1, IXD = IX + NX, IU = IXD + NX, IY = IU + NU, IP = IY + NY, IZ = IP
 enum { NV = IS + 3 };
 enum { METHOD = IS, STEP = IS + 1, TOLERANCE = IS + 2 };
 enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4, ROSW3_ADAPTIVE = 5 };
+#if INTERMEDIATE
+enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, UPDATING, TERMINATED, FAILED };
+#else
 enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, TERMINATED, FAILED };
+#endif
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
 typedef struct {
@@ -60,6 +64,11 @@ typedef struct {
   void *environment;
   void (*log2)(void *, const char *, int, const char *, const char *, ...);
   void (*log3)(void *, int, const char *, const char *);
+#if INTERMEDIATE
+  void (*update)(void *, double, bool, bool, bool, bool, bool *, double *); /* asks the importer for inputs */
+  size_t required; /* number of inputs that it sets within steps */
+  double asked;    /* time of the present inputs */
+#endif
 } Instance;
 
 /* Log a message and return its status. FMI 2 takes the text as a format: no % may be left in it. */
@@ -84,7 +93,12 @@ static int report(Instance *c, int status, const char *format, ...) {
 }
 
 static const char *const MODE_NAMES[] = {"not initialized", "in initialization mode", "in event mode",
+#if INTERMEDIATE
+                                         "in continuous-time mode", "in step mode",
+                                         "in intermediate update mode", "terminated",
+#else
                                          "in continuous-time mode", "in step mode", "terminated",
+#endif
                                          "stopped by a failed step"};
 #define IN(mode) (1u << (mode))
 
@@ -102,8 +116,25 @@ static void evaluate_outputs(double *v) {
   f_outputs(arg, res, 0, 0, 0);
 }
 
+#if INTERMEDIATE
+/* Intermediate update: the importer sets the inputs of time t. Of an importer that declares none of them it
+   is asked at the end of a stretch only. */
+static void ask(Instance *c, double t, bool finished) {
+  if (!c->update || (!finished && (!c->required || t == c->asked))) return;
+  bool early = false;
+  double when = t;
+  c->m.mode = UPDATING;
+  c->update(c->environment, t, c->required > 0, false, finished, false, &early, &when);
+  c->m.mode = STEPPING;
+  c->asked = t;
+}
+
+#endif
 /* Inputs at time t: held, or u + u' dt + u'' dt^2/2 from the present time on. */
 static const double *inputs_at(const Memory *m, double t, double *u) {
+#if INTERMEDIATE
+  ask((Instance *)m, t, false); /* it begins with its Memory */
+#endif
   if (!m->moving) return m->v + IU;
   const double dt = t - m->v[0], half = 0.5 * dt * dt;
   for (int i = 0; i < NU; i++) u[i] = m->v[IU + i] + dt * m->slope[i] + half * m->curve[i];
@@ -125,6 +156,9 @@ static void first_derivatives(const Memory *m, double t, const double *x, double
 
 /* Go to time t with the inputs, not with the states. */
 static void move_on(Memory *m, double t) {
+#if INTERMEDIATE
+  ask((Instance *)m, t, true);
+#endif
   if (m->moving) {
     const double dt = t - m->v[0], half = 0.5 * dt * dt;
     for (int i = 0; i < NU; i++) {
@@ -207,6 +241,9 @@ static void release(Instance *c) {
 }
 
 static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
+#if INTERMEDIATE
+  if (n && c->m.mode == UPDATING) return only_in(c, 0, "getting a value");
+#endif
   for (size_t i = 0; i < n; i++) {
     const uint32_t k = vr[i] - c->first;
     if (k >= METHOD && (k >= NV || k == METHOD))
@@ -234,6 +271,9 @@ static int set_value(Instance *c, uint32_t k, double value) {
     return report(c, ERROR, "%s: state %s can only be set before the end of initialization (time %.9g s)",
                   MODEL, NAMES[k], v[0]);
   if (parameter) {
+#if INTERMEDIATE
+    if (c->m.mode == UPDATING) return only_in(c, 0, "setting a parameter");
+#endif
     if (c->m.mode == CONTINUOUS)
       return report(c, ERROR, "%s: parameter %s can be set in event mode, not in continuous-time mode", MODEL,
                     NAMES[k]);
@@ -255,7 +295,11 @@ static int set_values(Instance *c, const uint32_t vr[], size_t n, const double v
   for (size_t i = 0; i < n; i++) {
     const uint32_t k = vr[i] - c->first;
     if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input, from now on held */
+#if INTERMEDIATE
+      if (v[k] != values[i] && c->m.mode != UPDATING) c->m.stale = 1; /* what was evaluated is of the begin */
+#else
       if (v[k] != values[i]) c->m.stale = 1;
+#endif
       v[k] = values[i];
       if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
       continue;
@@ -289,6 +333,9 @@ static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, con
 /* -- saved states --------------------------------------------------------------------------------- */
 
 static int save_state(Instance *c, void **state) {
+#if INTERMEDIATE
+  if (c->m.mode == UPDATING) return only_in(c, 0, "saving a state");
+#endif
   if (!state) return report(c, ERROR, "%s: no place given for the state", MODEL);
   if (!*state) *state = malloc(sizeof(Memory));
   if (!*state) return report(c, ERROR, "%s: out of memory", MODEL);

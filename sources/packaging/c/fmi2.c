@@ -61,6 +61,9 @@ EXPORT fmi2Status fmi2ExitInitializationMode(Instance *c) { return leave_initial
 EXPORT fmi2Status fmi2Terminate(Instance *c) { return terminate(c); }
 
 EXPORT fmi2Status fmi2Reset(Instance *c) {
+#if INTERMEDIATE
+  if (c->m.mode == UPDATING) return only_in(c, 0, "a reset");
+#endif
   set_start(c);
   return OK;
 }
@@ -122,6 +125,9 @@ EXPORT fmi2Status fmi2SetString(Instance *c, const uint32_t vr[], size_t n, cons
 EXPORT fmi2Status fmi2GetFMUstate(Instance *c, void **state) { return save_state(c, state); }
 
 EXPORT fmi2Status fmi2SetFMUstate(Instance *c, void *state) {
+#if INTERMEDIATE
+  if (c->m.mode == UPDATING) return only_in(c, 0, "restoring a state");
+#endif
   if (!state) return report(c, ERROR, "%s: no state given", MODEL);
   memcpy(&c->m, state, sizeof(Memory));
   return OK;

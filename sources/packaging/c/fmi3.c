@@ -39,12 +39,28 @@ EXPORT Instance *fmi3InstantiateCoSimulation(const char *name, const char *token
   (void)resources;
   (void)visible;
   (void)early_return;
+#if INTERMEDIATE
+  Instance *c = instantiate3(name, token, 0, logging, environment, log);
+  if (!c) return 0;
+  for (size_t i = 0; i < n; i++)
+    if (required[i] - c->first < IU || required[i] - c->first >= IY) {
+      report(c, ERROR, "%s: value reference %u is among the required intermediate variables and has no "
+             "intermediateUpdate; only inputs have", MODEL, required[i]);
+      release(c);
+      return 0;
+    }
+  c->event_mode = event_mode;
+  c->update = (void (*)(void *, double, bool, bool, bool, bool, bool *, double *))update;
+  c->required = update ? n : 0;
+  return c;
+#else
   (void)required;
   (void)n;
   (void)update;
   Instance *c = instantiate3(name, token, 0, logging, environment, log);
   if (c) c->event_mode = event_mode;
   return c;
+#endif
 }
 
 EXPORT Instance *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *resources,

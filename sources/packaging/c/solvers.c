@@ -23,6 +23,18 @@ static void rodas3(Memory *m, double t, double h, double *x, double *e) {
   double *res[] = {f, j, ft};
   const double ih = 1.0 / h;
   f_jacobian(arg, res, 0, 0, 0);
+#if INTERMEDIATE
+  if (((Instance *)m)->required) { /* what the inputs add to df/dt, by the parabola through three of their values */
+    double now[NU + 1], half[NU + 1], *moved[] = {y};
+    memcpy(now, m->v + IU, NU * sizeof *now);
+    memcpy(half, inputs_at(m, t + 0.5 * h, u), NU * sizeof *half);
+    const double *const end = inputs_at(m, t + h, u);
+    for (int i = 0; i < NU; i++) u[i] = now[i] + (4.0 * (half[i] - now[i]) - (end[i] - now[i]));
+    arg[3] = u;
+    f_derivatives(arg, moved, 0, 0, 0);
+    for (int i = 0; i < NX; i++) ft[i] += (y[i] - f[i]) * ih;
+  }
+#endif
   if (m->moving) { /* what the inputs add to df/dt, by a difference along their derivatives */
     const double dt = t - m->v[0];
     for (int i = 0; i < NU; i++) u[i] += h * (m->slope[i] + dt * m->curve[i]);

@@ -102,6 +102,9 @@ EXPORT int64_t cosim_work(const Instance *c) { return c->work; }
 
 static int do_step(Instance *c, double t, double h) {
   double *v = c->m.v;
+#if INTERMEDIATE
+  if (c->m.mode == UPDATING) return only_in(c, 0, "doStep");
+#endif
   if (c->m.mode != STEPPING)
     return report(c, ERROR, "%s: doStep at %.9g s, but the FMU %s", MODEL, t,
                   c->m.mode < EVENT ? "is not initialized" : c->m.mode == FAILED ? "has failed before"
@@ -116,6 +119,9 @@ static int do_step(Instance *c, double t, double h) {
                   c->m.stop);
   if (TIMED && v[0] != t) c->m.stale = 1; /* by a rounding */
   v[0] = t;
+#if INTERMEDIATE
+  c->asked = t; /* the importer has set the inputs of the begin */
+#endif
   double next;
   do {
     run_ticks(c);
