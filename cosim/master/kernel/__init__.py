@@ -247,8 +247,8 @@ class Kernel:
         self.run.means = self._structures(
             structures.Mean,
             (
-                (m.gain, m.offset, m.source, m.target, m.order, m.ahead, m.moving, m.bonded)
-                for m in plan.means
+                (m.gain, m.offset, m.source, m.target, alike, m.order, m.ahead, m.moving, m.bonded)
+                for m, alike in zip(plan.means, made.alike(plan.means), strict=True)
             ),
         )
         self.run.n_means = len(plan.means)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmu.instance import Instance
-from ..plan import Op, Plan
+from ..plan import Mean, Op, Plan
 from . import structures
 
 
@@ -71,11 +71,22 @@ def instructions(
             found.append((code, first, last))
 
     layout = plan.layout
+
+    def extrapolated(number: int) -> set[int]:
+        """Slots that the operation behind this one sets anyway."""
+        behind = rows[number + 1].tolist() if number + 1 < len(rows) else [Op.COPY, 0, 0]
+        if behind[0] != Op.EXTRAPOLATE:
+            return set()
+        return {mean.target for mean in plan.means[behind[1] : behind[2]]}
+
     plain = (layout.copy_gain == 1.0) & (layout.copy_offset == 0.0)
     for number, row in enumerate(rows.tolist()):
         op, a, b = Op(row[0]), row[1], row[2]
         if op is Op.COPY:
+            overwritten = extrapolated(number)
             for index in range(a, b):
+                if int(layout.copy_target[index]) in overwritten:
+                    continue
                 add(Code.COPY if plain[index] else Code.SCALE, index, index + 1)
         elif op is Op.STEP:
             codes = _WATCHED if instances[a].watched else _STEPS
@@ -153,4 +164,17 @@ def stretches(slots: Sequence[int]) -> list[tuple[int, int]]:
             found[-1] = (found[-1][0], slot + 1)
         else:
             found.append((slot, slot + 1))
+    return found
+
+
+def alike(means: Sequence[Mean]) -> list[int]:
+    """Per mean how many from it on are done in one way, and belong to one instance."""
+
+    def kind(mean: Mean) -> tuple[int, int, bool, bool, bool]:
+        return mean.instance, mean.order, mean.ahead, mean.moving, mean.bonded
+
+    found = [1] * len(means)
+    for index in reversed(range(len(means) - 1)):
+        if kind(means[index]) == kind(means[index + 1]):
+            found[index] = found[index + 1] + 1
     return found
