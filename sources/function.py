@@ -18,8 +18,9 @@ QUICK, LARGE = 8, 200
 """Instructions of an output that is computed without the others, and of a function that is worth
 it."""
 
-WORTHWHILE = 0.1
-"""Part of the instructions that leaving out the energy account must spare."""
+SMALL, WORTHWHILE = 60, 0.1
+"""Instructions that are done sooner than the question which of them are needed, and
+the part of them that leaving out the energy account must spare."""
 BEGINS_WITH_DERIVATIVES = ("rk4", "dopri5", "rosw3_adaptive")
 """Solvers that take the derivatives which came with the outputs."""
 
@@ -119,7 +120,8 @@ def build_functions(model: Model) -> Functions:
     some = tuple(k for k, v in enumerate(outputs) if v.name not in account or k in few)
     reused = xdot if model.solver.method in BEGINS_WITH_DERIVATIVES else ca.SX(0, 1)
     coupled = function("f_coupled", [reused, y[list(some)] if some else ca.SX(0, 1)])
-    if coupled.n_instructions() > (1.0 - WORTHWHILE) * whole.n_instructions():
+    spared = whole.n_instructions() - coupled.n_instructions()
+    if whole.n_instructions() < SMALL or spared < WORTHWHILE * whole.n_instructions():
         some = ()
     return Functions(
         outputs=whole,

@@ -156,6 +156,7 @@ class Kernel:
         layout, instances = plan.layout, bound.instances
         self._keep: list[Any] = [bound]
         self._made: dict[type[ct.Structure], Any] = {}
+        self._same: dict[bytes, NDArray[np.uint32]] = {}
         self._bound = bound
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
@@ -279,7 +280,7 @@ class Kernel:
                     taken = []
                     for begin, end in made.stretches(own):
                         some = structures.Call.from_buffer_copy(call)
-                        some.references = part.references[begin:end].ctypes.data
+                        some.references = self._references(part.references[begin:end])
                         some.buffer = part.buffer[begin:end].ctypes.data
                         some.n_references = some.n_values = end - begin
                         taken.append(some)
@@ -301,7 +302,7 @@ class Kernel:
                 rows.append(
                     structures.Derivatives(
                         instance.address, instance.functions["fmi2SetRealInputDerivatives"],
-                        call.references.ctypes.data, call.orders.ctypes.data,
+                        self._references(call.references), call.orders.ctypes.data,
                         call.values.ctypes.data, call.references.size,
                     )
                 )  # fmt: skip
@@ -316,6 +317,14 @@ class Kernel:
             raise TypeError("not a contiguous array of float64 or int64")
         self._keep.append(array)
         return int(array.ctypes.data)
+
+    def _references(self, references: NDArray[np.uint32]) -> int:
+        """Address of value references: one for all calls that have the same, as FMUs of a kind do.
+
+        They stay in the processor's cache then, however many instances there are.
+        """
+        content = references.tobytes()
+        return int(self._same.setdefault(content, references.copy()).ctypes.data)
 
     def _structures(self, kind: type[ct.Structure], rows: Iterable[Any]) -> int:
         """Address of C structures with these contents, which are kept alive."""
@@ -334,8 +343,9 @@ class Kernel:
             slots = self._array(np.ascontiguousarray(within + base, dtype=np.int64))
         names = instance.binding.SET if op is Op.SET else instance.binding.GET
         return structures.Call(
-            instance.address, instance.functions[names[part.type]], part.references.ctypes.data,
-            part.buffer.ctypes.data, slots, part.references.size, part.buffer.size,
+            instance.address, instance.functions[names[part.type]],
+            self._references(part.references), part.buffer.ctypes.data, slots,
+            part.references.size, part.buffer.size,
             _TYPE_CODES[part.type], instance.binding.version,
         )  # fmt: skip
 

@@ -222,10 +222,9 @@ static inline void move(double *to, const double *from, size_t n) {
   for (size_t i = 0; i < n; i++) to[i] = from[i];
 }
 
-/* How many of these value references, of n and no more than `most`, follow each other; 1 if few are left. */
+/* How many of these value references, of n >= ROW and no more than `most`, follow each other; 1 if few. */
 static size_t in_a_row(const uint32_t vr[], size_t n, size_t most) {
   size_t length = 1;
-  if (n < ROW) return 1;
   if (n > most) n = most;
   while (length < n && vr[length] == vr[0] + length) length++;
   return length < ROW ? 1 : length;
@@ -238,25 +237,23 @@ static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[
     if (k >= METHOD && (k >= NV || k == METHOD))
       return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
     if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh_for(c, k);
-    /* what follows may be as fresh: the rest of a vector */
-    const char *known = c->m.stale == COUPLED_DONE ? ASKED : c->m.stale == QUICK_DONE ? QUICK : 0;
-    size_t row = 1;
-    if (c->m.stale == FRESH && k < METHOD) row = in_a_row(vr + i, n - i, METHOD - k);
-    else if (known && k >= IY && k < IP && n - i >= ROW)
-      while (row < n - i && vr[i + row] == vr[i] + row && k + row < IP && known[k + row - IY]) row++;
-    if (row < ROW) {
-      const double value = v[k];
-      values[i] = value;
-      if (!isfinite(value)) return check_finite(c, k, 1);
-      i++;
+    if (n - i >= ROW) { /* what follows may be as fresh: the rest of a vector */
+      const char *known = c->m.stale == COUPLED_DONE ? ASKED : c->m.stale == QUICK_DONE ? QUICK : 0;
+      size_t row = 1;
+      if (c->m.stale == FRESH && k < METHOD) row = in_a_row(vr + i, n - i, METHOD - k);
+      else if (known && k >= IY && k < IP)
+        while (row < n - i && vr[i + row] == vr[i] + row && k + row < IP && known[k + row - IY]) row++;
+      int odd = 0;
+      ONE_BY_ONE
+      for (size_t j = 0; j < row; j++) odd |= !(fabs(v[k + j]) <= DBL_MAX);
+      move(values + i, v + k, row);
+      if (odd) return check_finite(c, k, (int)row);
+      i += row;
       continue;
     }
-    int odd = 0;
-    ONE_BY_ONE
-    for (size_t j = 0; j < row; j++) odd |= !(fabs(v[k + j]) <= DBL_MAX);
-    move(values + i, v + k, row);
-    if (odd) return check_finite(c, k, (int)row);
-    i += row;
+    const double value = v[k];
+    values[i++] = value;
+    if (!isfinite(value)) return check_finite(c, k, 1);
   }
   return OK;
 }
@@ -291,43 +288,50 @@ static int set_value(Instance *c, uint32_t k, double value) {
   return OK;
 }
 
+/* Any variables, with what hangs on parameters only. */
+static int set_any(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
+  int parameters = 0, status = OK;
+  for (size_t i = 0; i < n && status == OK; i++) {
+    const uint32_t k = vr[i] - c->first;
+    if (k == METHOD) status = report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
+    else status = set_value(c, k, values[i]);
+    if (status == OK && k >= IU && k < IY) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
+    parameters |= k >= IP && k < IZ;
+  }
+  if (parameters) f_constants(c->m.v + IP, c->m.k);
+  return status;
+}
+
 static int set_values(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
   double *v = c->m.v;
-  int parameters = 0, status = OK;
   if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
-  for (size_t i = 0; i < n && status == OK;) {
+  for (size_t i = 0; i < n;) {
     const uint32_t k = vr[i] - c->first;
-    const size_t row = k >= IU && k < IY ? in_a_row(vr + i, n - i, IY - k) : 0;
+    if (k < IU || k >= IY || !isfinite(values[i])) return set_any(c, vr + i, n - i, values + i);
+    /* the hot path: inputs, from now on held */
+    const size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
+    if (row == 1) {
+      if (v[k] != values[i]) c->m.stale = ALL;
+      v[k] = values[i++];
+      if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
+      continue;
+    }
     int changed = 0, odd = 0;
     ONE_BY_ONE
     for (size_t j = 0; j < row; j++) {
       changed |= v[k + j] != values[i + j];
       odd |= !(fabs(values[i + j]) <= DBL_MAX);
     }
-    if (row && !odd) { /* the hot path: inputs, from now on held */
-      if (changed) c->m.stale = ALL;
-      if (row < ROW) {
-        v[k] = values[i];
-        if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
-        i++;
-        continue;
-      }
-      move(v + k, values + i, row);
-      if (c->m.moving) {
-        memset(c->m.slope + k - IU, 0, row * sizeof *v);
-        memset(c->m.curve + k - IU, 0, row * sizeof *v);
-      }
-      i += row;
-      continue;
+    if (odd) return set_any(c, vr + i, n - i, values + i);
+    if (changed) c->m.stale = ALL;
+    move(v + k, values + i, row);
+    if (c->m.moving) {
+      memset(c->m.slope + k - IU, 0, row * sizeof *v);
+      memset(c->m.curve + k - IU, 0, row * sizeof *v);
     }
-    if (k == METHOD) status = report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
-    else status = set_value(c, k, values[i]);
-    if (status == OK && k >= IU && k < IY && c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
-    parameters |= k >= IP && k < IZ;
-    i++;
+    i += row;
   }
-  if (parameters) f_constants(v + IP, c->m.k);
-  return status;
+  return OK;
 }
 
 /* Derivatives of inputs, which move with them until they are set again. */
@@ -340,7 +344,7 @@ static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, con
     if (k < IU || k >= IY) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, k);
     if (order[i] < 1 || order[i] > 2)
       return report(c, ERROR, "%s: derivative of order %d of input %s; must be 1 or 2", MODEL, order[i], NAMES[k]);
-    size_t row = in_a_row(vr + i, n - i, IY - k);
+    size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
     int odd = 0, other = 0;
     ONE_BY_ONE
     for (size_t j = 0; j < row; j++) {
