@@ -30,7 +30,12 @@ enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4, ROSW3_ADAPTIVE = 5 
 enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, TERMINATED, FAILED };
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
+/* What every call looks at comes first: it shares the cache lines of the first variables. */
 typedef struct {
+  int32_t mode;
+  int32_t stale;         /* which outputs and derivatives must be evaluated again, see below */
+  int32_t moving;        /* inputs have been given derivatives */
+  int32_t left;          /* for how many steps the Jacobian may still serve */
   double v[NV];
   double period[NC + 1]; /* of each sample clock; depends on fixed parameters only */
   double tick[NC + 1];   /* index of the next tick of each clock */
@@ -43,19 +48,15 @@ typedef struct {
   double k[NK + 1];      /* what depends on parameters only */
   double slope[NU + 1];  /* first derivatives of the inputs at the present time */
   double curve[NU + 1];  /* second derivatives */
-  int32_t mode;
-  int32_t stale;         /* which outputs and derivatives must be evaluated again, see below */
-  int32_t moving;        /* inputs have been given derivatives */
-  int32_t left;          /* for how many steps the Jacobian may still serve */
 } Memory;
 
 typedef struct {
+  uint32_t first; /* value reference of the time */
+  int version;
+  int64_t work; /* steps of solvers so far: what an importer may limit, where time would depend on the machine */
   Memory m;
   int model_exchange;
   int event_mode; /* of co-simulation, FMI 3: the importer may ask for the ticks at its points */
-  int version;
-  int64_t work; /* steps of solvers so far: what an importer may limit, where time would depend on the machine */
-  uint32_t first; /* value reference of the time */
   int logging;
   char *name;
   void *environment;
