@@ -12,6 +12,7 @@ kernel, outputs that are fetched anew, and caches that are cold.
 from __future__ import annotations
 
 import argparse
+import copy
 import hashlib
 import threading
 import time
@@ -79,8 +80,9 @@ def shares(master: Master, settings: dict[str, Any], repeats: int) -> dict[str, 
             ]  # fmt: skip
             own = [(Op.SET, index, 0), *((Op.SET_DERIVATIVES, a, b) for a, b in derivatives)]
             rows = [*own, (Op.STEP, index, 0), (Op.GET, index, 0)]
-            plan = replace(run.plan, step=operations(rows))
-            alone = kernel.Kernel(run, plan)
+            only = copy.copy(run)
+            only.plan = replace(run.plan, step=operations(rows))
+            alone = kernel.Kernel(only)
             alone.run.index = half
             times = []
             for _ in range(repeats):

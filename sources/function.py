@@ -11,12 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from .model import Clock, Declared, Model
+from .model import E_STORED, P_IN, P_LOSS, Clock, Declared, Model
 
 Vector = NDArray[np.float64]
 QUICK, LARGE = 8, 200
 """Instructions of an output that is computed without the others, and of a function that is worth
 it."""
+
+SMALL, WORTHWHILE = 60, 0.1
+"""Instructions that are done sooner than the question which of them are needed, and
+the part of them that leaving out the energy account must spare."""
+BEGINS_WITH_DERIVATIVES = ("rk4", "dopri5", "rosw3_adaptive")
+"""Solvers that take the derivatives which came with the outputs."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +36,9 @@ class Functions:
         quick: `->` the outputs that take next to nothing to compute, states above all; without
             the derivatives, on which energies and forces hang.
         quick_outputs: their indices.
+        coupled: `-> (xdot, y)`: all outputs but the energy account, which couples nothing; xdot is
+            empty where the solver does not begin a step with it.
+        coupled_outputs: their indices; none if they are hardly cheaper than all.
         derivatives: `-> xdot`.
         jacobian: `-> (xdot, d xdot/dx as nonzeros, d xdot/dt)`.
         jacobian_pattern: (row, column) of the nonzeros.
@@ -43,6 +52,8 @@ class Functions:
     outputs: ca.Function
     quick: ca.Function
     quick_outputs: tuple[int, ...]
+    coupled: ca.Function
+    coupled_outputs: tuple[int, ...]
     derivatives: ca.Function
     jacobian: ca.Function
     jacobian_pattern: tuple[tuple[int, int], ...]
@@ -105,10 +116,19 @@ def build_functions(model: Model) -> Functions:
 
     whole = function("f_outputs", [xdot, y])
     few = _quick(y, arguments) if whole.n_instructions() > LARGE else ()
+    account = (E_STORED.name, P_IN.name, P_LOSS.name)
+    some = tuple(k for k, v in enumerate(outputs) if v.name not in account or k in few)
+    reused = xdot if model.solver.method in BEGINS_WITH_DERIVATIVES else ca.SX(0, 1)
+    coupled = function("f_coupled", [reused, y[list(some)] if some else ca.SX(0, 1)])
+    spared = whole.n_instructions() - coupled.n_instructions()
+    if whole.n_instructions() < SMALL or spared < WORTHWHILE * whole.n_instructions():
+        some = ()
     return Functions(
         outputs=whole,
         quick=function("f_quick", [y[list(few)] if few else ca.SX(0, 1)]),
         quick_outputs=few,
+        coupled=coupled,
+        coupled_outputs=some,
         derivatives=function("f_derivatives", [xdot]),
         jacobian=function("f_jacobian", [xdot, _nonzeros(jacobian), ca.jacobian(xdot, t)]),
         jacobian_pattern=tuple(zip(rows, columns, strict=True)),

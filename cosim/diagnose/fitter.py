@@ -216,8 +216,10 @@ class Fitter(Judge):
         return result
 
     def _elsewhere(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
-        """The best fit from other starts, by derivatives taken there: those that stalled are of a
-        model without the effect, which may meet limits that the machine does not."""
+        """The best fit from other starts, by derivatives taken there.
+
+        Those that stalled are of a model that may meet limits, without the effect.
+        """
         best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:
             found = self.judged(fit(simulator, start, effort=DRAFT))

@@ -65,7 +65,8 @@ class Interpreter:
         noted: communication point whose values stand behind the last row.
         bond_energy, bond_turnover: energy that each bond invented, and that went over it [J].
         newtons: one per algebraic loop.
-        history, past: of extrapolated inputs, and how many values it has before the first step.
+        history, past: of extrapolated inputs, newest first, and how many values it has before the
+            first step.
         derivatives: derivatives of the inputs that move within a step.
         bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
@@ -115,7 +116,7 @@ class Interpreter:
         self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
-        self.history = np.zeros((len(self.plan.means), 4))
+        self.history = np.zeros((4, len(self.plan.means)))
         self.past = np.zeros(1, dtype=np.int64)
         self.derivatives = InputDerivatives(self.plan, self.instances, self.values)
         self.held = np.zeros(len(self.layout.bond_input))
@@ -235,8 +236,8 @@ class Interpreter:
             case Op.SOLVE:
                 self.solve(a)
             case Op.NOTE:
-                self.history[:, 1:] = self.history[:, :-1].copy()
-                self.history[:, 0] = [values[mean.source] for mean in self.plan.means]
+                self.history[1:] = self.history[:-1].copy()
+                self.history[0] = [values[mean.source] for mean in self.plan.means]
             case Op.EXTRAPOLATE:
                 for index in range(a, b):
                     self.extrapolate(index, self.plan.means[index])
@@ -251,7 +252,7 @@ class Interpreter:
 
     def extrapolate(self, index: int, mean: Mean) -> None:
         """Let an input follow the polynomial through the last values of its source."""
-        past, now = self.history[index].tolist(), float(self.values[mean.source])
+        past, now = self.history[:, index].tolist(), float(self.values[mean.source])
         order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)  # values there are
         if mean.bonded or not mean.moving:
             average = mean_of_step(order, mean.ahead, now, past) * mean.gain + mean.offset

@@ -43,14 +43,14 @@ def find_past(run: Interpreter) -> None:
                     for op, a, b in step:
                         if op not in (Op.RECORD, Op.ENERGY):
                             run.do(op, a, b)
-                    seen.append(run.history[:, 0].copy())
+                    seen.append(run.history[0].copy())
                 seen.append(run.values[sources])
             except EndRequest:  # the run itself will end there
                 run.past[0] = 0
             else:
-                run.history[:, 0] = 3.0 * seen[0] - 3.0 * seen[1] + seen[2]
-                run.history[:, 1] = 6.0 * seen[0] - 8.0 * seen[1] + 3.0 * seen[2]
-                run.history[:, 2] = 10.0 * seen[0] - 15.0 * seen[1] + 6.0 * seen[2]
+                run.history[0] = 3.0 * seen[0] - 3.0 * seen[1] + seen[2]
+                run.history[1] = 6.0 * seen[0] - 8.0 * seen[1] + 3.0 * seen[2]
+                run.history[2] = 10.0 * seen[0] - 15.0 * seen[1] + 6.0 * seen[2]
                 run.past[0] = 3
             restore(run, before)
             run.index = 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import os
-import re
 import shutil
 import struct
 import subprocess
@@ -21,6 +20,7 @@ import casadi as ca
 from cosim.spec.cache import sealed
 
 from ..function import Functions
+from .c_code import Wanted, Writer
 from .cache import cache_folder, keep
 from .elimination import eliminate
 from .layout import Entry, owners
@@ -54,10 +54,6 @@ PLATFORMS: dict[str, Platform] = {
     "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
 }
 
-CHOICES = {"fmin": "x < y ? x : y", "fmax": "x > y ? x : y"}
-"""What stands for two functions of C: one instruction, whose result for zeros of different sign is
-the same on every processor, and which hides a NaN in the first place only."""
-
 
 class CompilerError(RuntimeError):
     """The C compiler failed; the text carries what it said."""
@@ -67,23 +63,34 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _casadi_code(functions: Functions) -> str:
-    generator = ca.CodeGenerator("model", {"casadi_int": "int"})
-    used = [functions.outputs, functions.derivatives, functions.directional]
+ARGUMENTS = ("t", "x", "z", "u", "p")
+SEEDS = ("dt", "dx", "dz", "du", "dp")
+
+
+def _functions_code(functions: Functions) -> tuple[str, int]:
+    """All functions in C, and how many numbers `f_constants` gives."""
+    writer = Writer()
+
+    def write(function: ca.Function, *results: str, places: Sequence[int] | None = None) -> str:
+        """With the places of the last result's elements."""
+        ends = [(name, None) for name in results[:-1]] + [(results[-1], places)]
+        return writer.write(Wanted(function, ARGUMENTS, tuple(ends)))
+
+    code = [write(functions.outputs, "xdot", "y"), write(functions.derivatives, "xdot")]
     if functions.derivatives.numel_out():
-        used.append(functions.jacobian)
+        code.append(write(functions.jacobian, "xdot", "j", "xdot_t"))
     if functions.quick_outputs:
-        used.append(functions.quick)
+        code.append(write(functions.quick, "y", places=functions.quick_outputs))
+    if functions.coupled_outputs:
+        code.append(write(functions.coupled, "xdot", "y", places=functions.coupled_outputs))
+    code += [write(function, "z_next") for function in functions.updates]
     if functions.updates:
-        used += [functions.periods, *functions.updates]
-    for function in used:
-        generator.add(function)
-    code = str(generator.dump())
-    for name, choice in CHOICES.items():
-        code = code.replace(f"return {name}(x, y);", f"return {choice};")
-    # all arguments and results are given
-    code = re.sub(r"arg\[(\d+)\]\? arg\[\1\]\[(\d+)\] : 0", r"arg[\1][\2]", code)
-    return re.sub(r"if \(res\[\d+\]!=0\) ", "", code)
+        periods = Wanted(functions.periods, ("p",), (("periods", None),))
+        code.append(writer.write(periods, sharing=False))
+    ends = (("xdot", None), ("y", None))
+    directional = Wanted(functions.directional, ARGUMENTS + SEEDS, ends)
+    code.append(writer.write(directional, sharing=False))
+    return "\n".join([*code, writer.constants()]), writer.kept
 
 
 def model_source(functions: Functions, entries: list[Entry], identifier: str) -> str:
@@ -97,6 +104,7 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
     }
     nx = counts["state"]
     elimination = eliminate(nx, functions.jacobian_pattern)
+    code, kept = _functions_code(functions)
     sizes = {
         "NX": nx,
         "NU": counts["input"],
@@ -106,7 +114,10 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         "NC": len(functions.updates),
         "NJ": len(functions.jacobian_pattern),
         "NLU": elimination.size,
+        "NK": kept,
         "NQ": len(functions.quick_outputs),
+        "COUPLED": int(bool(functions.coupled_outputs)),
+        "COUPLED_RATES": int(bool(functions.coupled.numel_out(0))),
         "TIMED": int(any(functions.outputs.jac_sparsity(k, 0).nnz() for k in (0, 1))),
     }
     infinity = float("inf")
@@ -119,8 +130,7 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
     quoted = ", ".join(f'"{entry.name}"' for entry in entries)
     lines = [
         f"/* Model {identifier}: generated, do not edit. */",
-        "#define CASADI_SYMBOL_EXPORT static",
-        _casadi_code(functions),
+        code,
         *(f"#define {name} {value}" for name, value in sizes.items()),
         f'#define MODEL "{identifier}"',
         '#define TOKEN "@TOKEN@"',
@@ -140,18 +150,13 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         f"static const int OWNER[] = {{{', '.join(map(str, [*owners(entries), 0]))}}};",
         f"static const double NOMINAL[] = {{{', '.join(map(_number, [*nominal, 1.0]))}}};",
     ]
-    if functions.quick_outputs:
-        few = [str(int(k in functions.quick_outputs)) for k in range(counts["output"])]
-        places = map(str, functions.quick_outputs)
-        lines += [
-            f"static const char QUICK[] = {{{', '.join(few)}}};",
-            f"static const int QUICK_PLACE[] = {{{', '.join(places)}}};",
-        ]
+    for name, some in (("QUICK", functions.quick_outputs), ("ASKED", functions.coupled_outputs)):
+        few = [str(int(k in some)) for k in range(counts["output"])]
+        lines.append(f"static const char {name}[] = {{{', '.join([*few, '0'])}}};")
     if functions.updates:
         names = ", ".join(function.name() for function in functions.updates)
         lines.append(
-            "static int (*const UPDATES[])(const double **, double **, int *, double *, int) = "
-            f"{{{names}}};"
+            f"static void (*const UPDATES[])({'const double *, ' * 6}double *) = {{{names}}};"
         )
     if nx:
         lines += [

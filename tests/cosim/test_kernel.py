@@ -12,6 +12,7 @@ from cosim import Constant, Function, Master, System, Table
 from cosim.data.recording import Recording
 from cosim.errors import StepError, ValueRangeError
 from cosim.master import algorithms, kernel
+from cosim.master.kernel import instructions
 from cosim.master.plan import operations
 from cosim.spec import cache
 from sources.packaging.build import host_platform
@@ -226,19 +227,19 @@ def test_unlike_copies_and_calls_are_not_merged(affine: Path, foreign3: Path) ->
     """One instruction per run of like operations, in the order of the plan."""
     system = mixed(affine, foreign3)
     seen: list[list[tuple[int, int, int]]] = []
-    original = kernel._instructions
+    original = instructions.instructions
 
     def spy(*arguments: object) -> list[tuple[int, int, int]]:
         seen.append(original(*arguments))
         return seen[-1]
 
     patch = pytest.MonkeyPatch()
-    patch.setattr(kernel, "_instructions", spy)
+    patch.setattr(instructions, "instructions", spy)
     try:
         Master(system, "jacobi", 0.1, executor="c").run(0.1)
     finally:
         patch.undo()
-    names = [kernel._Code(code).name for code, _, _ in seen[0]]
+    names = [instructions.Code(code).name for code, _, _ in seen[0]]
     assert names[:2] == ["EXTERNAL", "RECORD"] and names[-1] == "ENERGY"
     assert "COPY" in names and "SCALE" in names and "CONVERT_SET" in names
     steps = [n for n in names if n.startswith(("STEP", "WATCHED"))]
@@ -253,14 +254,40 @@ def test_unlike_copies_and_calls_are_not_merged(affine: Path, foreign3: Path) ->
 def test_outputs_fetched_after_the_energy_are_noted_again() -> None:
     """Outputs may be noted at the end of the step before only if nothing comes between."""
     plan = algorithms.compile_plan("jacobi", bench(), [], ["load.w"])
-    assert kernel._carried(plan)
+    assert instructions.carried(plan)
     rows = plan.step.tolist()
     energy = rows.pop()
     late = type(plan)(
         plan.algorithm, plan.layout, plan.initial,
         operations([*rows[:-1], energy, rows[-1]]), plan.final,
     )  # fmt: skip
-    assert not kernel._carried(late)
+    assert not instructions.carried(late)
+
+
+def test_outputs_fetched_twice_in_a_step_are_fetched_once_where_nobody_reads_between() -> None:
+    """The motor's torque goes to the gearbox at once, the rest waits for the inputs at the end."""
+    system = bench()
+    observed = ["motor.i", "motor.P_loss", "load.w"]
+    plan = algorithms.compile_plan(
+        "gauss_seidel", system, [], observed, options={"extrapolation": 2}
+    )
+    names, needed = plan.layout.names, instructions.needed(plan)
+    first = min(row for row in needed if plan.layout.instances[plan.step[row, 1]] == "motor")
+    assert [names[slot] for slot in needed[first]] == ["motor.tau"]
+    # fetched once: plain Jacobi asks each FMU once a step, for everything
+    assert instructions.needed(algorithms.compile_plan("jacobi", system, [], observed)) == {}
+    runs = [
+        Master(system, "gauss_seidel", 1e-3, executor=executor, options={"extrapolation": 2}).run(
+            0.3, inputs={"motor.w_ref": SINE}, record=observed
+        )
+        for executor in ("python", "c")
+    ]
+    same(*runs)
+
+
+def test_stretches_of_slots() -> None:
+    assert instructions.stretches([2, 3, 4, 7, 9, 10]) == [(2, 5), (7, 8), (9, 11)]
+    assert instructions.stretches([]) == []
 
 
 # -- errors ----------------------------------------------------------------------------------------

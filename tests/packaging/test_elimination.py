@@ -11,10 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from sources.packaging import c_functions, native, runtime
+from sources.packaging import c_code, c_functions, native, runtime
 from sources.packaging.build import host_platform
 from sources.packaging.elimination import Elimination, eliminate
 
@@ -92,16 +93,25 @@ UNARY = (
     *("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan"),
     *("sinh", "cosh", "tanh", "asinh", "floor", "ceil"),
 )
+CHOICES = {
+    "fmin": c_code.FORMS[ca.OP_FMIN].format("x", "y"),
+    "fmax": c_code.FORMS[ca.OP_FMAX].format("x", "y"),
+}
+OWN = {"sin": "own_sin", "cos": "own_cos"}
 EXPORT = '__attribute__((visibility("default"))) double'
 C_SOURCE = "\n".join(
     [
-        "#include <math.h>",
+        '#include "trigonometry.c"',
+        "static double own_sin(double a) { double s, c; sine_cosine(a, &s, &c); return s; }",
+        "static double own_cos(double a) { double s, c; sine_cosine(a, &s, &c); return c; }",
+        '__attribute__((visibility("default"))) void c_both(int n, const double *x, double *s, '
+        "double *c) { sines_cosines(n, x, s, c); }",
         f"{EXPORT} c_div(double a, double b) {{ return a / b; }}",
         *(
             f"{EXPORT} c_{name}(double x, double y) {{ return {text}; }}"
-            for name, text in {**{n: f"{n}(x, y)" for n in BINARY}, **native.CHOICES}.items()
+            for name, text in {**{n: f"{n}(x, y)" for n in BINARY}, **CHOICES}.items()
         ),
-        *(f"{EXPORT} c_{name}(double a) {{ return {name}(a); }}" for name in UNARY),
+        *(f"{EXPORT} c_{name}(double a) {{ return {OWN.get(name, name)}(a); }}" for name in UNARY),
         "",
     ]
 )
@@ -113,7 +123,8 @@ VALUES = (*SPECIAL, math.inf, -math.inf, math.nan)
 def c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     suffix = native.PLATFORMS[host_platform()].suffix
     path = tmp_path_factory.mktemp("c") / f"functions{suffix}"
-    files = {"functions.c": C_SOURCE}
+    trigonometry = (native.C_SOURCES / "trigonometry.c").read_text(encoding="utf-8")
+    files = {"functions.c": C_SOURCE, "trigonometry.c": trigonometry}
     path.write_bytes(native.compile_c(files, "functions.c", "functions", host_platform()))
     return ctypes.CDLL(str(path))
 
@@ -147,10 +158,37 @@ def test_unary_functions_are_those_of_c(c: ctypes.CDLL, name: str) -> None:
         assert same(of_python(a), of_c(a)), a
 
 
+def angles() -> np.ndarray:
+    """Of all sizes, and next to where sine or cosine vanish; their number is even."""
+    near = np.arange(-50.0, 50.0) * (math.pi / 2)
+    random = np.random.default_rng(1).uniform(-1.0, 1.0, 1000)
+    return np.concatenate([near, np.nextafter(near, 1e9), random, 10.0 * random, 1.5e6 * random])
+
+
+@pytest.mark.parametrize("far", [[], [2e6, -1e300]])
+def test_sines_of_many_angles_are_those_of_each_and_of_python(
+    c: ctypes.CDLL, far: list[float]
+) -> None:
+    x = np.append(angles(), far)
+    sines, cosines = np.empty_like(x), np.empty_like(x)
+    c.c_both(ctypes.c_int(x.size), *(ctypes.c_void_p(a.ctypes.data) for a in (x, sines, cosines)))
+    expected = np.array([c_functions._sine_cosine(a) for a in x.tolist()])
+    np.testing.assert_array_equal(sines, expected[:, 0])
+    np.testing.assert_array_equal(cosines, expected[:, 1])
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).nmant < 60, reason="no longer numbers to compare with")
+def test_sine_and_cosine_are_right_to_the_last_digit() -> None:
+    x = angles()[200:]  # multiples of pi/2 would need still longer numbers
+    for k, function in enumerate((np.sin, np.cos)):
+        exact = function(x.astype(np.longdouble))
+        found = np.array([c_functions._sine_cosine(a)[k] for a in x.tolist()])
+        units = np.abs(found - exact) / np.spacing(np.abs(exact.astype(np.float64)))
+        assert units.max() < 1.1  # as fdlibm
+
+
 @pytest.mark.parametrize("a", VALUES)
 def test_sign_is_that_of_casadi(a: float) -> None:
-    import casadi as ca
-
     x = ca.SX.sym("x")
     assert same(c_functions._sign(a), float(ca.Function("f", [x], [ca.sign(x)])(a)))
 

@@ -10,9 +10,8 @@ import ctypes as ct
 import hashlib
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,8 @@ from ...fmu.surroundings import MODES
 from ...spec import cache
 from ..input_derivatives import InputDerivatives
 from ..interpreter import Interpreter
-from ..plan import Op, Plan
+from ..plan import Op
+from . import instructions as made
 from . import structures
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
@@ -37,36 +37,6 @@ _TYPES = (
     "Boolean", "Boolean2", "Float32Whole",
 )  # fmt: skip
 _TYPE_CODES = {**{name: code for code, name in enumerate(_TYPES)}, "Enumeration2": 6}
-
-
-class _Code(IntEnum):
-    """Operations of the compiled executor."""
-
-    EXTERNAL = 0
-    RECORD = 1
-    COPY = 2
-    SCALE = 3
-    CALL2 = 4
-    CALL3 = 5
-    CONVERT_SET = 6
-    CONVERT_GET = 7
-    STEP2 = 8
-    STEP3 = 9
-    ENERGY = 10
-    SOLVE = 11
-    NOTE = 12
-    EXTRAPOLATE = 13
-    SUBSTEP = 14
-    HOLD = 15
-    SET_DERIVATIVES = 16
-    WATCHED2 = 17
-    WATCHED3 = 18
-    MOVE = 19
-
-
-_STEPS = {2: _Code.STEP2, 3: _Code.STEP3}
-_WATCHED = {2: _Code.WATCHED2, 3: _Code.WATCHED3}
-"""By FMI version."""
 
 
 UNFIT = 1002
@@ -187,6 +157,7 @@ class Kernel:
         layout, instances = plan.layout, bound.instances
         self._keep: list[Any] = [bound]
         self._made: dict[type[ct.Structure], Any] = {}
+        self._same: dict[bytes, NDArray[np.uint32]] = {}
         self._bound = bound
         self._parts: list[tuple[Op, Instance, Any]] = []
         self._instances = instances
@@ -203,6 +174,7 @@ class Kernel:
                     calls.append(self._call(op, instance, block, part, int(slots[index, 0])))
                     self._parts.append((op, instance, part))
                 spans[op, index] = (first, len(calls))
+        fewer = self._fewer(calls)
         self.run = structures.Run(
             members=self._structures(structures.Member, map(_member, instances)),
             n_members=len(instances),
@@ -245,17 +217,17 @@ class Kernel:
             bond_turnover=self._array(bound.bond_turnover),
             n_terms=len(layout.bond_output),
             final=programs is None,
-            carried=_carried(plan),
+            carried=made.carried(plan),
         )  # fmt: skip
         if bound.witness is not None:
             self.run = bound.witness.compiled(self.run)
         told = self._derivatives(bound.derivatives)
-        instructions = _instructions(plan, plan.step, spans, calls, instances, told)
+        instructions = made.instructions(plan, plan.step, spans, calls, instances, told, fewer)
         self.run.n_instructions = len(instructions)
         loops = []
         for loop, newton in zip(plan.loops, bound.newtons, strict=True):
             first = len(instructions)
-            instructions += _instructions(plan, loop.sweep, spans, calls, instances, told)
+            instructions += made.instructions(plan, loop.sweep, spans, calls, instances, told)
             loops.append(
                 structures.Loop(
                     self._array(loop.sources),
@@ -271,14 +243,14 @@ class Kernel:
         self._programs = []
         for program in programs or ():
             first = len(instructions)
-            instructions += _instructions(plan, program, spans, calls, instances, told)
+            instructions += made.instructions(plan, program, spans, calls, instances, told)
             self._programs.append((first, len(instructions)))
         self.run.instructions = self._structures(structures.Instruction, instructions)
         self.run.means = self._structures(
             structures.Mean,
             (
-                (m.gain, m.offset, m.source, m.target, m.order, m.ahead, m.moving, m.bonded)
-                for m in plan.means
+                (m.gain, m.offset, m.source, m.target, alike, m.order, m.ahead, m.moving, m.bonded)
+                for m, alike in zip(plan.means, made.alike(plan.means), strict=True)
             ),
         )
         self.run.n_means = len(plan.means)
@@ -289,6 +261,34 @@ class Kernel:
                 [(int(op), numbers[instance]) for op, instance, _ in self._parts],
                 [(int(Op.SET_DERIVATIVES), numbers[instance]) for instance, _ in self._told],
             )
+
+    def _fewer(self, calls: list[structures.Call]) -> dict[int, tuple[int, int]]:
+        """Calls that fetch no more than is read before the same outputs are fetched again.
+
+        They are added to `calls`; returned are their numbers by row of `plan.step`.
+        """
+        bound, found = self._bound, {}
+        for row, slots in made.needed(bound.plan).items():
+            index = int(bound.plan.step[row, 1])
+            instance, block = bound.instances[index], bound.outputs[index]
+            base, first = int(bound.layout.outputs[index, 0]), len(calls)
+            own = [slot - base for slot in slots]
+            for part in block.parts:
+                call = self._call(Op.GET, instance, block, part, base)
+                if call.slots or part.references.size != part.buffer.size:
+                    taken = [call] if own else []
+                else:
+                    taken = []
+                    for begin, end in made.stretches(own):
+                        some = structures.Call.from_buffer_copy(call)
+                        some.references = self._references(part.references[begin:end])
+                        some.buffer = part.buffer[begin:end].ctypes.data
+                        some.n_references = some.n_values = end - begin
+                        taken.append(some)
+                calls += taken
+                self._parts += [(Op.GET, instance, part)] * len(taken)
+            found[row] = (first, len(calls))
+        return found
 
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
         """Bind the calls; per SET_DERIVATIVES operation the first and behind the last."""
@@ -303,7 +303,7 @@ class Kernel:
                 rows.append(
                     structures.Derivatives(
                         instance.address, instance.functions["fmi2SetRealInputDerivatives"],
-                        call.references.ctypes.data, call.orders.ctypes.data,
+                        self._references(call.references), call.orders.ctypes.data,
                         call.values.ctypes.data, call.references.size,
                     )
                 )  # fmt: skip
@@ -318,6 +318,14 @@ class Kernel:
             raise TypeError("not a contiguous array of float64 or int64")
         self._keep.append(array)
         return int(array.ctypes.data)
+
+    def _references(self, references: NDArray[np.uint32]) -> int:
+        """Address of value references: one for all calls that have the same, as FMUs of a kind do.
+
+        They stay in the processor's cache then, however many instances there are.
+        """
+        content = references.tobytes()
+        return int(self._same.setdefault(content, references.copy()).ctypes.data)
 
     def _structures(self, kind: type[ct.Structure], rows: Iterable[Any]) -> int:
         """Address of C structures with these contents, which are kept alive."""
@@ -336,8 +344,9 @@ class Kernel:
             slots = self._array(np.ascontiguousarray(within + base, dtype=np.int64))
         names = instance.binding.SET if op is Op.SET else instance.binding.GET
         return structures.Call(
-            instance.address, instance.functions[names[part.type]], part.references.ctypes.data,
-            part.buffer.ctypes.data, slots, part.references.size, part.buffer.size,
+            instance.address, instance.functions[names[part.type]],
+            self._references(part.references), part.buffer.ctypes.data, slots,
+            part.references.size, part.buffer.size,
             _TYPE_CODES[part.type], instance.binding.version,
         )  # fmt: skip
 
@@ -435,62 +444,3 @@ def _member(instance: Instance) -> structures.Member:
     update = instance.moved.address if instance.moved is not None else 0
     kept = (*states, 0, update)
     return structures.Member(instance.address, step, functions.get(WORK, 0), 0.0, 0, 0, *kept)
-
-
-def _instructions(
-    plan: Plan,
-    rows: NDArray[np.int64],
-    spans: dict[tuple[Op, int], tuple[int, int]],
-    calls: Sequence[structures.Call],
-    instances: Sequence[Instance],
-    told: Mapping[tuple[int, int], tuple[int, int]],
-) -> list[tuple[int, int, int]]:
-    """The operations of these rows, in order; neighbours of one kind become one."""
-    found: list[tuple[int, int, int]] = []
-
-    def add(code: _Code, first: int, last: int) -> None:
-        if found and found[-1][0] == code and found[-1][2] == first:
-            found[-1] = (code, found[-1][1], last)
-        else:
-            found.append((code, first, last))
-
-    layout = plan.layout
-    plain = (layout.copy_gain == 1.0) & (layout.copy_offset == 0.0)
-    for row in rows.tolist():
-        op, a, b = Op(row[0]), row[1], row[2]
-        if op is Op.COPY:
-            for index in range(a, b):
-                add(_Code.COPY if plain[index] else _Code.SCALE, index, index + 1)
-        elif op is Op.STEP:
-            codes = _WATCHED if instances[a].watched else _STEPS
-            add(codes[instances[a].binding.version], a, a + 1)
-        elif op is Op.SET_DERIVATIVES:
-            add(_Code.SET_DERIVATIVES, *told[a, b])
-        elif op is Op.SUBSTEP:
-            kind = 2 * instances[a].watched + (instances[a].binding.version == 3)
-            found.append((_Code.SUBSTEP, a, 4 * b + kind))
-        elif op in (Op.SET, Op.GET):
-            for index in range(*spans[op, a]):
-                code = _Code.CALL2 if calls[index].version == 2 else _Code.CALL3
-                if calls[index].slots:
-                    code = _Code.CONVERT_SET if op is Op.SET else _Code.CONVERT_GET
-                add(code, index, index + 1)
-        else:
-            found.append((_Code[op.name], a, b))
-    return found
-
-
-def _carried(plan: Plan) -> bool:
-    """Whether the outputs that a step ends with are those that the next one notes for its bonds.
-
-    So it is if energy is added after the last get call, and noted before the first one.
-    """
-    codes = plan.step[:, 0].tolist()
-    gets = [index for index, code in enumerate(codes) if code in (Op.GET, Op.SOLVE)]
-    notes = [index for index, code in enumerate(codes) if code == Op.RECORD]
-    sums = [index for index, code in enumerate(codes) if code == Op.ENERGY]
-    return (
-        len(notes) == len(sums) == 1
-        and notes[0] < min(gets, default=len(codes))
-        and sums[0] > max(gets, default=-1)
-    )

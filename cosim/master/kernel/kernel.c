@@ -12,6 +12,7 @@
 
 #include <fenv.h>
 #include <float.h>
+#include <string.h>
 
 #include "run.h"
 
@@ -241,39 +242,58 @@ static double bend(double a, double b, double c, double d) {
   return last * before > 0.0 ? nearer : 0.0;
 }
 
+/* Slope and curve of an input by a parabola through its source, newest value first. */
+static inline void parabola(int ahead, double a, double b, double c, double d, double half, double square,
+                            double *slope, double *curve) {
+  const double second = bend(a, b, c, d), chord = 2.0 * (a - b);
+  *slope = (ahead ? chord - second : chord + second) * half;
+  *curve = second * square;
+}
+
 /* Inputs by the polynomial through the last values of their source: its mean over the step, or
    its value at the begin and its derivatives. */
 static void extrapolate(Run *run, int64_t first, int64_t last) {
   const double inverse = 1.0 / run->step, half = 0.5 * inverse, square = inverse * inverse;
-  for (int64_t i = first; i < last; i++) {
-    const Mean *m = run->means + i;
-    const double *p = run->history + 4 * i, now = run->values[m->source];
+  const double *const h0 = run->history, *const h1 = h0 + run->n_means, *const h2 = h1 + run->n_means,
+               *const h3 = h2 + run->n_means;
+  double *const values = run->values;
+  for (int64_t i = first, n; i < last; i += n) {
+    const Mean *const m = run->means + i;
     const int64_t known = run->index + *run->past + (m->ahead ? 1 : 0);
     const int64_t order = m->order < known ? m->order : known;
-    if (m->bonded || !m->moving) {
-      double mean;
-      if (m->ahead)
-        mean = order == 1 ? 0.5 * (now + p[0]) : 0.5 * (now + p[0]) - bend(now, p[0], p[1], p[2]) / 12.0;
-      else
-        mean = order == 0 ? p[0] : order == 1 ? 1.5 * p[0] - 0.5 * p[1]
-               : p[0] + 0.5 * (p[0] - p[1]) + 5.0 * bend(p[0], p[1], p[2], p[3]) / 12.0;
-      run->average[i] = mean * m->gain + m->offset;
-    }
+    n = m->alike < last - i ? m->alike : last - i;
+    if (m->bonded || !m->moving)
+      for (int64_t j = 0, k = i; j < n; j++, k++) {
+        const double now = values[m[j].source];
+        double mean;
+        if (m->ahead)
+          mean = order == 1 ? 0.5 * (now + h0[k]) : 0.5 * (now + h0[k]) - bend(now, h0[k], h1[k], h2[k]) / 12.0;
+        else
+          mean = order == 0 ? h0[k] : order == 1 ? 1.5 * h0[k] - 0.5 * h1[k]
+                 : h0[k] + 0.5 * (h0[k] - h1[k]) + 5.0 * bend(h0[k], h1[k], h2[k], h3[k]) / 12.0;
+        run->average[k] = mean * m[j].gain + m[j].offset;
+      }
     if (!m->moving) {
-      run->values[m->target] = run->average[i];
+      for (int64_t j = 0; j < n; j++) values[m[j].target] = run->average[i + j];
       continue;
     }
-    double slope = 0.0, curve = 0.0;
-    if (order == 1) {
-      slope = (m->ahead ? now - p[0] : p[0] - p[1]) * inverse;
-    } else if (order == 2) {
-      const double second = m->ahead ? bend(now, p[0], p[1], p[2]) : bend(p[0], p[1], p[2], p[3]);
-      slope = (m->ahead ? 2.0 * (now - p[0]) - second : 2.0 * (p[0] - p[1]) + second) * half;
-      curve = second * square;
+    double *const slope = run->slope + i, *const curve = run->curve + i;
+    if (order == 2 && m->ahead)
+      for (int64_t j = 0, k = i; j < n; j++, k++)
+        parabola(1, values[m[j].source], h0[k], h1[k], h2[k], half, square, slope + j, curve + j);
+    else if (order == 2)
+      for (int64_t j = 0, k = i; j < n; j++, k++)
+        parabola(0, h0[k], h1[k], h2[k], h3[k], half, square, slope + j, curve + j);
+    else
+      for (int64_t j = 0, k = i; j < n; j++, k++) {
+        slope[j] = order == 0 ? 0.0 : (m->ahead ? values[m[j].source] - h0[k] : h0[k] - h1[k]) * inverse;
+        curve[j] = 0.0;
+      }
+    for (int64_t j = 0; j < n; j++) {
+      values[m[j].target] = h0[i + j] * m[j].gain + m[j].offset;
+      slope[j] = slope[j] * m[j].gain;
+      curve[j] = curve[j] * m[j].gain;
     }
-    run->values[m->target] = p[0] * m->gain + m->offset;
-    run->slope[i] = slope * m->gain;
-    run->curve[i] = curve * m->gain;
   }
 }
 
@@ -369,13 +389,8 @@ solved:
     return status; /* the instruction inside has said what failed */
   NEXT;
 note:
-  for (int64_t i = 0; i < run->n_means; i++) {
-    double *const h = run->history + 4 * i;
-    h[3] = h[2];
-    h[2] = h[1];
-    h[1] = h[0];
-    h[0] = run->values[run->means[i].source];
-  }
+  memmove(run->history + run->n_means, run->history, 3 * (size_t)run->n_means * sizeof *run->history);
+  for (int64_t i = 0; i < run->n_means; i++) run->history[i] = run->values[run->means[i].source];
   NEXT;
 hold:
   for (int64_t i = 0; i < run->n_terms; i++) {

@@ -91,7 +91,9 @@ typedef struct {
 /* An input that follows a polynomial through its source's values: see cosim/master/plan.py. */
 typedef struct {
   double gain, offset;
-  int64_t source, target, order, ahead, moving, bonded;
+  int32_t source, target;
+  int32_t alike; /* how many from here on are of the same kind and belong to one instance */
+  int8_t order, ahead, moving, bonded;
 } Mean;
 
 /* One call that tells an FMU derivatives of its inputs: see cosim/master/input_derivatives.py. */
@@ -127,7 +129,7 @@ typedef struct {
   int64_t next_record; /* the next one to be kept */
   const Loop *loops;
   const Mean *means;
-  double *history; /* per mean the source at the beginnings of this step and the three before */
+  double *history; /* n_means of the sources at the beginning of this step, then of the three before */
   const int64_t *past; /* how many of them there are before the first step */
   int64_t n_means;
   double *average, *slope, *curve; /* per mean: over the step, derivatives at its begin */

@@ -6,7 +6,8 @@ import ctypes as ct
 
 from ...fmu.intermediate import Group, Update
 
-P, I64, I32, D = ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_double
+P, D = ct.c_void_p, ct.c_double
+I64, I32, I8 = ct.c_int64, ct.c_int32, ct.c_int8
 
 
 class Call(ct.Structure):
@@ -63,8 +64,8 @@ class Mean(ct.Structure):
     """As in `run.h`."""
 
     _fields_ = (
-        ("gain", D), ("offset", D), ("source", I64), ("target", I64), ("order", I64),
-        ("ahead", I64), ("moving", I64), ("bonded", I64),
+        ("gain", D), ("offset", D), ("source", I32), ("target", I32), ("alike", I32),
+        ("order", I8), ("ahead", I8), ("moving", I8), ("bonded", I8),
     )  # fmt: skip
 
 

@@ -1,4 +1,6 @@
 /* The whole FMU as one translation unit: nothing but the FMI functions and cosim_work is visible outside. */
+#include "trigonometry.c"
+
 #include "model.c"
 
 #include "core.c"

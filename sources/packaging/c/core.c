@@ -1,6 +1,6 @@
 /* One FMU instance: its variables, how they are set and read, its saved states. Included by all.c
-   after the generated model.c, which defines the sizes NX NU NY NP NZ NC, the tables and the CasADi
-   functions; solvers.c and steps.c follow.
+   after the generated model.c, which defines the sizes NX NU NY NP NZ NC NK, the tables and the functions
+   f_…; solvers.c and steps.c follow.
 
    All variables stand in one array v of doubles; the value reference of a variable is its index, in
    FMI 3 one more:
@@ -29,12 +29,20 @@ enum { METHOD = IS, STEP = IS + 1, TOLERANCE = IS + 2 };
 enum { RK4 = 1, RODAS3 = 2, DOPRI5 = 3, RODAS3_ADAPTIVE = 4, ROSW3_ADAPTIVE = 5 };
 #if INTERMEDIATE
 enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, UPDATING, TERMINATED, FAILED };
+/* What was evaluated is of the begin of a step within which inputs are set. */
+#define UPDATED(c) ((c)->m.mode == UPDATING)
 #else
+#define UPDATED(c) 0
 enum { INSTANTIATED, INITIALIZING, EVENT, CONTINUOUS, STEPPING, TERMINATED, FAILED };
 #endif
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
+/* What every call looks at comes first: it shares the cache lines of the first variables. */
 typedef struct {
+  int32_t mode;
+  int32_t stale;         /* which outputs and derivatives must be evaluated again, see below */
+  int32_t moving;        /* inputs have been given derivatives */
+  int32_t left;          /* for how many steps the Jacobian may still serve */
   double v[NV];
   double period[NC + 1]; /* of each sample clock; depends on fixed parameters only */
   double tick[NC + 1];   /* index of the next tick of each clock */
@@ -44,21 +52,18 @@ typedef struct {
   double j[NJ + 1];      /* Jacobian that is kept, and the factors of its matrix */
   double w[NLU + 1];
   double hw;             /* the step that they are for, of ROS34PW2 > 0, of Rodas3 < 0 */
+  double k[NK + 1];      /* what depends on parameters only */
   double slope[NU + 1];  /* first derivatives of the inputs at the present time */
   double curve[NU + 1];  /* second derivatives */
-  int32_t mode;
-  int32_t stale;         /* outputs and derivatives must be evaluated again; QUICK_DONE: but for the quick ones */
-  int32_t moving;        /* inputs have been given derivatives */
-  int32_t left;          /* for how many steps the Jacobian may still serve */
 } Memory;
 
 typedef struct {
+  uint32_t first; /* value reference of the time */
+  int version;
+  int64_t work; /* steps of solvers so far: what an importer may limit, where time would depend on the machine */
   Memory m;
   int model_exchange;
   int event_mode; /* of co-simulation, FMI 3: the importer may ask for the ticks at its points */
-  int version;
-  int64_t work; /* steps of solvers so far: what an importer may limit, where time would depend on the machine */
-  uint32_t first; /* value reference of the time */
   int logging;
   char *name;
   void *environment;
@@ -110,10 +115,13 @@ static int only_in(Instance *c, unsigned modes, const char *call) {
 
 /* -- model functions ------------------------------------------------------------------------ */
 
-static void evaluate_outputs(double *v) {
-  const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
-  double *res[] = {v + IXD, v + IY};
-  f_outputs(arg, res, 0, 0, 0);
+/* What is stale: everything, everything but what costs nothing, only the energies that nobody is coupled by. */
+enum { FRESH, ALL, QUICK_DONE, COUPLED_DONE };
+
+static void evaluate_outputs(Memory *m) {
+  double *v = m->v;
+  f_outputs(v, v + IX, v + IZ, v + IU, v + IP, m->k, v + IXD, v + IY);
+  m->stale = FRESH;
 }
 
 #if INTERMEDIATE
@@ -143,14 +151,12 @@ static const double *inputs_at(const Memory *m, double t, double *u) {
 
 static void derivatives(const Memory *m, double t, const double *x, double *xdot) {
   double u[NU + 1];
-  const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
-  double *res[] = {xdot};
-  f_derivatives(arg, res, 0, 0, 0);
+  f_derivatives(&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP, m->k, xdot);
 }
 
 /* Derivatives at the begin of a solver's step: those that were fetched there, if nothing has changed. */
 static void first_derivatives(const Memory *m, double t, const double *x, double *xdot) {
-  if (!m->stale && t == m->v[0]) memcpy(xdot, m->v + IXD, NX * sizeof *xdot);
+  if ((m->stale == FRESH || (COUPLED_RATES && m->stale == COUPLED_DONE)) && t == m->v[0]) memcpy(xdot, m->v + IXD, NX * sizeof *xdot);
   else derivatives(m, t, x, xdot);
 }
 
@@ -169,30 +175,31 @@ static void move_on(Memory *m, double t) {
   m->v[0] = t;
 }
 
-enum { QUICK_DONE = 2 };
-
 static void refresh(Instance *c) {
-  if (c->m.stale) {
-    evaluate_outputs(c->m.v);
-    c->m.stale = 0;
-  }
+  if (c->m.stale) evaluate_outputs(&c->m);
 }
 
-/* Bring an output or derivative up to date: outputs such as a state without all the others. */
+/* Bring an output or derivative up to date: outputs such as a state without all the others, and what is
+   coupled without the energies. */
 static void refresh_for(Instance *c, uint32_t k) {
+  Memory *m = &c->m;
+  double *v = m->v;
+  (void)v;
 #if NQ
   if (k >= IY && QUICK[k - IY]) {
-    if (c->m.stale == QUICK_DONE) return;
-    double *v = c->m.v, y[NQ];
-    const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
-    double *res[] = {y};
-    f_quick(arg, res, 0, 0, 0);
-    for (int i = 0; i < NQ; i++) v[IY + QUICK_PLACE[i]] = y[i];
-    c->m.stale = QUICK_DONE;
+    if (m->stale != ALL) return;
+    f_quick(v, v + IX, v + IZ, v + IU, v + IP, m->k, v + IY);
+    m->stale = QUICK_DONE;
     return;
   }
-#else
-  (void)k;
+#endif
+#if COUPLED
+  if (k >= IY && ASKED[k - IY]) {
+    if (m->stale == COUPLED_DONE) return;
+    f_coupled(v, v + IX, v + IZ, v + IU, v + IP, m->k, v + IXD, v + IY);
+    m->stale = COUPLED_DONE;
+    return;
+  }
 #endif
   refresh(c);
 }
@@ -212,7 +219,8 @@ static void set_start(Instance *c) {
   memcpy(c->m.v, START, sizeof c->m.v);
   c->m.stop = INFINITY;
   c->m.mode = INSTANTIATED;
-  c->m.stale = 1;
+  c->m.stale = ALL;
+  f_constants(c->m.v + IP, c->m.k);
 }
 
 static Instance *instantiate(const char *name, const char *token, int version, int model_exchange,
@@ -240,17 +248,52 @@ static void release(Instance *c) {
   free(c);
 }
 
+enum { ROW = 6 }; /* so many neighbours are worth being moved together */
+#if defined(__clang__) /* one by one: a wide load waits until what has just been written in parts is in the cache */
+#define ONE_BY_ONE _Pragma("clang loop vectorize(disable) unroll_count(4)")
+#else
+#define ONE_BY_ONE
+#endif
+
+static inline void move(double *to, const double *from, size_t n) {
+  ONE_BY_ONE
+  for (size_t i = 0; i < n; i++) to[i] = from[i];
+}
+
+/* How many of these value references, of n >= ROW and no more than `most`, follow each other; 1 if few. */
+static size_t in_a_row(const uint32_t vr[], size_t n, size_t most) {
+  size_t length = 1;
+  if (n > most) n = most;
+  while (length < n && vr[length] == vr[0] + length) length++;
+  return length < ROW ? 1 : length;
+}
+
 static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
 #if INTERMEDIATE
   if (n && c->m.mode == UPDATING) return only_in(c, 0, "getting a value");
 #endif
-  for (size_t i = 0; i < n; i++) {
+  double *const v = c->m.v;
+  for (size_t i = 0; i < n;) {
     const uint32_t k = vr[i] - c->first;
     if (k >= METHOD && (k >= NV || k == METHOD))
       return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
     if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh_for(c, k);
-    const double value = c->m.v[k];
-    values[i] = value;
+    if (n - i >= ROW) { /* what follows may be as fresh: the rest of a vector */
+      const char *known = c->m.stale == COUPLED_DONE ? ASKED : c->m.stale == QUICK_DONE ? QUICK : 0;
+      size_t row = 1;
+      if (c->m.stale == FRESH && k < METHOD) row = in_a_row(vr + i, n - i, METHOD - k);
+      else if (known && k >= IY && k < IP)
+        while (row < n - i && vr[i + row] == vr[i] + row && k + row < IP && known[k + row - IY]) row++;
+      int odd = 0;
+      ONE_BY_ONE
+      for (size_t j = 0; j < row; j++) odd |= !(fabs(v[k + j]) <= DBL_MAX);
+      move(values + i, v + k, row);
+      if (odd) return check_finite(c, k, (int)row);
+      i += row;
+      continue;
+    }
+    const double value = v[k];
+    values[i++] = value;
     if (!isfinite(value)) return check_finite(c, k, 1);
   }
   return OK;
@@ -285,28 +328,52 @@ static int set_value(Instance *c, uint32_t k, double value) {
                     MINIMUM[k], MAXIMUM[k]);
   }
   v[k] = value;
-  c->m.stale = 1;
+  c->m.stale = ALL;
   return OK;
+}
+
+/* Any variables, with what hangs on parameters only. */
+static int set_any(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
+  int parameters = 0, status = OK;
+  for (size_t i = 0; i < n && status == OK; i++) {
+    const uint32_t k = vr[i] - c->first;
+    if (k == METHOD) status = report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
+    else status = set_value(c, k, values[i]);
+    if (status == OK && k >= IU && k < IY) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
+    parameters |= k >= IP && k < IZ;
+  }
+  if (parameters) f_constants(c->m.v + IP, c->m.k);
+  return status;
 }
 
 static int set_values(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
   double *v = c->m.v;
   if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
-  for (size_t i = 0; i < n; i++) {
+  for (size_t i = 0; i < n;) {
     const uint32_t k = vr[i] - c->first;
-    if (k >= IU && k < IY && isfinite(values[i])) { /* the hot path: an input, from now on held */
-#if INTERMEDIATE
-      if (v[k] != values[i] && c->m.mode != UPDATING) c->m.stale = 1; /* what was evaluated is of the begin */
-#else
-      if (v[k] != values[i]) c->m.stale = 1;
-#endif
-      v[k] = values[i];
+    if (k < IU || k >= IY || !isfinite(values[i])) return set_any(c, vr + i, n - i, values + i);
+    /* the hot path: inputs, from now on held */
+    const size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
+    if (row == 1) {
+      if (v[k] != values[i] && !UPDATED(c)) c->m.stale = ALL;
+      v[k] = values[i++];
       if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
       continue;
     }
-    if (k == METHOD) return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
-    int status = set_value(c, k, values[i]);
-    if (status != OK) return status;
+    int changed = 0, odd = 0;
+    ONE_BY_ONE
+    for (size_t j = 0; j < row; j++) {
+      changed |= v[k + j] != values[i + j];
+      odd |= !(fabs(values[i + j]) <= DBL_MAX);
+    }
+    if (odd) return set_any(c, vr + i, n - i, values + i);
+    if (changed && !UPDATED(c)) c->m.stale = ALL;
+    move(v + k, values + i, row);
+    if (c->m.moving) {
+      memset(c->m.slope + k - IU, 0, row * sizeof *v);
+      memset(c->m.curve + k - IU, 0, row * sizeof *v);
+    }
+    i += row;
   }
   return OK;
 }
@@ -316,16 +383,33 @@ static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, con
   Memory *m = &c->m;
   const unsigned modes = IN(INITIALIZING) | IN(STEPPING);
   if (n && only_in(c, modes, "setting derivatives of inputs") != OK) return ERROR;
-  for (size_t i = 0; i < n; i++) {
+  for (size_t i = 0; i < n;) {
     const uint32_t k = vr[i];
     if (k < IU || k >= IY) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, k);
     if (order[i] < 1 || order[i] > 2)
       return report(c, ERROR, "%s: derivative of order %d of input %s; must be 1 or 2", MODEL, order[i], NAMES[k]);
-    if (!isfinite(values[i]))
-      return report(c, ERROR, "%s: a derivative of input %s cannot be set to %g at time %.9g s: not finite", MODEL,
-                    NAMES[k], values[i], m->v[0]);
-    (order[i] == 1 ? m->slope : m->curve)[k - IU] = values[i];
+    size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
+    int odd = 0, other = 0;
+    ONE_BY_ONE
+    for (size_t j = 0; j < row; j++) {
+      other |= order[i + j] != order[i];
+      odd |= !(fabs(values[i + j]) <= DBL_MAX);
+    }
+    if (other) row = 1;
+    if (row == 1 && isfinite(values[i])) {
+      (order[i] == 1 ? m->slope : m->curve)[k - IU] = values[i];
+      m->moving = 1;
+      i++;
+      continue;
+    }
+    if (odd)
+      for (size_t j = 0; j < row; j++)
+        if (!isfinite(values[i + j]))
+          return report(c, ERROR, "%s: a derivative of input %s cannot be set to %g at time %.9g s: not finite", MODEL,
+                        NAMES[k + j], values[i + j], m->v[0]);
+    move((order[i] == 1 ? m->slope : m->curve) + k - IU, values + i, row);
     m->moving = 1;
+    i += row;
   }
   return OK;
 }

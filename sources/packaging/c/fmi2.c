@@ -50,7 +50,7 @@ EXPORT fmi2Status fmi2SetupExperiment(Instance *c, fmi2Boolean tolerance_defined
     return report(c, ERROR, "%s: the stop time %g s lies before the start time %g s", MODEL, stop, start);
   c->m.v[0] = start;
   c->m.stop = stop_defined ? stop : INFINITY;
-  c->m.stale = 1;
+  c->m.stale = ALL;
   return OK;
 }
 
@@ -204,7 +204,7 @@ static int set_states(Instance *c, const double x[], size_t n) {
   if (status != OK) return status;
   if (n != NX) return report(c, ERROR, "%s: %zu states given, the FMU has %d", MODEL, n, NX);
   for (size_t i = 0; i < n; i++) c->m.v[IX + i] = x[i];
-  c->m.stale = 1;
+  c->m.stale = ALL;
   return check_finite(c, IX, NX);
 }
 

@@ -19,27 +19,23 @@ static void rk4(const Memory *m, double t, double h, double *x) {
    difference to the embedded solution of order 2. */
 static void rodas3(Memory *m, double t, double h, double *x, double *e) {
   double f[NX], ft[NX], j[NJ + 1], k1[NX], k2[NX], k3[NX], k4[NX], y[NX], u[NU + 1];
-  const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
-  double *res[] = {f, j, ft};
   const double ih = 1.0 / h;
-  f_jacobian(arg, res, 0, 0, 0);
+  f_jacobian(&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP, m->k, f, j, ft);
 #if INTERMEDIATE
   if (((Instance *)m)->required) { /* what the inputs add to df/dt, by the parabola through three of their values */
-    double now[NU + 1], half[NU + 1], *moved[] = {y};
+    double now[NU + 1], half[NU + 1];
     memcpy(now, m->v + IU, NU * sizeof *now);
     memcpy(half, inputs_at(m, t + 0.5 * h, u), NU * sizeof *half);
     const double *const end = inputs_at(m, t + h, u);
     for (int i = 0; i < NU; i++) u[i] = now[i] + (4.0 * (half[i] - now[i]) - (end[i] - now[i]));
-    arg[3] = u;
-    f_derivatives(arg, moved, 0, 0, 0);
+    f_derivatives(&t, x, m->v + IZ, u, m->v + IP, m->k, y);
     for (int i = 0; i < NX; i++) ft[i] += (y[i] - f[i]) * ih;
   }
 #endif
   if (m->moving) { /* what the inputs add to df/dt, by a difference along their derivatives */
     const double dt = t - m->v[0];
     for (int i = 0; i < NU; i++) u[i] += h * (m->slope[i] + dt * m->curve[i]);
-    double *moved[] = {y};
-    f_derivatives(arg, moved, 0, 0, 0);
+    f_derivatives(&t, x, m->v + IZ, u, m->v + IP, m->k, y);
     for (int i = 0; i < NX; i++) ft[i] += (y[i] - f[i]) * ih;
   }
   if (m->hw != -h || memcmp(j, m->j, NJ * sizeof *j)) {
@@ -106,9 +102,7 @@ static void rosw3(Memory *m, double t, double h, double *x, double *e) {
   const double ih = 1.0 / h;
   if (m->left == 0) {
     double u[NU + 1], ft[NX];
-    const double *arg[] = {&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP};
-    double *res[] = {k1, m->j, ft};
-    f_jacobian(arg, res, 0, 0, 0);
+    f_jacobian(&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP, m->k, k1, m->j, ft);
     m->left = KEEP;
     m->hw = 0;
   }

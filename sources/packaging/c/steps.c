@@ -11,9 +11,7 @@ static double slack(double period, double t) { return SLACK * period + 4 * DBL_E
 static int start_clocks(Instance *c) {
 #if NC
   Memory *m = &c->m;
-  const double *arg[] = {m->v + IP};
-  double *res[] = {m->period};
-  f_periods(arg, res, 0, 0, 0);
+  f_periods(m->v + IP, m->k, m->period);
   for (int k = 0; k < NC; k++) {
     if (!(m->period[k] > 0))
       return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, m->period[k]);
@@ -33,13 +31,11 @@ static void run_ticks(Instance *c) {
   double *v = m->v, z[NZ + 1];
   for (int k = 0; k < NC; k++) {
     if (!(m->next[k] <= v[0] + slack(m->period[k], v[0]))) continue;
-    const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP};
-    double *res[] = {z};
-    UPDATES[k](arg, res, 0, 0, 0);
+    UPDATES[k](v, v + IX, v + IZ, v + IU, v + IP, m->k, z);
     memcpy(v + IZ, z, NZ * sizeof *z);
     m->tick[k] += 1;
     m->next[k] = m->tick[k] * m->period[k];
-    m->stale = 1;
+    m->stale = ALL;
   }
 #else
   (void)c;
@@ -91,7 +87,7 @@ static int integrate(Instance *c, double t1, double length) {
   }
 #endif
   move_on(&c->m, t1);
-  c->m.stale = 1;
+  c->m.stale = ALL;
   const int status = check_finite(c, IX, NX);
   if (status != OK) v[0] = t0;
   return status;
@@ -117,7 +113,7 @@ static int do_step(Instance *c, double t, double h) {
   if (t1 > c->m.stop + 1e-9 * (1 + fabs(c->m.stop)))
     return report(c, ERROR, "%s: doStep from %.9g s to %.9g s goes past the stop time %.9g s", MODEL, t, t1,
                   c->m.stop);
-  if (TIMED && v[0] != t) c->m.stale = 1; /* by a rounding */
+  if (TIMED && v[0] != t) c->m.stale = ALL; /* by a rounding */
   v[0] = t;
 #if INTERMEDIATE
   c->asked = t; /* the importer has set the inputs of the begin */
@@ -163,7 +159,7 @@ static int set_time(Instance *c, double time) {
   if (!c->model_exchange) return report(c, ERROR, "%s: the time of co-simulation is set by its steps", MODEL);
   if (!isfinite(time)) return report(c, ERROR, "%s: time cannot be set to %g: not finite", MODEL, time);
   c->m.v[0] = time;
-  c->m.stale = 1;
+  c->m.stale = ALL;
   return OK;
 }
 
@@ -181,8 +177,7 @@ static int leave_initialization(Instance *c) {
   if (c->m.mode != INITIALIZING) return report(c, ERROR, "%s: initialization mode was not entered", MODEL);
   int status = start_clocks(c);
   if (status != OK) return status;
-  evaluate_outputs(c->m.v);
-  c->m.stale = 0;
+  evaluate_outputs(&c->m);
   status = check_finite(c, IXD, NX);
   if (status == OK) status = check_finite(c, IY, NY);
   if (status != OK) return status;
@@ -201,9 +196,7 @@ static int directional(Instance *c, const uint32_t unknowns[], size_t nu, const 
                     knowns[i]);
     s[k] = seed[i];
   }
-  const double *arg[] = {v, v + IX, v + IZ, v + IU, v + IP, s, s + IX, s + IZ, s + IU, s + IP};
-  double *res[] = {dxdot, dy};
-  f_directional(arg, res, 0, 0, 0);
+  f_directional(v, v + IX, v + IZ, v + IU, v + IP, s, s + IX, s + IZ, s + IU, s + IP, c->m.k, dxdot, dy);
   for (size_t i = 0; i < nu; i++) {
     const uint32_t k = unknowns[i] - c->first;
     if (k >= IXD && k < IU) result[i] = dxdot[k - IXD];
