@@ -16,7 +16,7 @@ from sources.variant import build_model
 EARLY = 1e-7  # part of a period by which k * period and k * dt may differ and still be one instant
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=None)
 def oracle_of(name: str) -> Oracle:
     """The oracle of a variant, shared by the tests, who do not change it or its model.
 
