@@ -32,7 +32,7 @@ LAWS: dict[str, disc.Law] = {
     "two": lambda w, theta, t: 0.01 * math.tanh(w / 0.02) + 4e-4 * w * abs(w),
     "teeth": lambda w, theta, t: 0.05 * math.sin(14.0 * theta + 0.5),
 }
-SHORT: dict[str, Any] = {"seconds": 2.5, "names": ("sweep", "steps", "check")}
+SHORT: dict[str, Any] = {"seconds": 1.6, "names": ("sweep", "steps", "check")}
 """Where no law of the catalogue fits, a diagnosis tries everything: two fitted runs, and one that
 is not, are enough to see that."""
 
