@@ -84,12 +84,11 @@ def children() -> list[str]:
 
 
 def test_a_child_is_seen() -> None:
-    program = "import time; time.sleep(60)  # cosim.master"
-    with subprocess.Popen([sys.executable, "-c", program]) as begun:
-        try:
-            assert [line for line in children() if "cosim.master" in line]
-        finally:
-            begun.kill()
+    program = [sys.executable, "-c", "print(flush=True); input()  # cosim.master"]
+    with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as begun:
+        begun.stdout.readline()  # it has begun
+        assert [line for line in children() if "cosim.master" in line]
+        begun.stdin.write(b"\n")
 
 
 def test_there_are_fifty_faults_and_the_page_has_them_all() -> None:
