@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
 from .model import Clock, Declared, Model
 
@@ -254,6 +253,8 @@ class Oracle:
         Raises:
             ValueError: the model has clocks (scipy knows no ticks) or the solver failed.
         """
+        from scipy.integrate import solve_ivp  # takes long, and commands that build FMUs need none
+
         if self.model.clocks:
             raise ValueError("the model has sample clocks; a reference by scipy needs none")
         grid = np.asarray(times, dtype=float)
