@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
 from .model import E_STORED, P_IN, P_LOSS, Clock, Declared, Model
 
@@ -17,7 +16,6 @@ Vector = NDArray[np.float64]
 QUICK, LARGE = 8, 200
 """Instructions of an output that is computed without the others, and of a function that is worth
 it."""
-
 SMALL, WORTHWHILE = 60, 0.1
 """Instructions that are done sooner than the question which of them are needed, and
 the part of them that leaving out the energy account must spare."""
@@ -25,43 +23,140 @@ BEGINS_WITH_DERIVATIVES = ("rk4", "dopri5", "rosw3_adaptive")
 """Solvers that take the derivatives which came with the outputs."""
 
 
-@dataclass(frozen=True)
 class Functions:
-    """The functions of a variant over `(t, x, z, u, p)`.
+    """The functions of a variant over `(t, x, z, u, p)`, each made when it is asked for.
 
     Shapes: x (nx), z (nz) sampled values, u (nu), p (np), y (ny).
 
-    Attributes:
-        outputs: `-> (xdot, y)`.
-        quick: `->` the outputs that take next to nothing to compute, states above all; without
-            the derivatives, on which energies and forces hang.
-        quick_outputs: their indices.
-        coupled: `-> (xdot, y)`: all outputs but the energy account, which couples nothing; xdot is
-            empty where the solver does not begin a step with it.
-        coupled_outputs: their indices; none if they are hardly cheaper than all.
-        derivatives: `-> xdot`.
-        jacobian: `-> (xdot, d xdot/dx as nonzeros, d xdot/dt)`.
-        jacobian_pattern: (row, column) of the nonzeros.
-        directional: `(t, x, z, u, p, dt, dx, dz, du, dp) -> (dxdot, dy)`.
-        updates: per clock `-> z` after the tick.
-        periods: `p -> periods of the clocks`.
-        output_dependencies, derivative_dependencies: per output / derivative the names of the
-            states, inputs and sampled values that it depends on.
+    Args:
+        model: a finished one; it does not change any more.
     """
 
-    outputs: ca.Function
-    quick: ca.Function
-    quick_outputs: tuple[int, ...]
-    coupled: ca.Function
-    coupled_outputs: tuple[int, ...]
-    derivatives: ca.Function
-    jacobian: ca.Function
-    jacobian_pattern: tuple[tuple[int, int], ...]
-    directional: ca.Function
-    updates: tuple[ca.Function, ...]
-    periods: ca.Function
-    output_dependencies: dict[str, tuple[str, ...]]
-    derivative_dependencies: dict[str, tuple[str, ...]]
+    def __init__(self, model: Model) -> None:
+        self._roles = {r: model.of_role(r) for r in ("state", "discrete", "input", "parameter")}
+        self._clocks, self._outputs, self._t = model.clocks, model.of_role("output"), model.time
+        self._x, self._z, self._u, self._p = (_stack(group) for group in self._roles.values())
+        self._xdot = _column([model.derivatives[v.name] for v in self._roles["state"]])
+        self._y = _column([variable.symbol for variable in self._outputs])
+        self._arguments = [self._t, self._x, self._z, self._u, self._p]
+        self._begins = model.solver.method in BEGINS_WITH_DERIVATIVES
+
+    @cached_property
+    def outputs(self) -> ca.Function:
+        """`-> (xdot, y)`."""
+        return self._function("f_outputs", [self._xdot, self._y])
+
+    @cached_property
+    def quick_outputs(self) -> tuple[int, ...]:
+        """Indices of the outputs that take next to nothing to compute, states above all."""
+        large = self.outputs.n_instructions() > LARGE
+        return _quick(self._y, self._arguments) if large else ()
+
+    @cached_property
+    def quick(self) -> ca.Function:
+        """`->` those outputs; without the derivatives, on which energies and forces hang."""
+        few = list(self.quick_outputs)
+        return self._function("f_quick", [self._y[few] if few else ca.SX(0, 1)])
+
+    @cached_property
+    def _coupled(self) -> tuple[ca.Function, tuple[int, ...]]:
+        account = (E_STORED.name, P_IN.name, P_LOSS.name)
+        some = tuple(
+            k for k, v in enumerate(self._outputs)
+            if v.name not in account or k in self.quick_outputs
+        )  # fmt: skip
+        reused = self._xdot if self._begins else ca.SX(0, 1)
+        chosen = self._y[list(some)] if some else ca.SX(0, 1)
+        return self._function("f_coupled", [reused, chosen]), some
+
+    @property
+    def coupled(self) -> ca.Function:
+        """`-> (xdot, y)`: all outputs but the energy account, which couples nothing.
+
+        xdot is empty where the solver does not begin a step with it.
+        """
+        return self._coupled[0]
+
+    @cached_property
+    def coupled_outputs(self) -> tuple[int, ...]:
+        """Their indices; none if they are hardly cheaper than all."""
+        whole = self.outputs.n_instructions()
+        spared = whole - self.coupled.n_instructions()
+        return () if whole < SMALL or spared < WORTHWHILE * whole else self._coupled[1]
+
+    @cached_property
+    def derivatives(self) -> ca.Function:
+        """`-> xdot`."""
+        return self._function("f_derivatives", [self._xdot])
+
+    @cached_property
+    def _jacobian(self) -> Any:
+        return ca.jacobian(self._xdot, self._x)
+
+    @cached_property
+    def jacobian(self) -> ca.Function:
+        """`-> (xdot, d xdot/dx as nonzeros, d xdot/dt)`."""
+        by_time = ca.jacobian(self._xdot, self._t)
+        return self._function("f_jacobian", [self._xdot, _nonzeros(self._jacobian), by_time])
+
+    @cached_property
+    def jacobian_pattern(self) -> tuple[tuple[int, int], ...]:
+        """(row, column) of the nonzeros."""
+        rows, columns = self._jacobian.sparsity().get_triplet()
+        return tuple(zip(rows, columns, strict=True))
+
+    @cached_property
+    def directional(self) -> ca.Function:
+        """`(t, x, z, u, p, dt, dx, dz, du, dp) -> (dxdot, dy)`."""
+        seeds = [ca.SX.sym(f"d_{k}", item.numel()) for k, item in enumerate(self._arguments)]
+        along, all_of = ca.vertcat(*seeds), ca.vertcat(*self._arguments)
+        tangent = ca.jtimes(ca.vertcat(self._xdot, self._y), all_of, along)
+        split = self._xdot.numel()
+        return self._function("f_directional", [tangent[:split], tangent[split:]], seeds)
+
+    @cached_property
+    def updates(self) -> tuple[ca.Function, ...]:
+        """Per clock `-> z` after the tick."""
+        return tuple(
+            self._function(f"f_update{index}", [_update(clock, self._roles["discrete"])])
+            for index, clock in enumerate(self._clocks)
+        )
+
+    @cached_property
+    def periods(self) -> ca.Function:
+        """`p -> periods of the clocks`."""
+        periods = _column([clock.period for clock in self._clocks])
+        return ca.Function("f_periods", [self._p], [ca.densify(periods)])
+
+    @cached_property
+    def output_dependencies(self) -> dict[str, tuple[str, ...]]:
+        """Output -> names of the states, inputs and sampled values that it depends on."""
+        return self._dependencies(self._y, [v.name for v in self._outputs])
+
+    @cached_property
+    def derivative_dependencies(self) -> dict[str, tuple[str, ...]]:
+        """State -> the same of its derivative."""
+        return self._dependencies(self._xdot, [v.name for v in self._roles["state"]])
+
+    def _dependencies(self, expression: Any, names: list[str]) -> dict[str, tuple[str, ...]]:
+        known = ca.vertcat(self._x, self._u, self._z, self._t)
+        groups = [self._roles[role] for role in ("state", "input", "discrete")]
+        known_names = [*(v.name for group in groups for v in group), "time"]
+        sparsity = ca.jacobian_sparsity(expression, known) if names else None
+        found: dict[str, list[str]] = {name: [] for name in names}
+        if sparsity is not None:
+            for row, column in zip(*sparsity.get_triplet(), strict=True):
+                found[names[row]].append(known_names[column])
+        return {name: tuple(items) for name, items in found.items()}
+
+    def _function(
+        self, name: str, results: list[Any], extra: list[Any] | None = None
+    ) -> ca.Function:
+        # what parts compute alike is computed once; structural zeros are written too: the C code
+        # and the Python twin index densely
+        return ca.Function(
+            name, self._arguments + (extra or []), ca.cse([ca.densify(r) for r in results])
+        )
 
 
 def _stack(variables: list[Declared]) -> Any:
@@ -77,72 +172,16 @@ def _update(clock: Clock, discrete: list[Declared]) -> Any:
 
 
 def build_functions(model: Model) -> Functions:
-    """Build the functions of a finished model.
+    """Build all functions of a finished model at once, for threads that share them.
 
     Raises:
         ValueError: an expression uses a symbol that nobody declared.
     """
-    roles = {role: model.of_role(role) for role in ("state", "discrete", "input", "parameter")}
-    outputs = model.of_role("output")
-    t = model.time
-    x, z, u, p = (_stack(roles[role]) for role in ("state", "discrete", "input", "parameter"))
-    xdot = _column([model.derivatives[variable.name] for variable in roles["state"]])
-    y = _column([variable.symbol for variable in outputs])
-    arguments = [t, x, z, u, p]
-    jacobian = ca.jacobian(xdot, x)
-    pattern = jacobian.sparsity()
-    rows, columns = pattern.get_triplet()
-    seeds = [ca.SX.sym(f"d_{index}", item.numel()) for index, item in enumerate(arguments)]
-    tangent = ca.jtimes(ca.vertcat(xdot, y), ca.vertcat(*arguments), ca.vertcat(*seeds))
-    split = xdot.numel()
-    known = ca.vertcat(x, u, z, t)
-    known_names = [v.name for role in ("state", "input", "discrete") for v in roles[role]]
-    known_names.append("time")
-
-    def dependencies(expression: Any, names: list[str]) -> dict[str, tuple[str, ...]]:
-        sparsity = ca.jacobian_sparsity(expression, known) if names else None
-        found: dict[str, list[str]] = {name: [] for name in names}
-        if sparsity is not None:
-            for row, column in zip(*sparsity.get_triplet(), strict=True):
-                found[names[row]].append(known_names[column])
-        return {name: tuple(items) for name, items in found.items()}
-
-    def function(name: str, results: list[Any], extra: list[Any] | None = None) -> ca.Function:
-        # what parts compute alike is computed once; structural zeros are written too: the C code
-        # and the Python twin index densely
-        return ca.Function(
-            name, arguments + (extra or []), ca.cse([ca.densify(r) for r in results])
-        )
-
-    whole = function("f_outputs", [xdot, y])
-    few = _quick(y, arguments) if whole.n_instructions() > LARGE else ()
-    account = (E_STORED.name, P_IN.name, P_LOSS.name)
-    some = tuple(k for k, v in enumerate(outputs) if v.name not in account or k in few)
-    reused = xdot if model.solver.method in BEGINS_WITH_DERIVATIVES else ca.SX(0, 1)
-    coupled = function("f_coupled", [reused, y[list(some)] if some else ca.SX(0, 1)])
-    spared = whole.n_instructions() - coupled.n_instructions()
-    if whole.n_instructions() < SMALL or spared < WORTHWHILE * whole.n_instructions():
-        some = ()
-    return Functions(
-        outputs=whole,
-        quick=function("f_quick", [y[list(few)] if few else ca.SX(0, 1)]),
-        quick_outputs=few,
-        coupled=coupled,
-        coupled_outputs=some,
-        derivatives=function("f_derivatives", [xdot]),
-        jacobian=function("f_jacobian", [xdot, _nonzeros(jacobian), ca.jacobian(xdot, t)]),
-        jacobian_pattern=tuple(zip(rows, columns, strict=True)),
-        directional=function("f_directional", [tangent[:split], tangent[split:]], seeds),
-        updates=tuple(
-            function(f"f_update{index}", [_update(clock, roles["discrete"])])
-            for index, clock in enumerate(model.clocks)
-        ),
-        periods=ca.Function(
-            "f_periods", [p], [ca.densify(_column([c.period for c in model.clocks]))]
-        ),
-        output_dependencies=dependencies(y, [v.name for v in outputs]),
-        derivative_dependencies=dependencies(xdot, [v.name for v in roles["state"]]),
-    )
+    functions = Functions(model)
+    for name, member in vars(Functions).items():
+        if isinstance(member, cached_property):
+            getattr(functions, name)
+    return functions
 
 
 def _quick(y: Any, arguments: list[Any]) -> tuple[int, ...]:
@@ -178,7 +217,7 @@ class Oracle:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.functions = build_functions(model)
+        self.functions = Functions(model)
         self.state_names = [v.name for v in model.of_role("state")]
         self.output_names = [v.name for v in model.of_role("output")]
         self._roles = [model.of_role(role) for role in ("state", "discrete", "input", "parameter")]
@@ -246,6 +285,8 @@ class Oracle:
         Raises:
             ValueError: the model has clocks (scipy knows no ticks) or the solver failed.
         """
+        from scipy.integrate import solve_ivp  # takes long, and commands that build FMUs need none
+
         if self.model.clocks:
             raise ValueError("the model has sample clocks; a reference by scipy needs none")
         grid = np.asarray(times, dtype=float)

@@ -10,11 +10,12 @@ import numpy as np
 from sources.function import Oracle
 from sources.model import Model, misfit
 from sources.variant import build_model, effects
+from tests.support import oracle_of
 
 
 @lru_cache(maxsize=None)
 def oracle(name: str) -> Oracle:
-    return Oracle(build_model(name))
+    return oracle_of(name)
 
 
 def attachable(plain: str) -> Iterator[str]:

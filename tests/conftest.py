@@ -42,6 +42,8 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[BEGIN] = time.perf_counter()
     # each worker of xdist has its share of the processors: more threads would only wait
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    if workers > 1 or getattr(config.option, "numprocesses", None):
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # inherited by workers that begin now
     if workers > 1:
         os.environ.setdefault(cores.VARIABLE, str(max(cores.cores() // workers, 1)))
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import atexit
-import ctypes
 import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ from sources.packaging.build import build
 _CHECKOUT = hashlib.sha256(str(Path(__file__).resolve().parents[1]).encode()).hexdigest()[:12]
 OUT = cache_folder() / "tests" / _CHECKOUT
 """Each checkout has its own: the same name may stand for other equations in another one."""
-_KEPT: dict[str, ctypes.CDLL] = {}
 _HOLDERS: list[tempfile.TemporaryDirectory[str]] = []
 
 
@@ -60,6 +59,24 @@ def catalogue() -> tuple[str, ...]:
     return tuple(chosen)
 
 
+@lru_cache(maxsize=None)
+def _loaded(path: Path) -> FMU2Slave | FMU3Slave:
+    """FMPy's access to the library of an FMU, whose functions it binds for 4 ms each time."""
+    description, folder = _unpacked(path)
+    kind = FMU3Slave if description.fmiVersion.startswith("3") else FMU2Slave
+    return kind(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="x",
+    )
+
+
+@lru_cache(maxsize=None)
+def _ended_at_exit(path: Path) -> None:
+    atexit.register(_loaded(path).dll.finalizePythonInterpreter)
+
+
 class Slave:
     """A co-simulation instance with values by name; `messages` holds what it logged."""
 
@@ -75,16 +92,15 @@ class Slave:
         update: Callable[..., None] | None = None,
         required: Iterable[str] = (),
     ) -> None:
-        self.description, folder = _unpacked(path)
+        self.description, _ = _unpacked(path)
         self.version = 3 if self.description.fmiVersion.startswith("3") else 2
         self.messages: list[str] = []
         self.alive = True  # after fmi2Fatal, pythonfmu's answer to all errors, no call may follow
-        arguments = {
-            "guid": token or self.description.guid,
-            "unzipDirectory": str(folder),
-            "modelIdentifier": self.description.coSimulation.modelIdentifier,
-            "instanceName": "x",
-        }
+        # an instance of its own, of a library that stays loaded: FMPy unloads it with an instance
+        self.fmu = copy(_loaded(path))
+        self.fmu.freeLibrary = lambda: None
+        self.fmu.guid = token or self.description.guid
+        self.inputs = [v for v in self.description.modelVariables if v.causality == "input"]
         self.vr = {v.name: v.valueReference for v in self.description.modelVariables}
         self.start = start
         if self.version == 2:
@@ -97,20 +113,13 @@ class Slave:
 
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(log)
-            self.fmu = FMU2Slave(**arguments)
-            # Libraries of pythonfmu release their state twice when the process ends, unless told
-            # before. FMPy unloads a library with its last instance: it is held, or the function
-            # would no longer be where it was. (The first one stays anyway, since it owns symbols
-            # that are unique in a process.)
-            library = str(self.fmu.dll._name)
-            if hasattr(self.fmu.dll, "finalizePythonInterpreter") and library not in _KEPT:
-                _KEPT[library] = ctypes.CDLL(library)
-                atexit.register(_KEPT[library].finalizePythonInterpreter)
+            # libraries of pythonfmu release their state twice when the process ends, unless told
+            if hasattr(self.fmu.dll, "finalizePythonInterpreter"):
+                _ended_at_exit(path)
             # an interpreted FMU reports its exceptions only when it may log
             chatty = bool(self.description.coSimulation.needsExecutionTool)
             self.fmu.instantiate(callbacks=self._callbacks, loggingOn=chatty)
         else:
-            self.fmu = FMU3Slave(**arguments)
             self.fmu.instantiate(
                 eventModeUsed=event_mode,
                 intermediateUpdate=update,

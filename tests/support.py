@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,15 @@ from sources.model import Model
 from sources.variant import build_model
 
 EARLY = 1e-7  # part of a period by which k * period and k * dt may differ and still be one instant
+
+
+@lru_cache(maxsize=None)
+def oracle_of(name: str) -> Oracle:
+    """The oracle of a variant, shared by the tests, who do not change it or its model.
+
+    Not for devices that a test has written: another test may mean another one by the same name.
+    """
+    return Oracle(build_model(name))
 
 
 class Stepper:
@@ -43,8 +53,8 @@ class Stepper:
         max_step: float | None = None,
         start: float = 0.0,
     ) -> None:
-        self.model = build_model(variant) if isinstance(variant, str) else variant
-        self.oracle = Oracle(self.model)
+        self.oracle = oracle_of(variant) if isinstance(variant, str) else Oracle(variant)
+        self.model = self.oracle.model
         self.max_step = max_step or self.model.solver.step
         self.t = start
         names = [[v.name for v in self.model.of_role(r)] for r in ("state", "discrete", "input")]

@@ -11,8 +11,9 @@ import pytest
 from cosim.fmu.check import check
 from sources.function import Oracle
 from sources.model import Role
-from sources.variant import build_model, components, parse_name
+from sources.variant import components, parse_name
 from tests.fmus import Slave, catalogue, fmu
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -27,8 +28,7 @@ def exercise(slave: Slave, seed: int) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     return {
         v.name: float(v.start) + rng.uniform(0.2, 0.8) * ((v.nominal and float(v.nominal)) or 0.1)
-        for v in slave.description.modelVariables
-        if v.causality == "input"
+        for v in slave.inputs
     }
 
 
@@ -104,7 +104,7 @@ def test_directional_derivatives_are_difference_quotients(name: str) -> None:
     step, so the best of six steps counts. 1e-6 of the largest terms is what the best step reaches
     with margin (rounding 1e-16 over a step of 1e-6, times cancellation); a wrong formula errs by 1.
     """
-    oracle = Oracle(build_model(name))
+    oracle = oracle_of(name)
     rng = np.random.default_rng(3)
     with Slave(fmu(name)) as slave:
         values = exercise(slave, 3)
@@ -164,7 +164,7 @@ def _random_point(oracle: Oracle, slave: Slave, seed: int) -> dict[str, float]:
 @pytest.mark.parametrize("name", [n for n in NAMES if components()[parse_name(n).component].energy])
 def test_energy_balance_closes(name: str) -> None:
     """dE/dt = P_in - P_loss at random states; an identity, so only rounding may remain."""
-    oracle = Oracle(build_model(name))
+    oracle = oracle_of(name)
     with Slave(fmu(name)) as slave:
         for seed in range(20):
             defect, largest = oracle.energy_defect(_random_point(oracle, slave, seed))
@@ -174,7 +174,7 @@ def test_energy_balance_closes(name: str) -> None:
 
 @pytest.mark.parametrize("name", WITH_EFFECT)
 def test_strength_0_is_absence(name: str) -> None:
-    model = build_model(name)
+    model = oracle_of(name).model
     strengths = [v.name for v in model.of_role("parameter") if v.of_effect and v.quantity.strength]
     assert strengths, "an effect without a strength"
     absent = dict.fromkeys(strengths, 0.0)
@@ -188,13 +188,13 @@ def test_strength_0_is_absence(name: str) -> None:
 @pytest.mark.parametrize("name", WITH_EFFECT)
 def test_effect_has_an_effect(name: str) -> None:
     """The negative twin: with its default strength, 60 ms of motion or a random state differ."""
-    model = build_model(name)
+    model = oracle_of(name).model
     strengths = [v for v in model.of_role("parameter") if v.of_effect and v.quantity.strength]
     absent = dict.fromkeys((v.name for v in strengths), 0.0)
     with Slave(fmu(name)) as on, Slave(fmu(name), absent) as off:
         if not np.array_equal(run(on, 60), run(off, 60)):
             return
-        oracle = Oracle(model)
+        oracle = oracle_of(name)
         differs = False
         for seed in range(8):
             nearer = 10.0 ** -(seed % 4)  # some effects live close to standstill
@@ -210,7 +210,7 @@ def _at_20_ms(name: str, cuts: list[float], shrink: float = 1.0) -> np.ndarray:
     with Slave(path, initialize=False) as slave:
         values = {}
         if "solver.step" in slave.vr:
-            step = build_model(name).solver.step
+            step = oracle_of(name).model.solver.step
             values["solver.step"] = min(step, cuts[1] - cuts[0]) * shrink
         slave.initialize(values)
         slave.set(exercise(slave, 5))
@@ -260,7 +260,7 @@ def test_parameter_out_of_bounds_is_refused(name: str, kind: str) -> None:
             if v.causality == "parameter" and v.min is not None and v.type == "Real"
         ]
         if not bounded:
-            assert not build_model(name).of_role("state")
+            assert not oracle_of(name).model.of_role("state")
             return
         variable = bounded[0]
         with pytest.raises(Exception, match=r"status [34]"):

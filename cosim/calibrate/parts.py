@@ -249,10 +249,28 @@ class Target(NamedTuple):
     factor: float
     least: float | None
 
-    def of(self, values: Sequence[float]) -> float:
-        """Its value, where the parameters have these."""
-        value = values[self.place]
-        return self.factor * (value if self.least is None else 1.0 / max(value, self.least))
+
+class Targets:
+    """Several targets, whose values are computed together.
+
+    Attributes:
+        names: theirs, in order.
+    """
+
+    def __init__(self, targets: Sequence[Target]) -> None:
+        self.names = tuple(target.name for target in targets)
+        self._places = np.array([target.place for target in targets], dtype=np.intp)
+        self._factors = np.array([target.factor for target in targets])
+        inverse = [(k, t.least) for k, t in enumerate(targets) if t.least is not None]
+        self._inverse = np.array([k for k, _ in inverse], dtype=np.intp)
+        self._least = np.array([least for _, least in inverse])
+
+    def of(self, theta: Vector) -> Vector:
+        """Their values, where the parameters have these."""
+        values = np.asarray(theta, dtype=float)[self._places]
+        if self._inverse.size:
+            values[self._inverse] = 1.0 / np.maximum(values[self._inverse], self._least)
+        return np.asarray(self._factors * values)
 
 
 def targets_of(parameters: Sequence[Parameter], run: str | None = None) -> list[Target]:
@@ -279,8 +297,8 @@ class Assigned(NamedTuple):
     run: MeasuredRun
     known: Mapping[str, float]
     late: Mapping[str, float]
-    variables: tuple[Target, ...]
-    clocks: tuple[Target, ...]
+    variables: Targets
+    clocks: Targets
     size: int
 
     @classmethod
@@ -297,23 +315,24 @@ class Assigned(NamedTuple):
             run,
             {name: value for name, value in known.items() if not name.startswith(CLOCK)},
             {n.removeprefix(CLOCK): v for n, v in given.items() if n.startswith(CLOCK)},
-            tuple(t for t in targets if not t.name.startswith(CLOCK)),
-            tuple(
-                t._replace(name=t.name.removeprefix(CLOCK))
-                for t in targets
-                if t.name.startswith(CLOCK)
+            Targets([t for t in targets if not t.name.startswith(CLOCK)]),
+            Targets(
+                [
+                    t._replace(name=t.name.removeprefix(CLOCK))
+                    for t in targets
+                    if t.name.startswith(CLOCK)
+                ]
             ),
             len(parameters),
         )
 
-    def of(self, theta: Vector, targets: Sequence[Target]) -> dict[str, float]:
+    def of(self, theta: Vector, targets: Targets) -> dict[str, float]:
         """Targets of the parameters with these values -> values."""
         if theta.size != self.size:
             raise ValueError(f"{theta.size} values for {self.size} parameters")
-        if not targets:
+        if not targets.names:
             return {}
-        values = theta.tolist()
-        return {target.name: target.of(values) for target in targets}
+        return dict(zip(targets.names, targets.of(theta).tolist(), strict=True))
 
 
 class Sensitivity(NamedTuple):

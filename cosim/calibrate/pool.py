@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
@@ -112,9 +112,9 @@ class SessionPool:
         self._count -= len(found)
         return found
 
-    def ran(self, key: Key, values: Mapping[str, float], limit: float) -> Ran | None:
+    def ran(self, key: Key, values: Hashable, limit: float) -> Ran | None:
         """What was simulated with these values before, if that was within the limit."""
-        place = (key, frozenset(values.items()))
+        place = (key, values)
         with self._lock:
             found = self._ran.get(place)
             if found is None or not found.within(limit):
@@ -122,12 +122,12 @@ class SessionPool:
             self._ran.move_to_end(place)
             return found
 
-    def remember(self, key: Key, values: Mapping[str, float], ran: Ran) -> bool:
+    def remember(self, key: Key, values: Hashable, ran: Ran) -> bool:
         """Keep what was simulated, nobody writes to its rows; whether it was new.
 
         Two threads may have simulated the same at once.
         """
-        place = (key, frozenset(values.items()))
+        place = (key, values)
         with self._lock:
             new = place not in self._ran
             self._forget(place)

@@ -182,7 +182,8 @@ class Simulator:
         key, limit = self._key(run), self.limits.get(run.name, math.inf)
         if later:  # only sessions of this process can be driven by what is late
             key = key._replace(run=(key.run, "late"))
-        which = values | {CLOCK + name: value for name, value in later.items()}
+        clocks = {CLOCK + name: value for name, value in later.items()}
+        which = frozenset((values | clocks).items())
         if (known := self._pool.ran(key, which, limit)) is not None:
             return known
         with self._lock:

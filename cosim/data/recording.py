@@ -187,14 +187,19 @@ class Recording:
         pq = needed("pyarrow.parquet", f"{path}: writing Parquet", "tables")
         import pyarrow as pa
 
-        fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})] + [
-            pa.field(name, pa.array(column[:1]).type, metadata={"unit": self.units.get(name, "")})
-            for name, column in zip(self.names, self._columns(), strict=True)
+        columns = [_arrow(column) for column in (self.time, *self._columns())]
+        fields = [
+            pa.field(name, column.type, metadata={"unit": unit})
+            for name, unit, column in zip(
+                ("time", *self.names),
+                ("s", *(self.units.get(name, "") for name in self.names)),
+                columns,
+                strict=True,
+            )
         ]
-        columns = [self.time, *self._columns()]
         schema = pa.schema(fields, metadata={_META: json.dumps(self._meta()).encode()})
         with atomic(path) as temporary:
-            pq.write_table(pa.table([pa.array(c) for c in columns], schema=schema), temporary)
+            pq.write_table(pa.table(columns, schema=schema), temporary)
         return path
 
     def write_npz(self, path: Path | str) -> Path:
@@ -341,6 +346,16 @@ def _read_npz(path: Path) -> tuple[dict[str, NDArray[Any]], bytes | None]:
             )
     plain = {n: c.astype(object) if c.dtype.kind == "U" else c for n, c in arrays.items()}
     return plain, str(meta).encode()
+
+
+def _arrow(column: NDArray[Any]) -> Any:
+    """A column for Arrow, which loads pandas to look at an array, but not for its memory."""
+    import pyarrow as pa
+
+    if column.dtype != np.float64:
+        return pa.array(column)
+    memory = pa.py_buffer(np.ascontiguousarray(column))
+    return pa.Array.from_buffers(pa.float64(), column.size, [None, memory])
 
 
 def _column(path: Path, name: str, column: Any) -> NDArray[Any]:

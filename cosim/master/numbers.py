@@ -70,7 +70,7 @@ class Numbers:
         Raises:
             FmuCallError: an FMU refused.
         """
-        if not all(type(value) is float or _exact(value) for value in values.values()):
+        if set(map(type, values.values())) - {float} and not all(map(_exact, values.values())):
             return False
         given = np.array(list(values.values()), dtype=np.float64)
         if not np.all((given >= self._low) & (given <= self._high)):
@@ -82,7 +82,7 @@ class Numbers:
 
 
 def _exact(value: object) -> bool:
-    """Whether a number that is no `float` is exactly the same as one."""
+    """Whether it is exactly the same as a floating-point number."""
     if isinstance(value, int) and not isinstance(value, bool):
         return abs(value) <= _EXACT
-    return isinstance(value, np.float64)
+    return isinstance(value, float)

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sources.function import Oracle
-from sources.variant import build_model
 from tests.arm.chains import DEVICES, Reference, laws, named, symmetric, vector
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +20,7 @@ RELATIVE = 1e-9  # two codes in double precision; 1e-12 is what they reach
 
 @lru_cache(maxsize=None)
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def close(a: np.ndarray, b: np.ndarray) -> None:

@@ -17,6 +17,7 @@ from sources.model import Attachment, Model
 from sources.quantity import Quantity
 from sources.variant import build_model, device_values, fidelity
 from tests.arm.chains import Reference, named, vector
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +28,7 @@ ROTOR = np.array([1.02, 1.02, 1.02, 0.2, 0.2, 0.2])
 
 @lru_cache(maxsize=None)
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def accelerations(variant: str, **more: float) -> np.ndarray:
@@ -183,8 +184,8 @@ def test_unknown_place_is_explained() -> None:
 )
 def test_payload_of_0_leaves_every_bit(fidelity: str) -> None:
     """Numbers that the chain folds at build time round as they do beside a mass of 0."""
-    plain = Oracle(build_model(f"ur5_arm/{fidelity}"))
-    loaded = Oracle(build_model(f"ur5_arm/{fidelity}+payload"))
+    plain = oracle_of(f"ur5_arm/{fidelity}")
+    loaded = oracle_of(f"ur5_arm/{fidelity}+payload")
     rng = np.random.default_rng(0)
     for _ in range(100):
         values = {

@@ -9,8 +9,9 @@ import pytest
 
 from sources.function import Oracle
 from sources.model import misfit
-from sources.variant import build_model, effects
+from sources.variant import effects
 from tests.arm.chains import vector
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +43,7 @@ SOME = (
 
 @lru_cache(maxsize=None)
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def fitting() -> list[str]:

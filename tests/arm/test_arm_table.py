@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from sources.function import Oracle
-from sources.variant import build_model
 from tests.arm.chains import laws, named, vector
+from tests.support import oracle_of
 
 HALF_DIGIT = 5.1e-7  # the values are printed with six decimals
 
@@ -143,7 +143,7 @@ WEIGHT = {"ur5": 167.249709, "ur5e": 173.637}
 
 @lru_cache(maxsize=None)
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def inverse(device: str, pose: str, mount: dict[str, tuple[float, ...]]) -> tuple[np.ndarray, ...]:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from sources.function import Oracle
-from sources.variant import build_model
 from tests.arm.chains import named, vector
+from tests.support import oracle_of
 
 
 @lru_cache(maxsize=None)
 def oracle(fidelity: str) -> Oracle:
-    return Oracle(build_model(f"joint_trajectory/{fidelity}"))
+    return oracle_of(f"joint_trajectory/{fidelity}")
 
 
 @pytest.mark.parametrize("fidelity", ["quintic", "swing", "multisine"])

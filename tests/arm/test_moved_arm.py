@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sources.function import Oracle
-from sources.variant import build_model, device_values
+from sources.variant import device_values
 from tests.arm.chains import named, vector
+from tests.support import oracle_of
 
 
 def device() -> dict[str, np.ndarray]:
@@ -43,7 +43,7 @@ def test_currents_are_inverse_dynamics_and_friction(seed: int) -> None:
     rng = np.random.default_rng(seed)
     q, qd, qdd = rng.normal(size=(3, 6))
     values = device()
-    oracle = Oracle(build_model("moved_arm/rigid"))
+    oracle = oracle_of("moved_arm/rigid")
     inertias = named(**{name: values[name] for name in values if name.startswith("J_")})
     outputs = oracle.outputs({**named(q=q, qd=qd, qdd=qdd), **inertias, "w_0": 0.1})
     model = reference(values)
@@ -57,7 +57,7 @@ def test_currents_are_inverse_dynamics_and_friction(seed: int) -> None:
 
 def test_a_bristle_keeps_its_torque_when_the_arm_stops() -> None:
     """What Coulomb friction over the speed forgets: the torque of the last direction."""
-    oracle = Oracle(build_model("moved_arm/rigid+bristle@joint_5"))
+    oracle = oracle_of("moved_arm/rigid+bristle@joint_5")
     stuck = {"joint_5.bristle.tau_c": 3.0, "joint_5.bristle.z": 0.8, **named(q=[0.1] * 6)}
     free = {"joint_5.bristle.tau_c": 0.0, **named(q=[0.1] * 6)}
     held = vector(oracle.outputs(stuck), "tau") - vector(oracle.outputs(free), "tau")

@@ -12,9 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sources.function import Oracle
-from sources.variant import build_model, device_values
+from sources.variant import device_values
 from tests.arm.chains import Reference, laws, named, vector
-from tests.support import Stepper
+from tests.support import Stepper, oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +24,7 @@ SIZES = {"size 3": 0, "size 1": 3}  # first joint of each
 
 @lru_cache(maxsize=None)
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def gravity_torques(device: str, q: np.ndarray) -> np.ndarray:

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from sources.function import Oracle
-from sources.variant import build_model
+from tests.support import oracle_of
 
 Inputs = Callable[[float, dict[str, float]], Mapping[str, float]]
 
@@ -21,7 +20,7 @@ class Stiff:
     """
 
     def __init__(self, variant: str, values: Mapping[str, float] | None = None) -> None:
-        self.oracle = Oracle(build_model(variant))
+        self.oracle = oracle_of(variant)
         self.inputs = [v.name for v in self.oracle.model.of_role("input")]
         _, self.x, self.z, self.u, self.p = self.oracle.arguments(values)
         pattern = np.array(self.oracle.functions.jacobian_pattern)

@@ -8,6 +8,7 @@ import pytest
 from sources.function import Oracle
 from sources.variant import build_model
 from tests.base.stiff import Stiff
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +43,7 @@ def upright(mass: float, centre: np.ndarray) -> dict[str, float]:
 
 def moving(variant: str, rng: np.random.Generator) -> dict[str, float]:
     """A random state of motion, wheels near rolling."""
-    oracle = Oracle(build_model(variant))
+    oracle = oracle_of(variant)
     spread = {"pose_z": 1e-4, "pitch": 0.003, "roll": 0.003, "vel_z": 0.01, "vel_y": 0.02}
     spread |= {"roll_rate": 0.02, "pitch_rate": 0.02, "travel_l": 1e-3, "travel_r": 1e-3}
     spread |= {"climb_l": 0.01, "climb_r": 0.01, "momentum": 0.005}
@@ -114,7 +115,7 @@ def test_static_loads_with_an_arm_are_those_of_six_equal_springs(
     arm["arm_bias[3]"] += FLANGE * G
     total, first = 98.0 + mass + FLANGE, mass * c[:2]
     at_pivots = six_springs(total, first, trail=0.0)
-    y = Oracle(build_model(PLANAR)).outputs(arm)
+    y = oracle_of(PLANAR).outputs(arm)
     assert loads(y) == pytest.approx(list(at_pivots), rel=1e-4)  # body mass rounded to 0.01 kg
 
     settled = settle(arm)
@@ -136,7 +137,7 @@ def test_casters_stand_behind_their_pivots_wherever_these_point() -> None:
 def test_a_leaning_body_turns_a_fork_downhill() -> None:
     """Moment of the normal force about the swivel axis, roll positive lowers the right side."""
     values = {"roll": 0.02, "caster.mu_s": 1e-6, "caster.mu_d": 0.0, "caster.b_s": 0.0}
-    base = Oracle(build_model(SIX_DOF))
+    base = oracle_of(SIX_DOF)
     rate, load = base.derivatives(values), base.outputs(values)["loads[4]"]
     # k = (0, sin roll, cos roll); wheel at (-trail, 0) from the pivot: z.(d x f k) = -trail f k_y
     expected = -TRAIL * load * np.sin(0.02)
@@ -180,7 +181,7 @@ def test_heave_swings_at_11_3_hz_with_damping_0_53() -> None:
 @pytest.mark.parametrize("variant", DYNAMIC)
 def test_rigid_arm_through_the_interface_is_a_payload(variant: str) -> None:
     rng = np.random.default_rng(5)
-    plain, loaded = Oracle(build_model(variant)), Oracle(build_model(variant + "+payload"))
+    plain, loaded = oracle_of(variant), oracle_of(variant + "+payload")
     mass, centre = 17.0, np.array([0.3, -0.2, 0.25])
     mount = np.array([0.05, -0.02, 0.7])
     place = {f"mount_{axis}": float(value) for axis, value in zip("xyz", mount, strict=True)}
@@ -210,7 +211,7 @@ def test_rigid_arm_through_the_interface_is_a_payload(variant: str) -> None:
 @pytest.mark.parametrize("variant", ["mobile_base/kinematic", *DYNAMIC])
 def test_motion_of_the_mount_is_the_derivative_of_its_position(variant: str) -> None:
     rng = np.random.default_rng(6)
-    oracle = Oracle(build_model(variant))
+    oracle = oracle_of(variant)
     values = moving(variant, rng) | {"mount_x": 0.05, "mount_y": 0.1}
     if variant == "mobile_base/kinematic":
         values |= {"speed_l": 4.0, "speed_r": 5.5}
@@ -438,7 +439,7 @@ def test_bristles_hold_a_braked_base_across_a_slope() -> None:
 def test_cable_pulls_sideways_towards_its_anchor() -> None:
     values = {"cable_force.tension": 20.0, "cable_force.anchor[1]": 0.0}
     values |= {"cable_force.anchor[2]": 50.0, "cable_force.anchor[3]": 0.1}
-    base = Oracle(build_model(PLANAR + "[wheel_contact=creep]+cable_force"))
+    base = oracle_of(PLANAR + "[wheel_contact=creep]+cable_force")
     free = {**values, "drive_wheel.mu": 0.0, "caster.mu_s": 1e-6, "caster.mu_d": 0.0}
     rates = base.derivatives(free)
     # 98 kg less what the forks swing aside, at 20 N

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sources.function import Oracle
-from sources.variant import build_model
 from tests.base.stiff import Stiff
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -141,7 +140,7 @@ def test_energy_lost_is_energy_missing() -> None:
 
 
 def test_scrub_torque_acts_on_the_fork_not_on_the_body() -> None:
-    caster = Oracle(build_model("caster/swivel+pivot_torque"))
+    caster = oracle_of("caster/swivel+pivot_torque")
     values = {"w_z": 0.4, "momentum": 0.003, "v_x": 0.0}
     off = caster.derivatives({**values, "pivot_torque.M_pa": 0.0})
     on = caster.derivatives({**values, "pivot_torque.M_pa": 2.0})

@@ -6,10 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from sources.function import Oracle
 from sources.laws import contact
-from sources.variant import build_model
 from tests.base.stiff import Stiff
+from tests.support import oracle_of
 
 FIDELITIES = ("rolling", "creep", "stick_slip", "spatial", "brush")
 
@@ -30,7 +29,7 @@ FIDELITIES = ("rolling", "creep", "stick_slip", "spatial", "brush")
 )
 def test_stick_slip_follows_the_tabulated_curve(ratio: float, mu: float) -> None:
     v_c, load = 0.02, 100.0
-    wheel = Oracle(build_model("wheel_contact/stick_slip"))
+    wheel = oracle_of("wheel_contact/stick_slip")
     y = wheel.outputs({"v_x": 0.6 * ratio * v_c, "v_y": 0.8 * ratio * v_c, "v_c": v_c, "f_n": load})
     assert np.hypot(y["f_x"], y["f_y"]) / load == pytest.approx(mu, abs=5e-6)  # five digits given
     assert y["f_x"] / y["f_y"] == pytest.approx(0.75, rel=1e-12)  # rounding: opposite to the slip
@@ -58,14 +57,14 @@ def test_held_side_force_drifts_as_the_formula_says(v_c: float, known: float) ->
     force, load, mu_s = 118.6 * 0.25, 118.6 * 9.81 / 3, 0.7
     drift = force * v_c / (1.5 * mu_s * load)
     assert drift == pytest.approx(known, rel=4e-3)  # known to three digits
-    wheel = Oracle(build_model("wheel_contact/stick_slip"))
+    wheel = oracle_of("wheel_contact/stick_slip")
     y = wheel.outputs({"v_x": 0.0, "v_y": -drift, "v_c": v_c, "mu_s": mu_s, "f_n": load})
     # the cubic term of mu(v) lowers the force by (v/v_c)^2/3
     assert y["f_y"] == pytest.approx(force, rel=(drift / v_c) ** 2)
 
 
 def test_creep_is_linear_and_saturates() -> None:
-    wheel = Oracle(build_model("wheel_contact/creep"))
+    wheel = oracle_of("wheel_contact/creep")
     base = {"c_x": 1e-6, "c_y": 3e-5, "mu": 0.8, "f_n": 279.0, "rest": 1.0}
     y = wheel.outputs({**base, "v_x": 1e-8, "v_y": -3e-7})
     # far below the limit the law is linear but for (f/limit)^2/2 = 1e-9
@@ -75,7 +74,7 @@ def test_creep_is_linear_and_saturates() -> None:
 
 
 def test_creep_may_fall_at_standstill() -> None:
-    wheel = Oracle(build_model("wheel_contact/rolling"))
+    wheel = oracle_of("wheel_contact/rolling")
     base = {"c_y": 3e-5, "rest": 0.1, "v_creep": 0.02, "v_y": 1e-6}
     still = wheel.outputs(base)["f_y"]
     fast = wheel.outputs({**base, "speed": 100.0, "v_x": 10.0})["f_y"]
@@ -125,7 +124,7 @@ def test_brush_breaks_away_at_the_static_limit_and_slides_at_the_dynamic_one() -
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_wheel_spins_up_by_what_the_floor_does_not_take(fidelity: str) -> None:
     """(J_w + J_added) w' = tau - r f_x - c_rr N r tanh(w/w_rr), from the outputs alone."""
-    wheel = Oracle(build_model(f"wheel_contact/{fidelity}"))
+    wheel = oracle_of(f"wheel_contact/{fidelity}")
     values = {"tau": 1.3, "J_added": 0.03, "v_x": 0.5, "v_y": 0.02, "speed": 5.01, "c_rr": 0.015}
     values |= {"z": 0.098, "f_n": 200.0}
     y = wheel.outputs(values)
@@ -142,8 +141,8 @@ def test_wheel_spins_up_by_what_the_floor_does_not_take(fidelity: str) -> None:
     ],
 )
 def test_forces_turn_with_the_direction_of_rolling(variant: str, values: dict[str, float]) -> None:
-    straight = Oracle(build_model("wheel_contact/creep"))
-    toed = Oracle(build_model(variant))
+    straight = oracle_of("wheel_contact/creep")
+    toed = oracle_of(variant)
     delta, v = 0.2, np.array([0.01, -0.02])
     turn = np.array([[np.cos(delta), -np.sin(delta)], [np.sin(delta), np.cos(delta)]])
     along = straight.outputs({"v_x": v[0], "v_y": v[1]})
@@ -154,7 +153,7 @@ def test_forces_turn_with_the_direction_of_rolling(variant: str, values: dict[st
 
 
 def test_low_friction_patch_acts_where_it_lies() -> None:
-    wheel = Oracle(build_model("wheel_contact/stick_slip+low_friction_patch"))
+    wheel = oracle_of("wheel_contact/stick_slip+low_friction_patch")
     base = {"v_y": 0.5, "low_friction_patch.reduction": 0.8, "low_friction_patch.x_p": 1.0}
     away = wheel.outputs({**base, "x_w": 3.0})["f_y"]
     inside = wheel.outputs({**base, "x_w": 1.0})["f_y"]
@@ -163,7 +162,7 @@ def test_low_friction_patch_acts_where_it_lies() -> None:
 
 def test_eccentric_wheel_lifts_and_falls_with_its_angle() -> None:
     """On a given height the radius at the contact decides the load of the spatial contact."""
-    wheel = Oracle(build_model("wheel_contact/spatial+wheel_runout"))
+    wheel = oracle_of("wheel_contact/spatial+wheel_runout")
     loads = [
         wheel.outputs({"z": 0.099, "angle": angle, "wheel_runout.e": 5e-4})["f_z"]
         for angle in (0.0, np.pi / 2, np.pi)

@@ -7,7 +7,7 @@ import pytest
 
 from sources.function import Oracle
 from sources.model import Declared
-from sources.variant import build_model
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -66,7 +66,7 @@ def random_values(oracle: Oracle, rng: np.random.Generator) -> dict[str, float]:
 
 @pytest.mark.parametrize("variant", [*FIDELITIES, *EFFECTS])
 def test_energy_neither_appears_nor_vanishes(variant: str) -> None:
-    oracle, rng = Oracle(build_model(variant)), np.random.default_rng(1)
+    oracle, rng = oracle_of(variant), np.random.default_rng(1)
     for _ in range(10):
         defect, largest = oracle.energy_defect(random_values(oracle, rng))
         # rounding; the terms inside exceed `largest` where random speeds meet 1e6 N/m
@@ -75,7 +75,7 @@ def test_energy_neither_appears_nor_vanishes(variant: str) -> None:
 
 @pytest.mark.parametrize("variant", FIDELITIES)
 def test_a_lagging_direction_of_rolling_keeps_the_energy(variant: str) -> None:
-    oracle, rng = Oracle(build_model(variant)), np.random.default_rng(3)
+    oracle, rng = oracle_of(variant), np.random.default_rng(3)
     lags = {v.name: 0.05 for v in oracle.model.of_role("parameter") if v.name.endswith("t_turn")}
     assert lags or "wheel_contact" not in variant
     acts = []
@@ -89,8 +89,8 @@ def test_a_lagging_direction_of_rolling_keeps_the_energy(variant: str) -> None:
 
 @pytest.mark.parametrize("variant", EFFECTS)
 def test_effect_of_strength_0_is_absent_bit_for_bit(variant: str) -> None:
-    with_effect = Oracle(build_model(variant))
-    without = Oracle(build_model(variant.partition("+")[0]))
+    with_effect = oracle_of(variant)
+    without = oracle_of(variant.partition("+")[0])
     parameters = with_effect.model.of_role("parameter")
     absent = {v.name: 0.0 for v in parameters if v.of_effect and v.quantity.strength}
     assert absent
@@ -106,7 +106,7 @@ def test_effect_of_strength_0_is_absent_bit_for_bit(variant: str) -> None:
 
 @pytest.mark.parametrize("variant", [*FIDELITIES, *EFFECTS])
 def test_nothing_is_nan_at_rest(variant: str) -> None:
-    oracle = Oracle(build_model(variant))
+    oracle = oracle_of(variant)
     model = oracle.model
     lifted = {v.name: 0.0 for v in model.of_role("input")}
     flat = {v.name: 0.0 for v in model.of_role("state")}
@@ -122,6 +122,6 @@ def test_nothing_is_nan_at_rest(variant: str) -> None:
 
 def test_six_dof_base_stays_cheap() -> None:
     """About 5 us per internal step ask for at most some 1500 and 10000 operations."""
-    functions = Oracle(build_model("mobile_base/six_dof")).functions
+    functions = oracle_of("mobile_base/six_dof").functions
     assert functions.derivatives.n_instructions() < 1500
     assert functions.jacobian.n_instructions() < 10000

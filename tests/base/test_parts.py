@@ -7,7 +7,7 @@ import pytest
 
 from sources.base_body import MOUNTS
 from sources.function import Oracle
-from sources.variant import build_model
+from tests.support import oracle_of
 
 Values = dict[str, float]
 CASES = [
@@ -43,8 +43,8 @@ class Parts:
 
     def __init__(self, wheel: str, caster: str, added: str) -> None:
         device = ".lab" if ".lab" in wheel else ""
-        self.body = Oracle(build_model(f"base_body{device}/planar{added}"))
-        kinds = {False: Oracle(build_model(wheel)), True: Oracle(build_model(caster))}
+        self.body = oracle_of(f"base_body{device}/planar{added}")
+        kinds = {False: oracle_of(wheel), True: oracle_of(caster)}
         self.wheels = {mount.name: kinds[mount.caster] for mount in MOUNTS}
 
     def __call__(self, state: Values, inputs: Values, given: Values) -> tuple[Values, Values]:
@@ -77,7 +77,7 @@ class Parts:
 def test_the_parts_move_as_the_packed_base_at_any_state(
     parts: tuple[str, str, str], packed: str
 ) -> None:
-    whole, apart, rng = Oracle(build_model(packed)), Parts(*parts), np.random.default_rng(4)
+    whole, apart, rng = oracle_of(packed), Parts(*parts), np.random.default_rng(4)
     own = [v for v in whole.model.of_role("parameter") if v.of_effect]
     given = {v.name.rpartition(".")[2]: v.start + rng.uniform(0.1, 0.3) for v in own}
     for _ in range(5):
@@ -97,7 +97,7 @@ def test_the_parts_move_as_the_packed_base_at_any_state(
 def test_what_a_caster_leaves_to_the_body_is_needed() -> None:
     """The twin of the above: without `relief` the base is heavier than it is."""
     apart, rng = Parts(*CASES[0]), np.random.default_rng(4)
-    whole = Oracle(build_model(PACKED[0]))
+    whole = oracle_of(PACKED[0])
     state = {n: rng.normal() * 0.3 for n in whole.state_names}
     inputs = {"tau_l": 3.0, "tau_r": -2.0, "J_l": 0.2, "J_r": 0.1}
     apart.passed = ("f_x", "f_y", "m_z", "mass")

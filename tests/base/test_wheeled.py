@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from sources.function import Oracle
-from sources.variant import build_model
+from tests.support import oracle_of
 
 ANGLES = np.deg2rad([60.0, 180.0, 300.0])
 
 
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(variant))
+    return oracle_of(variant)
 
 
 def omni_speeds(v_x: float, v_y: float, w_z: float, r: float = 0.04, arm: float = 0.125) -> dict:

@@ -34,11 +34,16 @@ def test_importing_the_package_loads_nothing_of_it() -> None:
 
 @pytest.mark.slow
 def test_a_run_loads_neither_command_line_nor_pictures() -> None:
-    found = loaded("import cosim\nassert cosim.run('motor_bench', duration=0.01).runs")
+    found = loaded(
+        "import cosim, pathlib, tempfile\n"
+        "result = cosim.run('motor_bench/ST1', duration=0.01)\n"
+        "with tempfile.TemporaryDirectory() as folder:\n"
+        "    assert result.recording.keep(pathlib.Path(folder, 'run')).exists()"
+    )
     assert {"cosim.running.runner", "numpy"} <= found
     rooms = {name.split(".")[1] for name in found if name.startswith("cosim.")}
     assert not rooms & {"calibrate", "cli", "control", "diagnose", "report", "study"}
-    assert not found & {"matplotlib", "rich", "typer"}
+    assert not found & {"matplotlib", "pandas", "rich", "scipy.integrate", "typer"}
 
 
 @pytest.mark.slow

@@ -12,7 +12,8 @@ from sources.crawler import track_contact
 from sources.function import Oracle
 from sources.model import Model
 from sources.tools.crawler_identification import quasi_static_shift
-from sources.variant import build_model, device_values
+from sources.variant import device_values
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +37,7 @@ VECTORS = {
 
 
 def oracle(variant: str) -> Oracle:
-    return Oracle(build_model(f"crawler{variant}"))
+    return oracle_of(f"crawler{variant}")
 
 
 @pytest.fixture(scope="module")

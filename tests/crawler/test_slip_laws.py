@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sources.function import Oracle
 from sources.tools.crawler_identification import LAWS, Turns, leave_one_set_out, predict
 from sources.tools.slip_laws import (
     CANDIDATES,
@@ -18,8 +17,8 @@ from sources.tools.slip_laws import (
     ranked,
     simplest,
 )
-from sources.variant import build_model
 from tests.crawler.tables import PAPER, column, turns
+from tests.support import oracle_of
 
 E2, E3 = column(2, "e2_m"), column(2, "e3_m")
 TURNS = turns()
@@ -82,7 +81,7 @@ def test_a_law_is_found_in_turns_that_follow_it(law: LawCandidate | OuterSkid) -
 
 
 def test_the_fmu_takes_the_law_with_a_constant_sum() -> None:
-    model = Oracle(build_model("crawler.paper/slip_law"))
+    model = oracle_of("crawler.paper/slip_law")
     law = {"slip_a": 0.02, "slip_b": 0.005, "slip_c": 0.005, "e_inner": 0.02, "exchange": 1.0}
     for w2, w3 in ((3.3, 1.3), (4.8, 0.6)):
         got = model.outputs({"w2": w2, "w3": w3, **law})

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -32,7 +31,7 @@ LAWS: dict[str, disc.Law] = {
     "two": lambda w, theta, t: 0.01 * math.tanh(w / 0.02) + 4e-4 * w * abs(w),
     "teeth": lambda w, theta, t: 0.05 * math.sin(14.0 * theta + 0.5),
 }
-SHORT: dict[str, Any] = {"seconds": 2.5, "names": ("sweep", "steps", "check")}
+FEW = ("sweep", "steps", "check")
 """Where no law of the catalogue fits, a diagnosis tries everything: two fitted runs, and one that
 is not, are enough to see that."""
 
@@ -42,10 +41,12 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     """The diagnosis of a disc with a law, some effects left out of the catalogue."""
     folder = tmp_path_factory.mktemp("discs")
 
-    def found(law: str, *without: str, short: bool = False) -> Diagnosis:
-        place = folder / f"{law}{'_short' * short}"
+    def found(
+        law: str, *without: str, seconds: float = 4.0, names: Iterable[str] = disc.RUNS
+    ) -> Diagnosis:
+        place = folder / f"{law}_{seconds}"
         if not place.is_dir():
-            disc.write(place, LAWS[law], **(SHORT if short else {}))
+            disc.write(place, LAWS[law], seconds=seconds, names=names)
         return diagnose(read_problem(place), without=without)
 
     return found
@@ -87,7 +88,7 @@ def test_a_disc_that_lacks_nothing_has_no_name_whatever_is_left_out(diagnosed: P
 def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
     diagnosed: Plant, law: str, without: tuple[str, ...]
 ) -> None:
-    found = diagnosed(law, *without, short=True)
+    found = diagnosed(law, *without, seconds=1.6, names=FEW)
     assert found.verdict == "unexplained" and not found.answer.laws
     assert found.after is found.before and not found.files
     assert found.answer.force is not None and found.answer.force.label == "load.flange"
@@ -115,7 +116,7 @@ def test_two_laws_that_explain_little_alone_are_both_named(diagnosed: Plant) -> 
 @pytest.mark.slow
 def test_two_laws_hundreds_of_sigma_off_are_named_or_the_nearest_hint(diagnosed: Plant) -> None:
     """Rounds end with unbalance and three wrong laws; unused runs are predicted a little worse."""
-    found = diagnosed("both", short=True)
+    found = diagnosed("both", seconds=2.5, names=FEW)
     named = found.answer.laws or found.answer.hints[0].laws
     friction = {"coulomb", "asymmetric_coulomb", "stribeck", "bristle"}
     assert len(named) == 2

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from sources.function import Oracle
-from sources.variant import build_model
+from tests.support import oracle_of
 
 
 class ClosedDrive:
@@ -26,9 +25,9 @@ class ClosedDrive:
         gearbox: str | None = None,
         values: Mapping[str, float] | None = None,
     ) -> None:
-        self.parts = {"motor": Oracle(build_model(motor)), "load": Oracle(build_model(load))}
+        self.parts = {"motor": oracle_of(motor), "load": oracle_of(load)}
         if gearbox:
-            self.parts["gear"] = Oracle(build_model(gearbox))
+            self.parts["gear"] = oracle_of(gearbox)
         values = dict(values or {})
         self.x0: dict[str, np.ndarray] = {}
         self.z0: dict[str, np.ndarray] = {}

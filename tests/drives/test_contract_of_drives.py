@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from sources.function import Oracle
 from sources.model import Model, misfit
 from sources.variant import build_model, components, device_values, devices, effects, fidelities
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -19,16 +19,11 @@ COMPONENTS = ("dc_motor", "gearbox", "inertia")
 PLAIN = [f"{c}/{f}" for c in COMPONENTS for f in fidelities(c)]
 
 
-@lru_cache(maxsize=None)
-def build(name: str) -> Model:
-    return build_model(name)
-
-
 def variants() -> list[str]:
     """Every fidelity with every effect at every balance that takes it."""
     found = []
     for plain in PLAIN:
-        for balance in build(plain).balances.values():
+        for balance in oracle_of(plain).model.balances.values():
             for effect, module in effects().items():
                 if not misfit(module.EFFECT, balance):
                     found.append(f"{plain}+{effect}@{balance.name}")
@@ -67,7 +62,7 @@ def random_point(model: Model, rng: np.random.Generator) -> dict[str, float]:
 
 @pytest.mark.parametrize("name", PLAIN + WITH_EFFECT)
 def test_energy_balance_closes(name: str) -> None:
-    oracle, rng = Oracle(build(name)), np.random.default_rng(1)
+    oracle, rng = oracle_of(name), np.random.default_rng(1)
     for _ in range(20):
         point = random_point(oracle.model, rng)
         defect, largest = oracle.energy_defect(point)
@@ -93,7 +88,7 @@ def ticks(oracle: Oracle) -> dict[str, Callable[[dict[str, float]], dict[str, fl
 
 @pytest.mark.parametrize("name", WITH_EFFECT)
 def test_strength_0_is_absence_bit_for_bit(name: str) -> None:
-    oracle, plain = Oracle(build(name)), Oracle(build(name.partition("+")[0]))
+    oracle, plain = oracle_of(name), oracle_of(name.partition("+")[0])
     rng = np.random.default_rng(2)
     parameters = oracle.model.of_role("parameter")
     absent = {v.name: 0.0 for v in parameters if v.of_effect and v.quantity.strength}
@@ -116,7 +111,7 @@ def test_strength_0_is_absence_bit_for_bit(name: str) -> None:
 @pytest.mark.parametrize("name", PLAIN + WITH_EFFECT)
 def test_everything_is_finite_at_rest(name: str) -> None:
     """Values and all derivatives, also with respect to the parameters."""
-    oracle = Oracle(build(name))
+    oracle = oracle_of(name)
     arguments = oracle.arguments()
     functions = oracle.functions
     results = [*functions.outputs(*arguments), *functions.jacobian(*arguments)]
@@ -133,7 +128,7 @@ def test_everything_is_finite_at_rest(name: str) -> None:
     "name", [n for n in WITH_EFFECT if n.partition("+")[2].partition("@")[0] in DISSIPATIVE]
 )
 def test_friction_and_resistance_never_give_power(name: str) -> None:
-    oracle, rng = Oracle(build(name)), np.random.default_rng(3)
+    oracle, rng = oracle_of(name), np.random.default_rng(3)
     effect, _, balance = name.partition("+")[2].partition("@")
     seen = 0.0
     for _ in range(200):
@@ -161,7 +156,7 @@ def test_every_effect_made_for_drives_finds_a_place() -> None:
 @pytest.mark.parametrize("component", COMPONENTS)
 def test_fidelities_can_be_swapped(component: str) -> None:
     """Same inputs, and the outputs of the simplest fidelity everywhere."""
-    models = [build(f"{component}/{fidelity}") for fidelity in fidelities(component)]
+    models = [oracle_of(f"{component}/{fidelity}").model for fidelity in fidelities(component)]
     inputs = [{v.name for v in m.of_role("input")} for m in models]
     outputs = [{v.name for v in m.of_role("output")} for m in models]
     assert all(names == inputs[0] for names in inputs)
@@ -175,7 +170,7 @@ def test_device_values_all_belong_to_some_fidelity(component: str) -> None:
     declared = {
         v.quantity.name
         for f in fidelities(component)
-        for v in build(f"{component}/{f}").variables.values()
+        for v in oracle_of(f"{component}/{f}").model.variables.values()
     }
     for device in devices(component):
         assert set(device_values(component, device)) <= declared

@@ -13,6 +13,7 @@ from sources.function import Oracle
 from sources.model import ModelError, Role
 from sources.variant import build_model
 from tests.drives.closed_drive import ClosedDrive
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -21,8 +22,8 @@ Point = Mapping[str, float]
 
 def torque_of(effect: str, point: Point) -> float:
     """Torque that an effect adds to a disc, from its acceleration."""
-    with_effect = Oracle(build_model(f"inertia/disc+{effect}"))
-    plain = Oracle(build_model("inertia/disc"))
+    with_effect = oracle_of(f"inertia/disc+{effect}")
+    plain = oracle_of("inertia/disc")
     inertia = 0.08
     shared = {k: v for k, v in point.items() if "." not in k}
     return inertia * (with_effect.derivatives(point)["speed"] - plain.derivatives(shared)["speed"])
@@ -74,8 +75,8 @@ def test_gear_friction_counts_both_sides(speed: float, angle: float, tau: float)
     arm = {"J": 0.05, "b": 0.0, "m": 0.5, "l": 0.1, "phi_0": 0.1}
     point = {**arm, "speed": speed, "angle": angle, "tau": tau}
     values = {**point, **{f"{name}.{key}": value for key, value in own.items()}}
-    loaded = Oracle(build_model(f"inertia/pendulum+{name}")).derivatives(values)["speed"]
-    plain = Oracle(build_model("inertia/pendulum")).derivatives(point)["speed"]
+    loaded = oracle_of(f"inertia/pendulum+{name}").derivatives(values)["speed"]
+    plain = oracle_of("inertia/pendulum").derivatives(point)["speed"]
     weight = -0.5 * 9.81 * 0.1 * math.sin(angle - 0.1)
     load = abs(tau - 0.6 * weight)
     low = 1 + 0.5 * math.exp(-((speed / 0.4) ** 2))
@@ -85,8 +86,8 @@ def test_gear_friction_counts_both_sides(speed: float, angle: float, tau: float)
 
 def voltage_of(effect: str, point: Point) -> float:
     """Voltage that an effect adds to the winding, from the rate of the current."""
-    with_effect = Oracle(build_model(f"dc_motor/sampled+{effect}"))
-    plain = Oracle(build_model("dc_motor/sampled"))
+    with_effect = oracle_of(f"dc_motor/sampled+{effect}")
+    plain = oracle_of("dc_motor/sampled")
     shared = {k: v for k, v in point.items() if "." not in k}
     return 2e-4 * (with_effect.derivatives(point)["current"] - plain.derivatives(shared)["current"])
 
@@ -123,7 +124,7 @@ def test_voltage_of_a_winding(effect: str, point: tuple[float, float, float]) ->
 
 
 def test_a_warm_winding_settles_where_heat_in_is_heat_out() -> None:
-    oracle = Oracle(build_model("dc_motor/sampled+winding_heating"))
+    oracle = oracle_of("dc_motor/sampled+winding_heating")
     current, r_th, alpha = 20.0, 1.5, 0.00393
     hot = 0.1 * current**2 / (1 - alpha * r_th * 0.1 * current**2)  # p = R (1 + alpha r_th p) i^2
     values = {"current": current, "winding_heating.p": hot}
@@ -137,7 +138,7 @@ def test_a_warm_winding_settles_where_heat_in_is_heat_out() -> None:
 )
 def test_a_wrong_current_sensor_misleads_its_loop(effect: str, measured: float) -> None:
     """The loop brings the measured current to its set value, so the true one is off."""
-    oracle = Oracle(build_model(f"dc_motor/electrical+{effect}"))
+    oracle = oracle_of(f"dc_motor/electrical+{effect}")
     point = {"current": 3.0, "current_integral": 0.0}
     assert oracle.outputs(point)["i_measured"] == pytest.approx(measured, rel=1e-12)
     assert oracle.outputs(point)["i"] == 3.0
@@ -146,7 +147,7 @@ def test_a_wrong_current_sensor_misleads_its_loop(effect: str, measured: float) 
 
 def test_transmission_error_turns_the_motor_by_its_own_shape() -> None:
     """Integrated over the output angle, w_a / w_b gives ratio (theta + eps sin(n theta))."""
-    oracle = Oracle(build_model("gearbox/ratio+mesh_ripple"))
+    oracle = oracle_of("gearbox/ratio+mesh_ripple")
     values = {"w_b": 2.0, "mesh_ripple.n": 5.0, "mesh_ripple.eps": 0.01}
     times = np.linspace(0.0, 1.0, 2001)
     run = oracle.simulate(times, values)
@@ -162,7 +163,7 @@ def disc_under_torque(
     effect: str, torque: Callable[[float], float], end: float
 ) -> dict[str, np.ndarray]:
     """A disc without other friction, sampled every 10 ms."""
-    oracle = Oracle(build_model(f"inertia/disc+{effect}"))
+    oracle = oracle_of(f"inertia/disc+{effect}")
     times = np.linspace(0.0, end, round(end / 0.01) + 1)
     return oracle.simulate(times, {"b": 0.0}, lambda t: {"tau": torque(t)}, rtol=1e-6, atol=1e-11)
 
@@ -197,7 +198,7 @@ def test_bristle_breaks_away_at_its_maximum_and_then_slides() -> None:
 
 
 def test_friction_fades_while_the_shaft_turns_and_returns_at_rest() -> None:
-    oracle = Oracle(build_model("inertia/disc+temperature_drift"))
+    oracle = oracle_of("inertia/disc+temperature_drift")
     rate = "temperature_drift.h"
     assert oracle.derivatives({"speed": 1.0})[rate] == pytest.approx(0.5 / 60)
     assert oracle.derivatives({"temperature_drift.h": 0.6})[rate] == pytest.approx(-0.01)
@@ -209,13 +210,13 @@ AT_REST = {"tau_a": 0.0, "w_b": 0.0}
 
 @pytest.mark.parametrize(("twist", "torque"), [(1e-3, 0.0), (-1.5e-3, 0.0), (2.5e-3, 6.0)])
 def test_backlash_leaves_a_gap(twist: float, torque: float) -> None:
-    oracle = Oracle(build_model("gearbox/elastic+backlash"))
+    oracle = oracle_of("gearbox/elastic+backlash")
     out = oracle.outputs({"twist": twist, "backlash.gap": 3e-3, **AT_REST})
     assert out["tau_b"] == pytest.approx(torque, abs=1e-12)  # 6000 N.m/rad beyond 1.5 mrad
 
 
 def test_spring_that_stiffens() -> None:
-    oracle = Oracle(build_model("gearbox/elastic+cubic_stiffness"))
+    oracle = oracle_of("gearbox/elastic+cubic_stiffness")
     out = oracle.outputs({"twist": 2e-3, "cubic_stiffness.k_3": 1e9, **AT_REST})
     assert out["tau_b"] == pytest.approx(6000 * 2e-3 + 1e9 * 8e-9, rel=1e-12)
 
@@ -226,7 +227,7 @@ def test_hysteresis_loses_the_area_of_its_loop() -> None:
     x is between 0 and the deflection 2 x_h over which the loop turns.
     """
     width, length, amplitude = 0.5, 5e-4, 0.01
-    oracle = Oracle(build_model("gearbox/elastic+hysteresis"))
+    oracle = oracle_of("gearbox/elastic+hysteresis")
     names = oracle.state_names
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from sources.function import Oracle
-from sources.variant import build_model
 from tests.drives.closed_drive import ClosedDrive
+from tests.support import oracle_of
 
 RATIO, ETA = 10.167, 0.9
 
@@ -27,7 +27,7 @@ def loss(oracle: Oracle, tau_a: float, w_b: float) -> float:
 
 @pytest.mark.parametrize("fidelity", ["lossy", "elastic"])
 def test_a_lossy_gear_never_creates_energy(fidelity: str) -> None:
-    oracle = Oracle(build_model(f"gearbox/{fidelity}"))
+    oracle = oracle_of(f"gearbox/{fidelity}")
     losses = [loss(oracle, *load) for load in random_loads(500)]
     assert min(losses) >= 0.0
     assert max(losses) > 1.0
@@ -35,13 +35,13 @@ def test_a_lossy_gear_never_creates_energy(fidelity: str) -> None:
 
 def test_a_constant_efficiency_does_create_energy() -> None:
     """The negative twin: the papers' gain gives power while the load drives."""
-    oracle = Oracle(build_model("gearbox/ratio"))
+    oracle = oracle_of("gearbox/ratio")
     assert loss(oracle, 1.0, 5.0) == pytest.approx((1 - ETA) * RATIO * 5.0, rel=1e-12)
     assert loss(oracle, -1.0, 5.0) == pytest.approx(-(1 - ETA) * RATIO * 5.0, rel=1e-12)
 
 
 def test_lossy_gear_is_the_gain_while_driving_and_its_inverse_while_braking() -> None:
-    oracle = Oracle(build_model("gearbox/lossy"))
+    oracle = oracle_of("gearbox/lossy")
     # 50 W against a blend of 0.5 W: tanh(100) is 1 to rounding
     driving = oracle.outputs({"tau_a": 1.0, "w_b": 50 / RATIO})["tau_b"]
     braking = oracle.outputs({"tau_a": -1.0, "w_b": 50 / RATIO})["tau_b"]
@@ -69,7 +69,7 @@ def test_two_masses_resonate_where_theory_says(inertia: float) -> None:
 def test_damping_lost_by_the_exchange_with_the_load(order: str, share: float) -> None:
     """Held speeds cost damping k H (1/J) / (1/J + 1/(ratio^2 J_a)) with Jacobi, none otherwise."""
     stiffness, damping, inertia, step = 6000.0, 1.1, 0.1, 1e-4
-    oracle = Oracle(build_model("gearbox/elastic"))
+    oracle = oracle_of("gearbox/elastic")
     rest = {"tau_a": 0.0, "w_b": 0.0}
     columns = [oracle.derivatives({**rest, name: 1e-6}) for name in (*oracle.state_names, "w_b")]
     a = np.array([[c[name] * 1e6 for c in columns] for name in oracle.state_names])
@@ -120,10 +120,10 @@ def test_stiff_spring_gives_the_rigid_gear(signed: float, rigid: str) -> None:
 
 
 def test_rotor_inertia_is_counted_once() -> None:
-    assert Oracle(build_model("gearbox/ratio")).outputs()["J_b"] == pytest.approx(RATIO**2 * 2e-4)
-    assert Oracle(build_model("gearbox/elastic")).outputs()["J_b"] == 0.0
+    assert oracle_of("gearbox/ratio").outputs()["J_b"] == pytest.approx(RATIO**2 * 2e-4)
+    assert oracle_of("gearbox/elastic").outputs()["J_b"] == 0.0
 
 
 def test_rotor_without_inertia_does_not_divide_by_zero() -> None:
-    oracle = Oracle(build_model("gearbox/elastic"))
+    oracle = oracle_of("gearbox/elastic")
     assert np.isfinite(oracle.derivatives({"J_a": 0.0, "tau_a": 1.0})["rotor_speed"])

@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from sources.function import Oracle
 from sources.variant import build_model
 from tests.drives.closed_drive import ClosedDrive
+from tests.support import oracle_of
 
 # One drive of the MiR250 with half of base, cabinet and arm, seen at the motor (straight ahead).
 INERTIA = 0.00601
@@ -133,7 +134,7 @@ def test_lifted_wheel_is_stable() -> None:
 
 
 def test_integrators_stop_at_the_limit_and_the_right_hand_side_is_continuous() -> None:
-    oracle = Oracle(build_model("dc_motor/electrical"))
+    oracle = oracle_of("dc_motor/electrical")
     limit, gain, integral_gain = 41.4, GAINS["Kp_v"], GAINS["Ki_v"]
 
     def rate(error: float) -> float:
@@ -257,7 +258,7 @@ def test_every_fidelity_reaches_the_set_speed(fidelity: str) -> None:
 
 
 def test_ideal_source_is_limited_in_acceleration_and_torque() -> None:
-    oracle = Oracle(build_model("dc_motor/ideal"))
+    oracle = oracle_of("dc_motor/ideal")
     assert oracle.derivatives({"w_ref": 100.0})["set_speed"] == 50.8
     assert oracle.derivatives({"w_ref": -100.0})["set_speed"] == -50.8
     assert oracle.outputs({"set_speed": 100.0})["tau"] == pytest.approx(0.13 * 41.4, rel=1e-15)

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sources.function import Oracle
-from sources.variant import build_model
+from tests.support import oracle_of
 
 
 def ticked(oracle: Oracle, values: dict[str, float], clock: int = 0) -> dict[str, float]:
@@ -24,7 +24,7 @@ CASCADE = {"K_p": 20.0, "K_v": 0.5, "K_u": 0.1, "u_max": 4.0, "T_loop": 2e-3}
 
 @pytest.mark.parametrize(("q_ref", "u_add"), [(0.31, 0.0), (0.31, 0.7), (2.0, 0.0), (-2.0, 0.1)])
 def test_cascade_is_position_loop_around_speed_loop(q_ref: float, u_add: float) -> None:
-    oracle = Oracle(build_model("position_servo/cascade"))
+    oracle = oracle_of("position_servo/cascade")
     angles = (0.30, 0.299, 0.2975)  # now, one and two ticks ago
     values = {**CASCADE, "q_ref": q_ref, "u_add": u_add, "phi": angles[0],
               "phi_before": angles[1], "phi_before_last": angles[2]}  # fmt: skip
@@ -46,7 +46,7 @@ HOBBY = {"k_d": 2.0, "K_t": 0.3, "R_a": 4.0, "u_supply": 7.0}
     ("q_ref", "duty"), [(0.2, 0.2), (1.0, 1.0), (-3.0, -1.0)], ids=["linear", "full", "reverse"]
 )
 def test_proportional_sets_the_duty(q_ref: float, duty: float) -> None:
-    oracle = Oracle(build_model("position_servo/proportional"))
+    oracle = oracle_of("position_servo/proportional")
     values = {**HOBBY, "q_ref": q_ref, "phi": 0.1, "w": 1.5}
     after = ticked(oracle, values)
     assert after["u_held"] == pytest.approx(7.0 * duty, abs=1e-12)  # rounding of a few volts
@@ -55,7 +55,7 @@ def test_proportional_sets_the_duty(q_ref: float, duty: float) -> None:
 
 
 def test_open_bridge_gives_no_torque() -> None:
-    oracle = Oracle(build_model("position_servo/proportional+brush_drop"))
+    oracle = oracle_of("position_servo/proportional+brush_drop")
     values = {**HOBBY, "u_held": 5.0, "w": 2.0, "brush_drop.u_b": 0.5}
     assert oracle.outputs({**values, "enable": 0.0})["tau"] == 0.0
     assert oracle.outputs({**values, "enable": 1.0})["tau"] != 0.0
@@ -69,7 +69,7 @@ def test_rigid_axis_moves_as_a_mass_with_friction() -> None:
     """In metres, by another solver, where the component counts in radians of the screw."""
     times = np.linspace(0.0, 0.4, 9)
     torque = lambda t: 0.05 * math.sin(20.0 * t)  # noqa: E731
-    oracle = Oracle(build_model("screw_axis/rigid"))
+    oracle = oracle_of("screw_axis/rigid")
     found = oracle.simulate(times, AXIS, lambda t: {"tau": torque(t)})
     per_metre = 2 * math.pi / 0.005
 
@@ -90,7 +90,7 @@ def test_a_stiff_screw_is_a_rigid_one() -> None:
     stiff = {"k": 1e4, "d": 1.0, "share": 0.4}
     found = {}
     for name, more in (("rigid", {}), ("elastic", stiff)):
-        oracle = Oracle(build_model(f"screw_axis/{name}"))
+        oracle = oracle_of(f"screw_axis/{name}")
         drive = lambda t: {"tau": 0.08 * math.sin(9.0 * t)}  # noqa: E731
         found[name] = oracle.simulate(times, {**AXIS, **more}, drive, rtol=1e-9)["x"]
     # the twist tau / k = 8e-6 rad is 6e-9 m of 16 mm
@@ -100,7 +100,7 @@ def test_a_stiff_screw_is_a_rigid_one() -> None:
 @pytest.mark.parametrize("variant", ["rigid", "elastic"])
 def test_the_encoders_zero_shifts_the_ripple(variant: str) -> None:
     """A ripple once per turn repeats when the zero moves by one lead, and turns round by half."""
-    oracle = Oracle(build_model(f"screw_axis/{variant}+cogging@screw"))
+    oracle = oracle_of(f"screw_axis/{variant}+cogging@screw")
     ripple = {"screw.cogging.tau_c": 0.02, "screw.cogging.n": 1.0, "angle": 1.0}
     state = "speed" if variant == "rigid" else "w_c"
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -67,9 +68,27 @@ def test_no_fault_is_silent(folder: Path, fault: Fault) -> None:
     before = os.getcwd(), os.umask(0o022)
     judge(fault, outcome(folder, fault, False))
     assert (os.getcwd(), os.umask(before[1])) == (before[0], 0o022)
-    assert not subprocess.run(
-        ["pgrep", "-P", str(os.getpid()), "-f", "cosim.master"], capture_output=True, check=False
-    ).stdout
+    assert not [line for line in children() if "cosim.master" in line]
+
+
+def children() -> list[str]:
+    """Command lines of the processes that this one has begun and that have not ended."""
+    numbers = [
+        n for file in Path("/proc/self/task").glob("*/children") for n in file.read_text().split()
+    ]
+    found = []
+    for number in numbers:
+        with suppress(FileNotFoundError):  # it has just ended
+            found.append(Path(f"/proc/{number}/cmdline").read_bytes().replace(b"\0", b" ").decode())
+    return found
+
+
+def test_a_child_is_seen() -> None:
+    program = [sys.executable, "-c", "print(flush=True); input()  # cosim.master"]
+    with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as begun:
+        begun.stdout.readline()  # it has begun
+        assert [line for line in children() if "cosim.master" in line]
+        begun.stdin.write(b"\n")
 
 
 def test_there_are_fifty_faults_and_the_page_has_them_all() -> None:

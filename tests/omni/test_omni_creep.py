@@ -7,10 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from sources.function import Oracle
-from sources.variant import build_model
 from tests.omni import lagrange as la
-from tests.support import Stepper
+from tests.support import Stepper, oracle_of
 
 TICK, SUBSTEPS = 1e-3, 20  # the rig's mechanics advance in steps of 50 us
 J_D, J_S = 20**2 * 2e-4, 40**2 * 6e-5
@@ -41,7 +39,7 @@ def loads(beta: np.ndarray) -> np.ndarray:
 
 
 def test_loads_are_those_of_statics() -> None:
-    base = Oracle(build_model("omni_base/creep"))
+    base = oracle_of("omni_base/creep")
     rng = np.random.default_rng(0)
     for _ in range(20):
         beta, theta = rng.uniform(-4, 4, 3), float(rng.uniform(-4, 4))
@@ -51,7 +49,7 @@ def test_loads_are_those_of_statics() -> None:
 
 
 def test_a_payload_presses_on_the_wheels_that_it_is_near() -> None:
-    base = Oracle(build_model("omni_base/creep+payload"))
+    base = oracle_of("omni_base/creep+payload")
     place = AXES[0] - la.E * np.array([1.0, 0.0])  # above the contact of the first wheel
     at = named(**{"payload.position": [*place, 0.3]})
     bare = vector(base.outputs({**at, "payload.mass": 0.0}), "normal")

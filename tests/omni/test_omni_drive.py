@@ -7,9 +7,9 @@ import pytest
 
 from sources.function import Oracle
 from sources.tools.omni_torques import torques
-from sources.variant import build_model
+from tests.support import oracle_of
 
-BASE = Oracle(build_model("omni_base/dynamic"))
+BASE = oracle_of("omni_base/dynamic")
 RNG = np.random.default_rng(4)
 
 
@@ -38,7 +38,7 @@ def point() -> tuple[dict[str, float], dict[str, float], np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("fidelity", ["inverse_dynamics", "pid"])
 def test_torques_give_the_set_acceleration(fidelity: str) -> None:
-    drive = Oracle(build_model(f"omni_drive/{fidelity}"))
+    drive = oracle_of(f"omni_drive/{fidelity}")
     for _ in range(5):
         inputs, states, _, acceleration = point()
         found = drive.outputs(known(drive, inputs | {"tau_max": 1e6}))
@@ -51,7 +51,7 @@ def test_torques_give_the_set_acceleration(fidelity: str) -> None:
 
 
 def test_torques_are_those_of_the_tool() -> None:
-    drive = Oracle(build_model("omni_drive/inverse_dynamics"))
+    drive = oracle_of("omni_drive/inverse_dynamics")
     inputs, _, rates, acceleration = point()
     beta = [inputs[f"beta[{i}]"] for i in (1, 2, 3)]
     expected = torques(inputs["theta"], beta, rates, acceleration)
@@ -62,7 +62,7 @@ def test_torques_are_those_of_the_tool() -> None:
 
 
 def test_pid_answers_an_error_and_keeps_its_limit() -> None:
-    drive = Oracle(build_model("omni_drive/pid"))
+    drive = oracle_of("omni_drive/pid")
     limited = drive.outputs({"x_set": 10.0, "tau_max": 30.0})
     assert max(abs(limited[f"tau_phi[{i}]"]) for i in (1, 2, 3)) == 30.0
     near = drive.outputs({"x_set": 0.01})

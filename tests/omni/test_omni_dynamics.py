@@ -21,8 +21,8 @@ from sources.omni_base.rigid_body import (
 )
 from sources.tools import omni_kinematics
 from sources.tools.omni_torques import torques
-from sources.variant import build_model
 from tests.omni import lagrange as la
+from tests.support import oracle_of
 
 FREE = {"f_s": 0.0, "f_v": 0.0}  # no axle friction
 BASE = omni_kinematics.Base.symmetric(la.L, (np.pi / 3, np.pi, 5 * np.pi / 3), la.E, la.R)
@@ -30,6 +30,7 @@ GEOMETRY = Geometry(ca.DM(BASE.x), ca.DM(BASE.y), ca.DM([la.E] * 3), ca.DM([la.R
 MASSES = Masses(
     la.M_P, la.M_P * la.X_G, 0.0, la.I_P + la.M_P * la.X_G**2, la.M_W, la.D, la.I_S, la.I_PHI
 )
+
 LAGRANGE = la.equations()
 # test point of the reference numbers
 THETA, BETA, RATES = 0.3, np.array([0.2, 1.1, -2.0]), np.array([0.5, -0.2, 0.4])
@@ -37,7 +38,7 @@ THETA, BETA, RATES = 0.3, np.array([0.2, 1.1, -2.0]), np.array([0.5, -0.2, 0.4])
 
 @lru_cache(maxsize=None)
 def oracle(fidelity: str) -> Oracle:
-    return Oracle(build_model(f"omni_base/{fidelity}"))
+    return oracle_of(f"omni_base/{fidelity}")
 
 
 def vector(name: str, values: np.ndarray) -> dict[str, float]:

@@ -10,9 +10,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from sources.packaging import native
-from sources.packaging.build import Variant, collect
-from sources.packaging.description import describe_fmi2, describe_fmi3, terminals
+from sources.packaging.build import Variant
+from sources.packaging.description import terminals
 from tests.fmus import catalogue, fmu
+from tests.packaging.described import described as texts_of
 
 pytestmark = pytest.mark.slow
 
@@ -24,11 +25,8 @@ Described = tuple[Variant, ET.Element, ET.Element]
 
 
 def describe(name: str) -> Described:
-    variant = collect(name)
-    arguments = (variant.model, variant.functions, variant.entries)
-    common = {"identifier": variant.name.identifier, "name": name, "token": "{0}"}
-    two = ET.fromstring(describe_fmi2(*arguments, **common, kind="native"))
-    return variant, two, ET.fromstring(describe_fmi3(*arguments, **common))
+    variant, texts = texts_of(name)
+    return variant, ET.fromstring(texts["fmi2"]), ET.fromstring(texts["fmi3"])
 
 
 @pytest.fixture(scope="module", params=NAMES)

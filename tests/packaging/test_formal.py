@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from sources.packaging.build import Variant, collect
+from sources.packaging.build import Variant
 from sources.packaging.description import (
     build_description,
-    describe_fmi2,
-    describe_fmi3,
     terminals,
 )
 from tests.fmus import catalogue
+from tests.packaging.described import described
 from tests.packaging.formal import ALLOWED, INITIAL, problems, variables
 
 pytestmark = pytest.mark.slow
@@ -32,18 +31,6 @@ TWIN = "dc_motor/sampled"  # inputs, outputs, states, clocks, parameters of both
 @lru_cache(maxsize=2)
 def schema(file: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(str(SCHEMAS / file)))
-
-
-@lru_cache(maxsize=1)
-def described(name: str) -> tuple[Variant, dict[str, bytes]]:
-    variant = collect(name)
-    arguments = (variant.model, variant.functions, variant.entries)
-    common = {"identifier": variant.name.identifier, "name": name, "token": "{0}"}
-    return variant, {
-        "fmi2": describe_fmi2(*arguments, **common, kind="native"),
-        "python": describe_fmi2(*arguments, **common, kind="python"),
-        "fmi3": describe_fmi3(*arguments, **common),
-    }
 
 
 @pytest.mark.parametrize("name", catalogue())

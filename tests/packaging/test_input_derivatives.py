@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sources.function import Oracle
 from sources.packaging.layout import METHODS
-from sources.variant import build_model
 from tests.fmus import Slave, fmu
+from tests.support import oracle_of
 
 NAME = "dc_motor/electrical"
 VALUES = {"w_ref": 1.0, "w": 0.5}
@@ -30,7 +29,7 @@ def moving(t: float) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def exact() -> tuple[list[str], np.ndarray, np.ndarray]:
-    oracle = Oracle(build_model(NAME))
+    oracle = oracle_of(NAME)
     found = oracle.simulate(np.linspace(0.0, END, 5), VALUES, moving, rtol=1e-12, atol=1e-13)
     states = np.array([found[state] for state in oracle.state_names])
     return oracle.state_names, states[:, -1], np.abs(states).max(axis=1)

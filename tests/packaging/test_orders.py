@@ -12,10 +12,9 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sources.function import Oracle
 from sources.packaging.layout import METHODS
-from sources.variant import build_model
 from tests.fmus import Slave, fmu
+from tests.support import oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +51,7 @@ ADAPTIVE = [name for name in CASES if name != "trajectory/body"]
 @lru_cache
 def reference(name: str) -> tuple[list[str], np.ndarray, np.ndarray]:
     values, end, *_ = CASES[name]
-    oracle = Oracle(build_model(name))
+    oracle = oracle_of(name)
     found = oracle.simulate(np.linspace(0.0, end, 20), values, rtol=1e-12, atol=1e-13)
     states = np.array([found[state] for state in oracle.state_names])
     return oracle.state_names, states[:, -1], np.abs(states).max(axis=1)
@@ -112,7 +111,7 @@ STIFF = {
 @pytest.mark.parametrize("name", STIFF)
 def test_linearly_implicit_steps_are_stable_where_explicit_ones_are_not(name: str) -> None:
     values, end = STIFF[name]
-    oracle = Oracle(build_model(name))
+    oracle = oracle_of(name)
     found = oracle.simulate([0.0, end], values, rtol=1e-10, atol=1e-12)
     expected = np.array([found[state][-1] for state in oracle.state_names])
     ends = {}

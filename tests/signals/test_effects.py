@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from sources.effect import Effect
-from sources.function import Oracle
 from sources.model import ModelError
 from sources.variant import build_model, effects
-from tests.support import Stepper
+from tests.support import Stepper, oracle_of
 
 pytestmark = pytest.mark.slow
 
@@ -183,7 +182,7 @@ def test_rate_limit_is_the_digital_acceleration_limiter() -> None:
 
 
 def outputs(variant: str, values: dict[str, float]) -> dict[str, float]:
-    return Oracle(build_model(variant)).outputs(values)
+    return oracle_of(variant).outputs(values)
 
 
 def test_static_effects_follow_their_formulas() -> None:

@@ -6,9 +6,7 @@ import math
 
 import pytest
 
-from sources.function import Oracle
-from sources.variant import build_model
-from tests.support import Stepper
+from tests.support import Stepper, oracle_of
 
 R, TRACK, RATIO = 0.100, 0.410, 10.167  # digital twin paper, Table 1
 
@@ -46,7 +44,7 @@ def test_base_turns_by_the_commanded_angle(fidelity: str) -> None:
 
 def test_half_the_track_is_the_lever() -> None:
     for fidelity in ("body", "world"):
-        oracle = Oracle(build_model(f"inverse_kinematics/{fidelity}"))
+        oracle = oracle_of(f"inverse_kinematics/{fidelity}")
         spot = oracle.outputs({**STILL, "w_d": 1.0})
         # The right wheel of a base turning on the spot runs on a circle of half the track.
         assert spot["w_r_ref"] == pytest.approx(RATIO * 0.205 / 0.1, rel=1e-15)
@@ -54,7 +52,7 @@ def test_half_the_track_is_the_lever() -> None:
 
 
 def test_world_form_uses_the_set_heading_and_loses_the_sideways_part() -> None:
-    oracle = Oracle(build_model("inverse_kinematics/world"))
+    oracle = oracle_of("inverse_kinematics/world")
     turned = {**STILL, "phi_d": 0.8}
     along = oracle.outputs({**turned, "xd_d": 0.3 * math.cos(0.8), "yd_d": 0.3 * math.sin(0.8)})
     assert along["w_l_ref"] == pytest.approx(RATIO * 0.3 / R, rel=1e-15)
@@ -63,7 +61,7 @@ def test_world_form_uses_the_set_heading_and_loses_the_sideways_part() -> None:
 
 
 def test_controller_constants_may_be_wrong() -> None:
-    oracle = Oracle(build_model("inverse_kinematics.lab/body"))
+    oracle = oracle_of("inverse_kinematics.lab/body")
     outputs = oracle.outputs({"v_d": 0.5, "w_d": 0.4, "track": 0.400})
     # A base with the true track turns less by the ratio of the tracks.
     assert base_motion(outputs)[1] == pytest.approx(0.4 * 0.400 / TRACK, rel=1e-14)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sources.function import Oracle
 from sources.variant import build_model, device_values, devices
-from tests.support import Stepper
+from tests.support import Stepper, oracle_of
 
 DT = 0.01  # all ramps below begin and end on multiples of it
 
@@ -150,7 +149,7 @@ def test_outputs_are_finite_where_segments_are_empty() -> None:
         for name in (v.name for v in build_model("trajectory/body").of_role("parameter"))
         if name.startswith(("duration", "speed", "turn"))
     }
-    oracle = Oracle(build_model("trajectory/body"))
+    oracle = oracle_of("trajectory/body")
     for t in (0.0, 1.0, 2.0):
         assert np.all(np.isfinite(list(oracle.outputs(zero, t).values())))
         jacobian, time = oracle.functions.jacobian(*oracle.arguments(zero, t))[1:]

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity, Target, targets_of
+from ...calibrate.parts import Channel, MeasuredRun, Parameter, Sensitivity, Targets, targets_of
 from ...calibrate.problem import Problem
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError, UnknownNameError, VariantError, listing
@@ -100,23 +100,27 @@ class LawProblem(Problem):
         )
 
     @cached_property
-    def _coefficients(self) -> tuple[Target, ...]:
-        """What sets them, in order."""
-        return tuple(
-            target
-            for target in targets_of(self.parameters)
-            if self.parameters[target.place].targets[0][0].startswith(self.coefficient)
+    def _coefficients(self) -> tuple[Targets, list[str], NDArray[np.intp]]:
+        """What sets them, in order; their names, and the place of each target's among those."""
+        targets = Targets(
+            [
+                target
+                for target in targets_of(self.parameters)
+                if self.parameters[target.place].targets[0][0].startswith(self.coefficient)
+            ]
         )
+        place = {name: k for k, name in enumerate(dict.fromkeys(targets.names))}
+        return targets, list(place), np.array([place[n] for n in targets.names], dtype=np.intp)
 
     def values(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
         """See `Problem.values`."""
         run = self.run(run) if isinstance(run, str) else run
         found = super().values(theta, run)
-        sums: dict[str, float] = {}
-        values = theta.tolist()
-        for target in self._coefficients:
-            sums[target.name] = sums.get(target.name, 0.0) + target.of(values)
-        for name, value in sums.items():
+        targets, names, places = self._coefficients
+        if not names:
+            return found
+        sums = np.bincount(places, weights=targets.of(theta)).tolist()
+        for name, value in zip(names, sums, strict=True):
             if value == 0.0 and name not in self.constants:  # as the FMU has it
                 del found[name]
             else:
