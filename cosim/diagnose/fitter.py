@@ -216,7 +216,7 @@ class Fitter(Judge):
         return result
 
     def _elsewhere(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
-        """The best fit from other starts, by derivatives taken there (of the model with the law)."""
+        """The best fit from other starts, with derivatives of the model itself."""
         best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:
             found = self.judged(fit(simulator, start, effort=DRAFT))
