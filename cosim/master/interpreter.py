@@ -268,7 +268,7 @@ class Interpreter:
     def move(self, index: int, parts: int, part: int) -> None:
         """Let an input take its mean over a part of the step."""
         mean, derivatives = self.plan.means[index], self.derivatives
-        begin = float(self.history[index, 0]) * mean.gain + mean.offset
+        begin = float(self.history[0, index]) * mean.gain + mean.offset
         slope, curve = float(derivatives.slope[index]), float(derivatives.curve[index])
         self.values[mean.target] = mean_of_part(begin, slope, curve, self.step, parts, part)
 

@@ -301,7 +301,7 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
 static void move(Run *run, int64_t index, int64_t code) {
   const Mean *m = run->means + index;
   const double width = run->step / (double)(code / PARTS), middle = ((double)(code % PARTS) + 0.5) * width;
-  const double begin = run->history[4 * index] * m->gain + m->offset;
+  const double begin = run->history[index] * m->gain + m->offset;
   run->values[m->target] =
       begin + middle * run->slope[index] + (0.5 * middle * middle + width * width / 24.0) * run->curve[index];
 }

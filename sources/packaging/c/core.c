@@ -125,6 +125,10 @@ static void evaluate_outputs(Memory *m) {
 }
 
 #if INTERMEDIATE
+static inline Instance *owner(const Memory *memory) {
+  return (Instance *)((char *)memory - offsetof(Instance, m));
+}
+
 /* Intermediate update: the importer sets the inputs of time t. Of an importer that declares none of them it
    is asked at the end of a stretch only. */
 static void ask(Instance *c, double t, bool finished) {
@@ -141,7 +145,7 @@ static void ask(Instance *c, double t, bool finished) {
 /* Inputs at time t: held, or u + u' dt + u'' dt^2/2 from the present time on. */
 static const double *inputs_at(const Memory *m, double t, double *u) {
 #if INTERMEDIATE
-  ask((Instance *)m, t, false); /* it begins with its Memory */
+  ask(owner(m), t, false);
 #endif
   if (!m->moving) return m->v + IU;
   const double dt = t - m->v[0], half = 0.5 * dt * dt;
@@ -163,7 +167,7 @@ static void first_derivatives(const Memory *m, double t, const double *x, double
 /* Go to time t with the inputs, not with the states. */
 static void move_on(Memory *m, double t) {
 #if INTERMEDIATE
-  ask((Instance *)m, t, true);
+  ask(owner(m), t, true);
 #endif
   if (m->moving) {
     const double dt = t - m->v[0], half = 0.5 * dt * dt;

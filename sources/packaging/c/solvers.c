@@ -22,7 +22,7 @@ static void rodas3(Memory *m, double t, double h, double *x, double *e) {
   const double ih = 1.0 / h;
   f_jacobian(&t, x, m->v + IZ, inputs_at(m, t, u), m->v + IP, m->k, f, j, ft);
 #if INTERMEDIATE
-  if (((Instance *)m)->required) { /* what the inputs add to df/dt, by the parabola through three of their values */
+  if (owner(m)->required) { /* what the inputs add to df/dt, by the parabola through three of their values */
     double now[NU + 1], half[NU + 1];
     memcpy(now, m->v + IU, NU * sizeof *now);
     memcpy(half, inputs_at(m, t + 0.5 * h, u), NU * sizeof *half);
