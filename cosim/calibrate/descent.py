@@ -75,7 +75,7 @@ class Descent:
         self.loss: Loss = Squares()
         self.uneven = False
         self.promised = math.inf
-        self.unkept = 0.0
+        self.unkept, self.valley = 0.0, False
         self.damping = FIRM
         self.begun = simulator.evaluations if begun is None else begun
         self.drawn = drawn(problem)
@@ -158,10 +158,10 @@ class Descent:
         """Go there if it is better, or to where further steps with the same derivatives lead.
 
         A step along a curved valley ends on its slope, which costs more than was gained; the
-        derivatives across it are good enough to come back down.
+        derivatives across it are good enough to come back down. Elsewhere no step is made good.
         """
         p, promised, before = self.problem, self.promised, math.inf
-        for _ in range(1 if p.unstable else 1 + RESTORED):
+        for _ in range(1 + RESTORED if self.valley else 1):
             try:
                 residuals = self.simulator.residuals(theta, self.purpose)
             except FmuCallError:
@@ -307,7 +307,7 @@ class Descent:
             if before - self.cost < self.enough(ROUGHLY if draft else EVEN):
                 if draft or self.cost < before or size <= SHORTEST or self.problem.unstable:
                     break
-                size, left = SHRUNK * size, VALLEY
+                size, left, self.valley = SHRUNK * size, VALLEY, True
             elif not left:
                 break
         return normal

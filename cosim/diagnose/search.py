@@ -226,7 +226,8 @@ class Search(LateFitter):
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
             self.evaluations += bench.evaluations
-        signatures = merge(sorted(signatures, key=lambda s: s.tuned))
+        # of laws that are one to first order the one with fewer parameters of its own stands first
+        signatures = merge(sorted(signatures, key=lambda s: (s.tuned, len(s.probe.others))))
         corrected = holm([s.score.p_value for s in signatures], len(signatures) + len(aside))
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         named |= {label: named[s.candidate.label] for s in signatures for label in s.same}

@@ -178,8 +178,8 @@ def _fitted(
             if one is not None:
                 now.append(one)
         now.sort(key=lambda d: -_total(search, declared, d.fitted))
-        least = (1.0 - ALIKE) * _total(search, declared, now[0].fitted)
-        near = [d for d in now if _total(search, declared, d.fitted) > least]
+        most = _total(search, declared, now[0].fitted)  # below 0 if all explain nothing
+        near = [d for d in now if _total(search, declared, d.fitted) >= most - ALIKE * abs(most)]
         simplest = min(near, key=lambda d: len(d.whole.parameters))
         for one in now:  # how sharply a law sticks may be what another has parameters for
             better = one in (now[0], simplest)

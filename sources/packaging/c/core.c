@@ -118,9 +118,12 @@ static int only_in(Instance *c, unsigned modes, const char *call) {
 /* What is stale: everything, everything but what costs nothing, only the energies that nobody is coupled by. */
 enum { FRESH, ALL, QUICK_DONE, COUPLED_DONE };
 
+/* Where derivatives go: without states to no place that arguments share. */
+#define RATES(v, none) (NX ? (v) + IXD : (none))
+
 static void evaluate_outputs(Memory *m) {
-  double *v = m->v;
-  f_outputs(v, v + IX, v + IZ, v + IU, v + IP, m->k, v + IXD, v + IY);
+  double *v = m->v, none[1];
+  f_outputs(v, v + IX, v + IZ, v + IU, v + IP, m->k, RATES(v, none), v + IY);
   m->stale = FRESH;
 }
 
@@ -187,8 +190,8 @@ static void refresh(Instance *c) {
    coupled without the energies. */
 static void refresh_for(Instance *c, uint32_t k) {
   Memory *m = &c->m;
-  double *v = m->v;
-  (void)v;
+  double *v = m->v, none[1];
+  (void)v, (void)none;
 #if NQ
   if (k >= IY && QUICK[k - IY]) {
     if (m->stale != ALL) return;
@@ -200,7 +203,7 @@ static void refresh_for(Instance *c, uint32_t k) {
 #if COUPLED
   if (k >= IY && ASKED[k - IY]) {
     if (m->stale == COUPLED_DONE) return;
-    f_coupled(v, v + IX, v + IZ, v + IU, v + IP, m->k, v + IXD, v + IY);
+    f_coupled(v, v + IX, v + IZ, v + IU, v + IP, m->k, RATES(v, none), v + IY);
     m->stale = COUPLED_DONE;
     return;
   }
