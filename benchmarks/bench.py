@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+INSIDE = 0.15
+"""Share of a parameter's range, on both sides, from which no truth is drawn."""
 
 
 @dataclass(frozen=True)
@@ -43,3 +51,43 @@ class Bench:
         """The individual with each of its laws alone, itself if it has none."""
         laws = self.laws or (Law("none", 0.0),)
         return [Bench(self.parameters, law.name, law.size, law.shape) for law in laws]
+
+
+def parameters(
+    random: np.random.Generator, declared: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Values of an individual within the bounds of its sheet."""
+    values = {}
+    for name, (low, high) in declared.items():
+        margin = INSIDE * (high - low)
+        values[name] = float(random.uniform(low + margin, high - margin))
+    return values
+
+
+def drawn_form(random: np.random.Generator, bounds: tuple[float, float], *, wide: bool) -> float:
+    """Shape of a law: a direction anyway, log-uniform if `wide`; 0, the usual one, else."""
+    low, high = bounds
+    if low < 0.0:
+        return float(random.uniform(low, high))
+    if high and wide:
+        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+    return 0.0
+
+
+def camera(poses: Vector, skew: Vector, late: Vector, sample: float) -> Vector:
+    """Poses at the times that a camera's clock shows, in between linearly.
+
+    Args:
+        poses: (times, 3, individuals).
+        skew, late: of the clock of each individual, [1] and [s].
+        sample: interval of the poses [s].
+    """
+    if not np.any(skew) and not np.any(late):
+        return poses
+    times = np.arange(poses.shape[0]) * sample
+    seen = np.empty_like(poses)
+    for column in range(poses.shape[2]):
+        when = times * (1.0 + skew[column]) - late[column]
+        for k in range(3):
+            seen[:, k, column] = np.interp(when, times, poses[:, k, column])
+    return seen

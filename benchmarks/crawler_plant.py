@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench
+from benchmarks.bench import Bench, camera, drawn_form, parameters
 
 Vector = NDArray[np.float64]
 STEP = 5e-5
@@ -81,16 +81,8 @@ def draw(
     random: np.random.Generator, effect: str = "none", factor: float = 1.0, *, wide: bool = False
 ) -> Bench:
     """A robot with parameters within the sheet's bounds; directions are drawn anyway."""
-    values = {}
-    for name, (low, high) in DECLARED.items():
-        margin = 0.15 * (high - low)
-        values[name] = float(random.uniform(low + margin, high - margin))
-    low, high = SHAPES.get(effect, (0.0, 0.0))
-    shape = 0.0
-    if low < 0.0:
-        shape = float(random.uniform(low, high))
-    elif high and wide:
-        shape = float(np.exp(random.uniform(np.log(low), np.log(high))))
+    values = parameters(random, DECLARED)
+    shape = drawn_form(random, SHAPES.get(effect, (0.0, 0.0)), wide=wide)
     return Bench(values, effect, factor * EFFECTS[effect][0], shape)
 
 
@@ -238,7 +230,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         x, y, yaw = x + STEP * o_x, y + STEP * o_y, yaw + STEP * rate
         angle_l, angle_r = angle_l + STEP * w_l, angle_r + STEP * w_r
     poses = np.array(kept)  # (times, 3, runs x benches)
-    seen = _camera(poses, of("camera_skew"), late("camera_late"))
+    seen = camera(poses, of("camera_skew"), late("camera_late"), SAMPLE)
     found = {}
     scale = 1.0 + of("camera_scale")
     for k, (m_x, m_y) in enumerate(MARKERS):
@@ -253,19 +245,6 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         found[name] = np.repeat(np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE,
                                 count, axis=1)  # fmt: skip
     return found
-
-
-def _camera(poses: Vector, skew: Vector, late: Vector) -> Vector:
-    """Poses at the times that the camera's clock shows, in between linearly."""
-    times = np.arange(poses.shape[0]) * SAMPLE
-    if not np.any(skew) and not np.any(late):
-        return poses
-    seen = np.empty_like(poses)
-    for column in range(poses.shape[2]):
-        when = times * (1.0 + skew[column]) - late[column]
-        for k in range(3):
-            seen[:, k, column] = np.interp(when, times, poses[:, k, column])
-    return seen
 
 
 def _starts(seed: int) -> Vector:

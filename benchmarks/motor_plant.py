@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench
+from benchmarks.bench import Bench, parameters
 
 Vector = NDArray[np.float64]
 TICK = 5e-5
@@ -75,10 +75,7 @@ def draw(
         factor: on its size.
         wide: its shape is log-uniform over its range, not the usual one.
     """
-    values = {}
-    for name, (low, high) in DECLARED.items():
-        margin = 0.15 * (high - low)
-        values[name] = float(random.uniform(low + margin, high - margin))
+    values = parameters(random, DECLARED)
     shape = 0.0
     if wide and effect in SHAPES:
         shape = float(np.exp(random.uniform(*np.log(SHAPES[effect]))))

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench
+from benchmarks.bench import Bench, camera, drawn_form, parameters
 
 Vector = NDArray[np.float64]
 STEP, TICKS, SAMPLE = 5e-5, 20, 0.01  # mechanics; steps per control period; of the log [s]
@@ -101,16 +101,8 @@ def draw(
     random: np.random.Generator, effect: str = "none", factor: float = 1.0, *, wide: bool = False
 ) -> Bench:
     """A base with parameters within the sheet's bounds; directions are drawn anyway."""
-    values = {}
-    for name, (low, high) in DECLARED.items():
-        margin = 0.15 * (high - low)
-        values[name] = float(random.uniform(low + margin, high - margin))
-    low, high = SHAPES.get(effect, (0.0, 0.0))
-    shape = 0.0
-    if low < 0.0:
-        shape = float(random.uniform(low, high))
-    elif high and wide:
-        shape = float(np.exp(random.uniform(np.log(low), np.log(high))))
+    values = parameters(random, DECLARED)
+    shape = drawn_form(random, SHAPES.get(effect, (0.0, 0.0)), wide=wide)
     return Bench(values, effect, factor * EFFECTS[effect][0], shape)
 
 
@@ -331,7 +323,7 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         x, y = x + STEP * (v_x * cos - v_y * sin), y + STEP * (v_x * sin + v_y * cos)
         phi, b, wheel_angle = phi + STEP * w, b + STEP * b_rate, wheel_angle + STEP * p_rate
     table = np.array(kept)
-    seen = _camera(table[:, :3], of("camera_skew"), late("camera_late"))
+    seen = camera(table[:, :3], of("camera_skew"), late("camera_late"), SAMPLE)
     off, where = of("marker_offset"), form("marker_offset")
     scale = 1 + of("camera_scale")
     found = {
@@ -342,19 +334,6 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
     kinds = "steer_angle", "wheel_angle", "drive_current", "steer_current"
     names = [f"{kind}_{k}" for kind in kinds for k in (1, 2, 3)]
     return found | {name: table[:, 3 + k] for k, name in enumerate(names)}
-
-
-def _camera(poses: Vector, skew: Vector, late: Vector) -> Vector:
-    """Poses at the times that the camera's clock shows, in between linearly."""
-    if not np.any(skew) and not np.any(late):
-        return poses
-    times = np.arange(poses.shape[0]) * SAMPLE
-    seen = np.empty_like(poses)
-    for column in range(poses.shape[2]):
-        when = times * (1.0 + skew[column]) - late[column]
-        for k in range(3):
-            seen[:, k, column] = np.interp(when, times, poses[:, k, column])
-    return seen
 
 
 def counted(angle: Vector, count: float) -> Vector:

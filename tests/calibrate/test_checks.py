@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -248,6 +249,25 @@ def test_spikes_of_one_column_are_faults_of_the_log(noisy) -> None:
     assert [f.run for f in found] == ["sines", "stairs", "check"]
     assert "has 3 single samples that stand out, the first at 0.3 s" in found[0].text
     assert "the largest 1e+09 A at 1.5 s" in found[0].text
+
+
+def test_a_spike_that_hardly_adds_to_the_noise_stops_nothing(noisy) -> None:
+    """The impact of a play may hide in all columns but one."""
+
+    def impact(size: float) -> Callable[[np.ndarray], np.ndarray]:
+        def moved(x: np.ndarray) -> np.ndarray:
+            result = x.copy()
+            result[700] += size
+            return result
+
+        return moved
+
+    problem = noisy(0)
+    sigma = next(c.sigma for c in problem.channels if c.name == "current")
+    # 12 and 60 deviations on some 2000 samples: 0.07 and 1.8 of the noise's mean square
+    for size, severity in ((12.0 * sigma, "warning"), (60.0 * sigma, "error")):
+        found = of_kind(changed(problem, "current", impact(size)), "spikes")
+        assert {f.severity for f in found} == {severity}
 
 
 def test_a_jolt_moves_something(noisy) -> None:
