@@ -4,8 +4,12 @@ A late clock stamps t what was there at t - late. For a channel the comparison i
 the simulated signal at t - late. A column that drives an input is read at t + late, so a late
 sensor that drives the model needs no future of the model. Both may be negative.
 
+A channel's clock that runs slow becomes later all the time: `clock:drift:NAME` is how much, per
+time since the first sample. Of two clocks that drift apart one is taken to be right, that of what
+drives the model; where it is the other, the drift has the other sign.
+
 The same quantity has two roles: declared, it is a parameter of the mapping; undeclared, it is the
-effect `delay` at a column of the log (`Shift`).
+effect `delay`, or `clock_skew`, at a column of the log (`Shift`).
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..errors import UnknownNameError, listing
 from ..spec.hints import SearchHints
-from .parts import CLOCK, Channel, Parameter
+from .parts import CLOCK, DRIFT, Channel, Parameter
 
 if TYPE_CHECKING:
     from .estimate import Estimate
@@ -43,13 +47,15 @@ class Shift:
         channels: that read what was there so much earlier.
         inputs: driven inputs that follow their columns so much later; negative where the columns
             themselves are late.
+        grows: whether the clock of the channels drifts instead: it is right when a run begins.
     """
 
     channels: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
+    grows: bool = False
 
     def added_to(self, problem: Problem, prefix: str) -> Problem:
-        """The problem with the delay as a parameter, 0 at its nominal value.
+        """The problem with the delay, or drift, as a parameter, 0 at its nominal value.
 
         Args:
             problem: with these channels and inputs.
@@ -58,6 +64,8 @@ class Shift:
         reach = min(LONGEST, PART * min(float(run.times[-1]) for run in problem.runs))
         count = max(1, math.ceil(math.log(reach / SHORTEST) / math.log(APART)))
         sizes = [SHORTEST * (reach / SHORTEST) ** (k / count) for k in range(count + 1)]
+        if self.grows:
+            return self._drifting(problem, prefix, sizes)
         targets = [(CLOCK + name, 1.0) for name in self.channels]
         targets += [(CLOCK + name, -1.0) for name in self.inputs]
         # held commands act at ticks of a rig that has them
@@ -69,15 +77,34 @@ class Shift:
         )  # fmt: skip
         return problem.with_parameters([*problem.parameters, delay])
 
+    def _drifting(self, problem: Problem, prefix: str, sizes: list[float]) -> Problem:
+        """The problem with a clock that has become as late as `sizes` when the longest run ends."""
+        longest = max(float(run.times[-1] - run.times[0]) for run in problem.runs)
+        rates = [size / longest for size in sizes]
+        skew = Parameter(
+            prefix + "skew", "1", 0.0, -rates[-1], rates[-1],
+            tuple((CLOCK + DRIFT + name, 1.0) for name in self.channels), "effect", strength=True,
+            span=5.0 * rates[0], text="time lost per time, 0 = absent",
+            hints=SearchHints(tries=(*(-r for r in rates), *rates)),
+        )  # fmt: skip
+        return problem.with_parameters([*problem.parameters, skew])
+
 
 def check_clock(target: str, channels: Iterable[str], inputs: Iterable[str], where: str) -> None:
-    """Refuse the clock of what is neither a channel nor a driven input.
+    """Refuse the clock of what is neither a channel nor a driven input, drifts of inputs too.
 
     Raises:
         UnknownNameError: with the nearest names.
     """
     name = target.removeprefix(CLOCK)
     known = [*channels, *inputs]
+    if name.startswith(DRIFT):
+        name, known = name.removeprefix(DRIFT), list(channels)
+        if name not in known:
+            raise UnknownNameError(
+                f"{where}: {target!r}: there is no channel {name!r} that is measured; of two "
+                f"clocks that drift apart, state that of the channels; {listing(known, name)}"
+            )
     if name not in known:
         raise UnknownNameError(
             f"{where}: {target!r}: there is no channel {name!r} that is measured, and no input of "
@@ -86,7 +113,7 @@ def check_clock(target: str, channels: Iterable[str], inputs: Iterable[str], whe
 
 
 def clocked(parameters: Iterable[Parameter]) -> set[str]:
-    """Channels and inputs whose clock a parameter sets."""
+    """Channels and inputs whose clock a parameter sets, and `drift:CHANNEL`."""
     return {n.removeprefix(CLOCK) for p in parameters for n, _ in p.targets if n.startswith(CLOCK)}
 
 
@@ -106,7 +133,10 @@ def offsets(estimate: Estimate) -> dict[str, dict[str, Any]]:
 
 
 def bounds(parameters: Iterable[Parameter], run: str) -> dict[str, tuple[float, float]]:
-    """Least and greatest lateness [s] of the clocks of a run, by channel or input."""
+    """Least and greatest lateness [s] of the clocks of a run, by channel or input.
+
+    Drifts are `drift:CHANNEL`, per time.
+    """
     found: dict[str, tuple[float, float]] = {}
     for p in parameters:
         if p.run not in ("", run):
@@ -135,16 +165,18 @@ def masked(
         times: of the samples [s].
         data: one column per channel.
         channels: of the columns.
-        late: bounds of the lateness, by channel or input.
+        late: bounds of the lateness, by channel or input, and of drifts.
         begin: of the simulation [s].
     """
     data = data.copy()
-    names = {channel.name for channel in channels}
+    names = {name for c in channels for name in (c.name, DRIFT + c.name)}
     ahead = max((high for name, (_, high) in late.items() if name not in names), default=0.0)
     data[times + ahead > times[-1]] = np.nan
     for index, channel in enumerate(channels):
-        if channel.name in late:
-            low, high = late[channel.name]
-            out = (times - high < begin) | (times - low > times[-1])
+        if {channel.name, DRIFT + channel.name} & late.keys():
+            low, high = late.get(channel.name, (0.0, 0.0))
+            least, most = late.get(DRIFT + channel.name, (0.0, 0.0))
+            since = times - times[0]
+            out = (times - high - most * since < begin) | (times - low - least * since > times[-1])
             data[out, index] = np.nan
     return data

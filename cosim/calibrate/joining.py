@@ -24,7 +24,16 @@ from .clocks import bounds, check_clock, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
-from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .parts import (
+    CLOCK,
+    COINCIDENT,
+    DRIFT,
+    Channel,
+    Coarse,
+    MeasuredRun,
+    Parameter,
+    check_parameters,
+)
 from .problem import Problem
 from .scales import known, per_second, scaled
 
@@ -323,7 +332,7 @@ class Joined(MappedLogs):
     def _wanted(self, name: str) -> Unit | None:
         """Unit of a target, None where that is unknown."""
         if name.startswith(CLOCK):
-            return parse("s")
+            return parse("1" if name.startswith(CLOCK + DRIFT) else "s")
         try:
             return self.system.variables(name)[1][0].unit
         except UnknownNameError:

@@ -25,9 +25,10 @@ COINCIDENT = 1e-3
 keep times rounded, often to 32 bits)."""
 SHIFTS = 32
 """Shifts whose places are kept; channels have two or three."""
-CLOCK = "clock:"
+CLOCK, DRIFT = "clock:", "drift:"
 """Begins the name of a target that is no variable of the system: `clock:CHANNEL` or `clock:INPUT`,
-how late the clock of a channel, or of the column that drives an input, is [s]."""
+how late the clock of a channel, or of the column that drives an input, is [s]; and what follows
+where it is how much later it becomes in a run, per time: `clock:drift:CHANNEL`."""
 
 
 @dataclass(frozen=True)
@@ -123,22 +124,23 @@ class Channel:
     window: float = 0.0
     shift: float = 0.0
 
-    def of(self, sampler: Sampler, values: Vector, late: float = 0.0) -> Vector:
+    def of(self, sampler: Sampler, values: Vector, late: float = 0.0, drift: float = 0.0) -> Vector:
         """What the channel would read, of a signal that was recorded at the sampler's times.
 
         Args:
             sampler: of the run.
             values: of the signal.
-            late: how late the channel's clock is [s].
+            late: how late the channel's clock is when the run begins [s].
+            drift: how much later it becomes, per time.
         """
         shift = self.shift - late
         if self.transform == "sample":
-            result = sampler.at(shift, values)
+            result = sampler.at(shift, values, drift)
         elif self.transform == "difference":
-            before = sampler.at(shift - self.window, values)
-            result = (sampler.at(shift, values) - before) / self.window
+            before = sampler.at(shift - self.window, values, drift)
+            result = (sampler.at(shift, values, drift) - before) / self.window
         else:
-            times, recorded = sampler.times + shift, sampler.recorded
+            times, recorded = sampler.drifted(shift, drift), sampler.recorded
             steps = np.diff(recorded) * 0.5 * (values[1:] + values[:-1])
             integral = np.concatenate([[0.0], np.cumsum(steps)])
             first = np.maximum(times - self.window, recorded[0])
@@ -160,23 +162,28 @@ class Sampler:
 
     def __init__(self, times: Vector, recorded: Vector) -> None:
         self.times, self.recorded = times, recorded
-        self._places: dict[float, tuple[NDArray[np.intp], Vector | None]] = {}
+        self._places: dict[tuple[float, float], tuple[NDArray[np.intp], Vector | None]] = {}
 
-    def at(self, shift: float, values: Vector) -> Vector:
-        """Values at the sample times plus a shift [s], between recorded ones on straight lines."""
-        place, past = self._places.get(shift) or self._sought(shift)
+    def drifted(self, shift: float, drift: float) -> Vector:
+        """Sample times plus a shift [s], less what a clock has lost since the first of them."""
+        times = self.times + shift
+        return times - drift * (self.times - self.times[0]) if drift else times
+
+    def at(self, shift: float, values: Vector, drift: float = 0.0) -> Vector:
+        """Values at `drifted` sample times, between recorded ones on straight lines."""
+        place, past = self._places.get((shift, drift)) or self._sought(shift, drift)
         if past is None:
             return np.asarray(values[place], dtype=np.float64)
         first = values[place]
         slope = (values[place + 1] - first) / (self.recorded[place + 1] - self.recorded[place])
         return np.asarray(slope * past + first, dtype=np.float64)
 
-    def _sought(self, shift: float) -> tuple[NDArray[np.intp], Vector | None]:
+    def _sought(self, shift: float, drift: float) -> tuple[NDArray[np.intp], Vector | None]:
         """Recorded times at or before the sample times, and how far behind these are.
 
         Where all coincide, None is behind.
         """
-        times, recorded = self.times + shift, self.recorded
+        times, recorded = self.drifted(shift, drift), self.recorded
         last = recorded.size - 1
         interval = recorded[1] - recorded[0] if last else 1.0
         found: tuple[NDArray[np.intp], Vector | None]
@@ -189,7 +196,7 @@ class Sampler:
             found = before, held - recorded[before]
         if len(self._places) >= SHIFTS:  # a clock that is being estimated has ever new ones
             self._places.clear()
-        self._places[shift] = found
+        self._places[shift, drift] = found
         return found
 
 
@@ -289,7 +296,7 @@ class Assigned(NamedTuple):
     Attributes:
         run: which.
         known: full variable name -> value that no parameter changes.
-        late: the same of clocks, by channel or input.
+        late: the same of clocks, by channel or input, or `drift:CHANNEL`.
         variables, clocks: what parameters set.
         size: how many parameters there are.
     """

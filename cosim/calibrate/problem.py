@@ -250,7 +250,10 @@ class Problem:
         return {**assigned.known, **assigned.of(theta, assigned.variables)}
 
     def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
-        """How late the clocks of channels are in a run [s], where that is estimated or held."""
+        """How late the clocks of channels are in a run [s], where that is estimated or held.
+
+        What `drift:CHANNEL` is late comes on top, per time since the run's first sample.
+        """
         run = self.run(run) if isinstance(run, str) else run
         assigned = self._assigned(run)
         return {**assigned.late, **assigned.of(theta, assigned.clocks)}

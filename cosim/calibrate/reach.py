@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .parts import COINCIDENT, Channel, MeasuredRun
+from .parts import COINCIDENT, DRIFT, Channel, MeasuredRun
 
 Vector = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ def known(
     Args:
         run: measured.
         channels: of its columns.
-        late: how late clocks are [s], by channel or input.
+        late: how late clocks are [s], by channel or input, and `drift:CHANNEL`.
         read: one column per channel.
     """
     times, read = run.times, read.copy()
@@ -29,6 +29,7 @@ def known(
     end = float(times[-1]) - max([0.0, *(late.get(name, 0.0) for name in run.inputs)]) + close
     for index, channel in enumerate(channels):
         wanted = times - late.get(channel.name, 0.0)
+        wanted = wanted - late.get(DRIFT + channel.name, 0.0) * (times - times[0])
         out = (wanted < begin) | (wanted > end)
         read[out & np.isfinite(run.data[:, index]), index] = np.nan
     return read

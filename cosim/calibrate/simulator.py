@@ -21,7 +21,7 @@ from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
-from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
+from .parts import CLOCK, COINCIDENT, DRIFT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
 from .reach import apart, known
@@ -161,7 +161,12 @@ class Simulator:
         sampler = self._sampler(run, ran.times)
         read = np.column_stack(
             [
-                c.of(sampler, ran.rows[:, place[c.signal]], late.get(c.name, 0.0))
+                c.of(
+                    sampler,
+                    ran.rows[:, place[c.signal]],
+                    late.get(c.name, 0.0),
+                    late.get(DRIFT + c.name, 0.0),
+                )
                 for c in problem.channels
             ]
         )

@@ -1,6 +1,7 @@
 """What could be missing: every effect of the catalogue that fits a balance of the system.
 
-Besides, fidelities of which a declared one is a limit, and delays of the log's columns.
+Besides, fidelities of which a declared one is a limit, and clocks of the log's columns that are
+late or drift.
 """
 
 from __future__ import annotations
@@ -11,15 +12,16 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from ..calibrate.clocks import Shift, clocked
-from ..calibrate.parts import Parameter
+from ..calibrate.parts import DRIFT, Parameter
 from ..calibrate.problem import Problem
 from ..calibrate.refinement import Refinement
 from ..system.variants import component
 
-LOG, DELAY = "log", "delay"
+LOG, DELAY, SKEW = "log", "delay", "clock_skew"
 """Where columns of the log are late, and what that is called: as the effect in the system."""
 SHOWS = "Late sensor or clock of what was logged."
 FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
+DRIFTS = "Clock that runs slow against that of the inputs; negative: fast."
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -56,7 +58,8 @@ class Candidate:
         port: balance of the instance, or group of balances, at which it acts.
         text: one line about the effect.
         refinement: the fidelity that it stands for, None for an effect.
-        shift: the delay of columns of the log that it stands for, None for what is in the system.
+        shift: the delay, or drift of a clock, of columns of the log that it stands for, None for
+            what is in the system.
         contains: effects that its law becomes for some values of its parameters.
     """
 
@@ -86,7 +89,7 @@ class Candidate:
 
     @property
     def change(self) -> dict[str, str]:
-        """As of `cosim run --set`; nothing for a delay of the log's columns."""
+        """As of `cosim run --set`; nothing for clocks of the log's columns."""
         if self.shift is not None:
             return {}
         if self.refinement is not None:
@@ -120,7 +123,7 @@ def candidates(problem: Problem) -> list[Candidate]:
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
-    return found + delays(problem)
+    return found + delays(problem) + drifts(problem)
 
 
 def delays(problem: Problem) -> list[Candidate]:
@@ -157,6 +160,25 @@ def delays(problem: Problem) -> list[Candidate]:
             FOLLOWS if shift.inputs or place.endswith(".inputs") else SHOWS, shift=shift,
         )
         for place, shift in (single | groups).items()
+    ]  # fmt: skip
+
+
+def drifts(problem: Problem) -> list[Candidate]:
+    """Clocks of columns of the log that drift: of all that one instance gives.
+
+    They are taken to come from one recorder. What a mapping declares is not asked again.
+    """
+    declared = clocked(problem.parameters)
+    gives: dict[str, list[str]] = {}
+    for channel in problem.channels:
+        if DRIFT + channel.name not in declared:
+            gives.setdefault(channel.signal.partition(".")[0], []).append(channel.name)
+    return [
+        Candidate(
+            LOG, LOG, SKEW, f"{giver}.outputs" if few[1:] else few[0], DRIFTS,
+            shift=Shift(channels=tuple(few), grows=True),
+        )
+        for giver, few in gives.items()
     ]  # fmt: skip
 
 

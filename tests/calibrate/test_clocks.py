@@ -91,6 +91,14 @@ def test_values_that_a_clock_may_move_out_of_the_run_do_not_count(folder: Path) 
     assert np.isfinite(problem(folder, "").runs[0].data).all()
 
 
+def test_values_that_a_drift_may_move_out_of_the_run_do_not_count(folder: Path) -> None:
+    drift = CLOCK.replace("clock:", "clock:drift:").replace('unit = "s"', 'unit = "1"')
+    run = problem(folder, drift.replace("-0.5", "-0.1").replace("0.5", "0.02")).runs[0]
+    end = run.times[-1]
+    out = run.times + 0.1 * (run.times - run.times[0]) > end
+    assert np.array_equal(np.isnan(run.data).all(axis=1), out) and out.any()
+
+
 def test_a_held_clock_stays(folder: Path) -> None:
     it = problem(folder)
     theta = it.nominal
@@ -112,6 +120,13 @@ def test_clocks_have_units_and_names(folder: Path) -> None:
         match=r"no channel 'yow' that is measured, and no input .*; did you mean 'yaw'",
     ):
         problem(folder, CLOCK.replace("clock:yaw", "clock:yow"))
+    with pytest.raises(
+        UnknownNameError,
+        match=r"two clocks that drift apart, state that of the channels; there is x, y, yaw",
+    ):
+        problem(folder, CLOCK.replace("clock:yaw", "clock:drift:base.w_l"))
+    with pytest.raises(UnitError, match=r"nuisance clock: clock:drift:x"):
+        problem(folder, CLOCK.replace("clock:x", "clock:drift:x"))
     with pytest.raises(UnitError, match=r"nuisance clock: clock:x"):
         problem(folder, CLOCK.replace('unit = "s"', 'unit = "m"'))
     with pytest.raises(ValueRangeError, match="parameter clock"):

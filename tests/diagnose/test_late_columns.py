@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from cosim.calibrate.clocks import Shift
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.candidates import Candidate, delays
+from cosim.diagnose.candidates import Candidate, delays, drifts
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
 from cosim.intake.example import RADIUS, drive, write_csv
@@ -42,11 +43,14 @@ targets = "base.r"
 """
 
 
-def written(folder: Path, late: float, mapping: str = MAPPING) -> Problem:
-    """Runs of a robot by exact arcs, whose camera's clock is late; no FMU is in them."""
+def written(folder: Path, late: float, mapping: str = MAPPING, *, slow: float = 0.0) -> Problem:
+    """Runs of a robot by exact arcs, whose camera's clock is late, or slow; no FMU is in them."""
     runs = ""
     for seed, name in enumerate(NAMES):
-        write_csv(drive(40 + seed, late=late), name, folder)
+        run = drive(40 + seed, late=late)
+        begin = run.stamped[0]
+        stamped = begin + (run.stamped - begin) / (1.0 - slow)
+        write_csv(replace(run, stamped=stamped), name, folder)
         runs += (
             f'[[run]]\nname = "{name}"\npurpose = "{"validation" if seed > 1 else "identification"}'
             f'"\nfiles = {{ cmd = "{name}_cmd.csv", pose = "{name}_pose.csv" }}\n'
@@ -57,7 +61,7 @@ def written(folder: Path, late: float, mapping: str = MAPPING) -> Problem:
 
 
 def found(problem: Problem) -> tuple[Fitted, Fitted | None]:
-    search = Search(simulator(problem, 1), only=delays(problem))
+    search = Search(simulator(problem, 1), only=[*delays(problem), *drifts(problem)])
     base = search.calibrated()
     winner = search.round(base).winner
     search.close()
@@ -80,6 +84,32 @@ def test_a_late_camera_and_late_wheels_are_named_with_their_delay(
     assert winner.estimate.values[name] == pytest.approx(late, abs=2e-3)
     assert 2.0 * base.estimate.robust > 4.0 * base.estimate.count
     assert 2.0 * winner.estimate.robust < 1.2 * winner.estimate.count
+
+
+@pytest.mark.parametrize("slow", [0.01, -0.006])
+def test_a_clock_that_drifts_is_named_with_its_rate(tmp_path: Path, slow: float) -> None:
+    """A clock that is too fast would need the model's future; so the comparison is shifted."""
+    base, winner = found(written(tmp_path, 0.0, slow=slow))
+    assert winner is not None
+    effect = winner.effects[-1]
+    assert effect.label == "clock_skew at log.base.outputs" and effect.change == {}
+    name = f"{effect.prefix}skew"
+    place = winner.problem.index(name)
+    assert winner.estimate.low[place] < slow < winner.estimate.high[place]
+    # what is late by 2 ms at the end of a run of 12 s, a twentieth of the camera's interval
+    assert winner.estimate.values[name] == pytest.approx(slow, abs=2e-3 / 12.0)
+    assert 2.0 * base.estimate.robust > 1.5 * base.estimate.count
+    assert 2.0 * winner.estimate.robust < 1.2 * winner.estimate.count
+
+
+def test_a_declared_drift_is_not_named_again(tmp_path: Path) -> None:
+    declared = CLOCK.replace("clock:", "clock:drift:").replace('unit = "s"', 'unit = "1"')
+    declared = declared.replace("0.5", "0.05")
+    problem = written(tmp_path, 0.0, MAPPING + declared, slow=0.01)
+    assert not drifts(problem)
+    base, winner = found(problem)
+    assert winner is None
+    assert base.estimate.values["clock"] == pytest.approx(0.01, abs=2e-3 / 12.0)  # as above
 
 
 def test_clocks_that_agree_are_not_named(tmp_path: Path) -> None:
