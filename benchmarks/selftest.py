@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import crawler_plant, motor_plant, omni_plant
+from benchmarks import arm_plant, crawler_plant, motor_plant, omni_plant
 from benchmarks.bench import Bench, Law
 from benchmarks.own_plant import Made, catalogue, example, made
 from cosim.calibrate.differences import jacobian
@@ -50,7 +50,7 @@ from cosim.files import atomic
 Vector = NDArray[np.float64]
 Change = dict[str, dict[str, Vector]]
 PLANTS: dict[str, Any] = {
-    "motor": motor_plant, "crawler": crawler_plant, "omni": omni_plant
+    "motor": motor_plant, "crawler": crawler_plant, "omni": omni_plant, "arm": arm_plant
 }  # fmt: skip
 """Rigs that are played by code of their own, written from their sheets."""
 SHEET, SECONDS = motor_plant.SHEET, motor_plant.SECONDS

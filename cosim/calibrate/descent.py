@@ -130,16 +130,21 @@ class Descent:
     def attempt(self, theta: Vector) -> bool:
         """Go there, inside the bounds, if it is better."""
         theta = np.clip(theta, self.problem.lower, self.problem.upper)  # sums round past them
-        if np.array_equal(theta, self.theta):
-            return False
+        return not np.array_equal(theta, self.theta) and self._went(theta, self._seen(theta))
+
+    def _seen(self, theta: Vector) -> tuple[list[tuple[str, Vector]], float] | None:
+        """Residuals and cost at a point, None if it cannot be simulated."""
         try:
             residuals = self.simulator.residuals(theta, self.purpose)
         except FmuCallError:
+            return None
+        return residuals, self.total(theta, residuals)
+
+    def _went(self, theta: Vector, seen: tuple[list[tuple[str, Vector]], float] | None) -> bool:
+        """Go to a point that has been seen, if it is better."""
+        if seen is None or not seen[1] < self.cost:
             return False
-        cost = self.total(theta, residuals)
-        if not cost < self.cost:
-            return False
-        self.theta, self.residuals, self.cost = theta, residuals, cost
+        self.theta, (self.residuals, self.cost) = theta, seen
         return True
 
     def meet(self, theta: Vector, residuals: list[tuple[str, Vector]], cost: float) -> None:
@@ -162,17 +167,12 @@ class Descent:
         """
         p, promised, before = self.problem, self.promised, math.inf
         for _ in range(1 + RESTORED if self.valley else 1):
-            try:
-                residuals = self.simulator.residuals(theta, self.purpose)
-            except FmuCallError:
-                break
-            cost = self.total(theta, residuals)
-            if cost < self.cost:
-                self.theta, self.residuals, self.cost = theta, residuals, cost
+            seen = self._seen(theta)
+            if self._went(theta, seen):
                 return True
-            if not cost < before:
+            if seen is None or not seen[1] < before:
                 break
-            before = cost
+            residuals, before = seen
             slope = gradient(p, theta, self.jacobian, residuals, self.loss)
             theta = self.step(normal, damping, theta, slope)
         self.promised = promised
