@@ -157,6 +157,15 @@ class Builder:
         """What builds, with CasADi, which FMUs that are there do not need."""
         return sources("packaging.build")
 
+    def loaded(self) -> Builder:
+        """Itself, that can build.
+
+        Raises:
+            UnbuiltError: it cannot: CasADi is not installed.
+        """
+        sources("packaging.build")
+        return self
+
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU, built if it is not there."""
         with naming_errors():
@@ -249,7 +258,7 @@ class Installed:
             UnbuiltError: the sources cannot build here.
         """
         try:
-            self._builder = self._builder or Builder(told=self._told)
+            self._builder = (self._builder or Builder(told=self._told)).loaded()
         except UnbuiltError as error:
             self.library.check(variant)
             short = variant if len(variant) <= SHOWN else f"{variant[:SHOWN]}…"
@@ -265,7 +274,7 @@ class Installed:
         beside = _beside_device(variant)
         if beside is not None:
             try:
-                self._builder = self._builder or Builder(told=self._told)
+                self._builder = (self._builder or Builder(told=self._told)).loaded()
             except UnbuiltError:
                 return FolderProvider(beside).path(variant)
             return self._builder.path(variant)  # the device file may have changed
