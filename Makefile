@@ -6,6 +6,10 @@ STAMP := $(VENV)/.installed
 RUNS := $(VENV)/.runs
 WORKERS ?= 2
 
+# Some containers forbid byte code, which git ignores here. Each command would compile cosim anew, and
+# tests start hundreds.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test quick check fmus docs site fuzz bench wheel clean
 
 demo: $(RUNS)

@@ -170,8 +170,7 @@ class _Slave(ct.Structure):
 
 
 def _compile(folder: Path, fmi: int) -> Any:
-    from sources.packaging.build import host_platform
-    from sources.packaging.native import PLATFORMS
+    from sources.packaging.platforms import PLATFORMS, host_platform
 
     source, library = folder / "floor.c", folder / "floor.so"
     source.write_text(FLOOR, encoding="utf-8")

@@ -18,8 +18,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from sources.packaging.build import build, host_platform
-from sources.packaging.native import PLATFORMS
+from sources.packaging.build import build
+from sources.packaging.platforms import PLATFORMS, host_platform
 from tests.fmus import Slave, _unpacked
 
 CASES = {

@@ -34,8 +34,8 @@ from benchmarks.chain import DRIVES, EVERY, RECORD, STEP, build_chain
 from cosim import Master, ssp
 from cosim.master.kernel import SOURCES, cache_folder, library_name
 from cosim.master.session import Session
-from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
+from sources.packaging.platforms import host_platform
 
 FMUS = 3 * DRIVES
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -109,6 +109,11 @@ def commands(random: np.random.Generator, seconds: float) -> dict[str, tuple[str
     }
 
 
+def clip(values: Vector, low: Vector | float, high: Vector | float) -> Vector:
+    """As of numpy, which looks at its arguments for longer than a few benches take."""
+    return cast(Vector, np.minimum(np.maximum(values, low), high))
+
+
 def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[str, Vector]:
     """Speed, current, voltage and angle at 1 kHz, one column per bench, without noise.
 
@@ -156,6 +161,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
     rows: dict[str, list[Vector]] = {k: [] for k in ("speed", "current", "voltage", "angle")}
     last = RATIO * angle
 
+    efficient, gained = RATIO * eta, 1 + gain
     # what no bench has is not computed: it would add zeros
     has = {
         name: bool(np.any(values))
@@ -180,12 +186,12 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
         volts = supply - hot * i - constant * RATIO * w
         if has["drop"]:
             volts = volts - drop * np.tanh(i / 0.2)
-        return np.asarray(volts / L_A)
+        return cast(Vector, volts / L_A)
 
     def speed_rates(
         i: Vector, w: Vector, angle: Vector, w_out: Vector, angle_out: Vector, constant: Vector
     ) -> tuple[Vector, Vector]:
-        torque = RATIO * eta * constant * i
+        torque = efficient * constant * i
         if has["cogging"]:
             torque = torque - RATIO * cogging * np.sin(n_cog * RATIO * angle + 0.7)
         friction = b * w_out
@@ -196,7 +202,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
             friction = friction + (coulomb + load_mu * np.abs(torque)) * sign
             if has["stribeck"]:
                 friction = friction + stribeck * np.exp(-((w_out / w_s) ** 2)) * sign
-        springs = np.zeros(n)
+        springs: Vector | float = 0.0
         if has["unbalance"]:
             springs = unbalance * np.sin(angle_out)
         if has["hose"]:
@@ -205,7 +211,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
         if not has["elastic"]:
             return together, together
         twist = angle - angle_out
-        pressed = twist - np.clip(twist, -gap / 2, gap / 2)
+        pressed = twist - clip(twist, -gap / 2, gap / 2)
         touching = np.abs(twist) >= gap / 2
         through = touching * (stiffness * pressed + D_TWIST * (w - w_out))
         return (
@@ -216,31 +222,37 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
     for tick in range(w_ref.shape[0] * 20):
         if tick % 20 == 0:
             rows["speed"].append((RATIO * angle - last) / 1e-3)
-            rows["current"].append(i * (1 + gain) + offset)
+            rows["current"].append(i * gained + offset)
             rows["voltage"].append(u.copy())
             rows["angle"].append(RATIO * angle)
             last = RATIO * angle
         if tick % 10 == 0:
             command = w_ref[np.maximum(tick // 20 - delay, 0), column]
-            w_set = w_set + np.clip(command - w_set, -acc * 5e-4, acc * 5e-4)
+            w_set = w_set + clip(command - w_set, -acc * 5e-4, acc * 5e-4)
             error = w_set - RATIO * w
             wanted = kp * error + speed_integral
             free = np.abs(wanted) < I_MAX
             speed_integral = speed_integral + np.where(free, ki * error * 5e-4, 0.0)
-            i_set = np.clip(wanted, -I_MAX, I_MAX)
-        error = i_set - (i * (1 + gain) + offset)
+            i_set = clip(wanted, -I_MAX, I_MAX)
+        error = i_set - (i * gained + offset)
         wanted = KP_I * error + current_integral
         free = np.abs(wanted) < U_MAX
         current_integral = current_integral + np.where(free, KI_I * error * TICK, 0.0)
-        u = np.clip(wanted, -U_MAX, U_MAX)
+        u = clip(wanted, -U_MAX, U_MAX)
         # all rates at the tick's start; the current by the midpoint rule, its winding is fast
         constant = torque_constant(i, angle)
         w_rate, out_rate = speed_rates(i, w, angle, w_out, angle_out, constant)
         middle = i + 0.5 * TICK * current_rate(i, w, constant)
         i = i + TICK * current_rate(middle, w, torque_constant(middle, angle))
-        w, w_out = w + TICK * w_rate, w_out + TICK * out_rate
-        angle, angle_out = angle + TICK * w, angle_out + TICK * w_out
-        heat = heat + TICK * (resistance * i**2 - heat) / t_th
+        w = w + TICK * w_rate
+        angle = angle + TICK * w
+        if has["elastic"]:
+            w_out = w_out + TICK * out_rate
+            angle_out = angle_out + TICK * w_out
+        else:  # one shaft
+            w_out, angle_out = w, angle
+        if has["heating"]:
+            heat = heat + TICK * (resistance * i**2 - heat) / t_th
     return {name: np.array(values) for name, values in rows.items()}
 
 

@@ -30,9 +30,12 @@ class Functions:
 
     Args:
         model: a finished one; it does not change any more.
+        often: Jacobian and directional derivatives are asked for often, so that it is worth finding
+            what their parts compute alike, which takes most of the time to make them.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, *, often: bool = True) -> None:
+        self._often = often
         self._roles = {r: model.of_role(r) for r in ("state", "discrete", "input", "parameter")}
         self._clocks, self._outputs, self._t = model.clocks, model.of_role("output"), model.time
         self._x, self._z, self._u, self._p = (_stack(group) for group in self._roles.values())
@@ -97,7 +100,8 @@ class Functions:
     def jacobian(self) -> ca.Function:
         """`-> (xdot, d xdot/dx as nonzeros, d xdot/dt)`."""
         by_time = ca.jacobian(self._xdot, self._t)
-        return self._function("f_jacobian", [self._xdot, _nonzeros(self._jacobian), by_time])
+        parts = [self._xdot, _nonzeros(self._jacobian), by_time]
+        return self._function("f_jacobian", parts, alike=self._often)
 
     @cached_property
     def jacobian_pattern(self) -> tuple[tuple[int, int], ...]:
@@ -112,7 +116,8 @@ class Functions:
         along, all_of = ca.vertcat(*seeds), ca.vertcat(*self._arguments)
         tangent = ca.jtimes(ca.vertcat(self._xdot, self._y), all_of, along)
         split = self._xdot.numel()
-        return self._function("f_directional", [tangent[:split], tangent[split:]], seeds)
+        parts = [tangent[:split], tangent[split:]]
+        return self._function("f_directional", parts, seeds, alike=self._often)
 
     @cached_property
     def updates(self) -> tuple[ca.Function, ...]:
@@ -150,13 +155,12 @@ class Functions:
         return {name: tuple(items) for name, items in found.items()}
 
     def _function(
-        self, name: str, results: list[Any], extra: list[Any] | None = None
+        self, name: str, results: list[Any], extra: list[Any] | None = None, *, alike: bool = True
     ) -> ca.Function:
-        # what parts compute alike is computed once; structural zeros are written too: the C code
-        # and the Python twin index densely
-        return ca.Function(
-            name, self._arguments + (extra or []), ca.cse([ca.densify(r) for r in results])
-        )
+        # structural zeros are written too: the C code and the Python twin index densely
+        dense = [ca.densify(r) for r in results]
+        # what parts compute alike is computed once, with the same numbers
+        return ca.Function(name, self._arguments + (extra or []), ca.cse(dense) if alike else dense)
 
 
 def _stack(variables: list[Declared]) -> Any:
@@ -217,7 +221,7 @@ class Oracle:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.functions = Functions(model)
+        self.functions = Functions(model, often=False)
         self.state_names = [v.name for v in model.of_role("state")]
         self.output_names = [v.name for v in model.of_role("output")]
         self._roles = [model.of_role(role) for role in ("state", "discrete", "input", "parameter")]

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sources.packaging.build import host_platform
-from sources.packaging.native import PLATFORMS, compile_c
+from sources.packaging.native import compile_c
+from sources.packaging.platforms import PLATFORMS, host_platform
 
 SHELL = (Path(__file__).parent / "tiny_fmu.c").read_text(encoding="utf-8")
 INNER = {"Float64": "Real", "Int32": "Integer"}

@@ -55,6 +55,7 @@ def diagnose(
     workers: int | None = None,
     without: Iterable[str] = (),
     law_at: str = "",
+    law: bool = True,
 ) -> Diagnosis:
     """Calibrate, look for what is missing, and judge: all that `cosim diagnose` does on a data set.
 
@@ -67,6 +68,8 @@ def diagnose(
             them: it should end with `unexplained`, or with laws that do the same.
         law_at: make a law from the data there (`load.flange`; `fan.tau` of an FMU without
             sources), and do not ask the catalogue.
+        law: make one from the data where no law of the catalogue fits, too; takes several times as
+            long as to see that none does.
 
     Raises:
         CosimError: the declared system cannot be simulated, no effect of that name fits it, or no
@@ -93,7 +96,7 @@ def diagnose(
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, begun)
-            return _searched(search, base, findings, out, say, begun, asked, adapters)
+            return _searched(search, base, findings, out, say, begun, asked, adapters, law)
     finally:
         search.close()
 
@@ -117,6 +120,7 @@ def _searched(
     begun: float,
     asked: Site | None = None,
     adapters: tuple[Adapter, ...] = (),
+    law: bool = True,
 ) -> Diagnosis:
     problem = search.raw
     result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
@@ -181,7 +185,7 @@ def _searched(
         result.bursts = times(sudden, list(search.fitting.runs))
     _tested(result)
     result.asked = asked is not None
-    if asked or result.verdict == "unexplained":
+    if asked or (law and result.verdict == "unexplained"):
         result.law = unnamed(search, result.after, result.located, asked)
     if result.law is not None:
         result.files += result.law.leave_fmu(out)

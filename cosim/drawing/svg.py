@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from ..files import write_text
 from .drawable import Drawable
@@ -218,7 +218,7 @@ class _Drawing:
             f'<svg xmlns="http://www.w3.org/2000/svg" class="cosim-system" '
             f'viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}">'
         )
-        yield f"<title>{escape(system.name)}</title>"
+        yield f"<title>{escape(system.name, quote=False)}</title>"
         yield f"<style>\n{STYLE}</style>"
         yield f'<rect width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>'
         yield _text("name", BORDER, BORDER + 12.0, system.name)
@@ -322,7 +322,7 @@ class _Drawing:
         (x, y), w, h = self.layout.box(item), item.width, item.height
         yield "<g>"
         if member.description.text:
-            yield f"<title>{escape(member.description.text)}</title>"
+            yield f"<title>{escape(member.description.text, quote=False)}</title>"
         yield f'<rect class="box" x="{x:.1f}" y="{y:.1f}" width="{w:.0f}" height="{h:.0f}" rx="5"/>'
         yield (
             f'<path class="head" d="M{x + 0.6:.1f} {y + HEAD:.1f}v{5.6 - HEAD:.1f}q0 -5 5 -5'
@@ -357,7 +357,7 @@ def _row(number: int) -> float:
 
 def _text(kind: str, x: float, y: float, text: str, anchor: str = "") -> str:
     where = f' text-anchor="{anchor}"' if anchor else ""
-    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}"{where}>{escape(text)}</text>'
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}"{where}>{escape(text, quote=False)}</text>'
 
 
 def _circle(kind: str, x: float, y: float) -> str:
@@ -366,7 +366,7 @@ def _circle(kind: str, x: float, y: float) -> str:
 
 def _path(kind: str, d: str, text: str) -> str:
     head = f'<path class="{f"wire {kind}".strip()}" d="{d}"'
-    return f"{head}><title>{escape(text)}</title></path>" if text else f"{head}/>"
+    return f"{head}><title>{escape(text, quote=False)}</title></path>" if text else f"{head}/>"
 
 
 def _bend(x0: float, y0: float, x: float, y1: float) -> str:

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,9 +38,14 @@ def sources(module: str) -> ModuleType:
     try:
         return importlib.import_module(f"{places.sources_package()}.{module}")
     except ModuleNotFoundError as error:
-        raise UnbuiltError(
-            f"building FMUs needs {error.name}, which is not installed: {way_out('build')}"
-        ) from error
+        raise needed(error.name) from error
+
+
+def needed(package: str | None) -> UnbuiltError:
+    """That a package is missing which builds FMUs."""
+    return UnbuiltError(
+        f"building FMUs needs {package}, which is not installed: {way_out('build')}"
+    )
 
 
 def carried() -> Library | None:
@@ -134,19 +140,37 @@ class Builder:
         self._count = _Count(told)
         from ..master import kernel  # needs numpy, which lists of variants do not
 
-        self._packaging = sources("packaging.build")
+        self._ready = sources("packaging.ready")
+        try:
+            self._ready.sources_key()
+        except PackageNotFoundError as error:
+            raise needed(error.name) from error
         if kernel.find() is None:  # a checkout's first run: compile the executor as an FMU
             sources("packaging.kernel").build_kernel(
                 kernel.SOURCES,
                 kernel.cache_folder() / kernel.library_name(),
-                self._packaging.host_platform(),
+                sources("packaging.platforms").host_platform(),
             )
+
+    @property
+    def _packaging(self) -> ModuleType:
+        """What builds, with CasADi, which FMUs that are there do not need."""
+        return sources("packaging.build")
+
+    def loaded(self) -> Builder:
+        """Itself, that can build.
+
+        Raises:
+            UnbuiltError: it cannot: CasADi is not installed.
+        """
+        sources("packaging.build")
+        return self
 
     def path(self, variant: str) -> Path:
         """Path of the variant's FMU, built if it is not there."""
         with naming_errors():
             folder = _beside_device(variant) or self.out
-            done = self._packaging.ready(variant, out=folder)
+            done = self._ready.ready(variant, out=folder)
             if done is not None:
                 return Path(done)
             self._count.begin(variant)
@@ -182,12 +206,15 @@ class Builder:
     def _missing(self, variants: Iterable[str]) -> list[str]:
         return [
             n for n in dict.fromkeys(variants)
-            if not self._packaging.ready(n, out=_beside_device(n) or self.out)
+            if not self._ready.ready(n, out=_beside_device(n) or self.out)
         ]  # fmt: skip
 
     def _known(self, variants: Iterable[str]) -> list[str]:
+        names = list(variants)
+        if not names:
+            return []
         build_model, found = sources("variant").build_model, []
-        for name in variants:
+        for name in names:
             try:
                 build_model(name)
             except (ValueError, CosimError):
@@ -231,7 +258,7 @@ class Installed:
             UnbuiltError: the sources cannot build here.
         """
         try:
-            self._builder = self._builder or Builder(told=self._told)
+            self._builder = (self._builder or Builder(told=self._told)).loaded()
         except UnbuiltError as error:
             self.library.check(variant)
             short = variant if len(variant) <= SHOWN else f"{variant[:SHOWN]}…"
@@ -247,7 +274,7 @@ class Installed:
         beside = _beside_device(variant)
         if beside is not None:
             try:
-                self._builder = self._builder or Builder(told=self._told)
+                self._builder = (self._builder or Builder(told=self._told)).loaded()
             except UnbuiltError:
                 return FolderProvider(beside).path(variant)
             return self._builder.path(variant)  # the device file may have changed

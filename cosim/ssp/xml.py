@@ -7,7 +7,6 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -73,6 +72,8 @@ def _definition(unit: Unit) -> dict[str, Any]:
 
 def attributes(**values: Any) -> str:
     """Attributes of an element; those that are None are left out."""
+    from xml.sax.saxutils import quoteattr  # loads what fetches web pages
+
     return "".join(
         f" {name}={quoteattr(text(value))}" for name, value in values.items() if value is not None
     )

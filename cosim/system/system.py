@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..drawing import svg as drawing
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
 from ..fmu.description import Description, PowerPort, Variable
@@ -428,6 +427,8 @@ class System:
 
     def svg(self, marks: Mapping[str, Sequence[str]] | None = None) -> str:
         """The system as a drawing (SVG); instances with marks (short texts) stand out."""
+        from ..drawing import svg as drawing
+
         return drawing.svg(self, marks)
 
     def _repr_svg_(self) -> str:
@@ -435,6 +436,8 @@ class System:
 
     def to_svg(self, path: Path | str) -> Path:
         """Write the drawing to a file."""
+        from ..drawing import svg as drawing
+
         return drawing.to_svg(self, path)
 
     def __str__(self) -> str:

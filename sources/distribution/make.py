@@ -28,9 +28,9 @@ from cosim.master import kernel
 from cosim.spec.cache import cache_folder
 from cosim.spec.variant import file_stem, parse_name
 from sources.packaging import catalog
-from sources.packaging.build import build_many, host_platform
+from sources.packaging.build import build_many
 from sources.packaging.kernel import build_kernel
-from sources.packaging.native import PLATFORMS
+from sources.packaging.platforms import PLATFORMS, host_platform
 from sources.variant import effects
 
 from . import contents

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import inspect
 import json
-import platform as host
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
 import casadi as ca
 
-from cosim import spec
 from cosim.errors import listing
-from cosim.spec import devices, hints
+from cosim.spec import hints
 from cosim.spec.archive import pack
 from cosim.spec.variant import Name
 
@@ -29,12 +26,11 @@ from ..model import Model, ModelError
 from ..scene import model_scene
 from ..variant import build_model, fidelities, parse_name
 from . import description, native, python, rights
-from .cache import cache_folder, write_atomically
+from .cache import write_atomically
 from .layout import Entry, layout
+from .platforms import PLATFORMS
+from .ready import Kind, platforms, ready, stamp_path, target_path
 
-Kind = description.Kind
-_SOURCES = Path(__file__).parent.parent
-_SPEC = Path(spec.__path__[0])
 _EQUATIONS = threading.Lock()
 """Held while CasADi works: it counts references without locks. Compilers run beside it."""
 
@@ -178,7 +174,7 @@ def _libraries(source: str, identifier: str, fmi: int, platforms: list[str]) -> 
         made = dict(zip(platforms, compiled, strict=True))
     files = {}
     for platform, library in made.items():
-        target = native.PLATFORMS[platform]
+        target = PLATFORMS[platform]
         folder = target.fmi2 if fmi == 2 else target.fmi3
         files[f"binaries/{folder}/{identifier}{target.suffix}"] = library
     mac = [library for platform, library in made.items() if platform.endswith("darwin")]
@@ -188,93 +184,31 @@ def _libraries(source: str, identifier: str, fmi: int, platforms: list[str]) -> 
     return files
 
 
+def _short(text: str) -> str:
+    """Of a module's text, for its name: Python keeps one module of a name in a process."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
 def _python_files(variant: Variant) -> tuple[dict[str, bytes], str]:
-    source = python.slave_source(variant.model, variant.functions, variant.entries, variant.name)
     arguments = (variant.model, variant.functions, variant.entries)
     identifier = variant.name.identifier
+    equations = python.equations_source(*arguments, variant.name)
+    part = f"{identifier}_equations_{_short(equations)}"
+    source = python.slave_source(variant.model, variant.name, part)
     blank = description.describe_fmi2(
         *arguments, identifier=identifier, name=str(variant.name), token="", kind="python"
     )
     token = _token(source, blank.decode())
-    module = f"{identifier}_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+    module = f"{identifier}_{_short(source)}"
     files = {
         "modelDescription.xml": description.describe_fmi2(
             *arguments, identifier=identifier, name=str(variant.name), token=token, kind="python"
         ),
         "resources/slavemodule.txt": module.encode(),
         f"resources/{module}.py": source.encode(),
+        f"resources/{part}.py": equations.encode(),
     }
     return files | python.binaries(identifier) | rights.pythonfmu(), source
-
-
-@lru_cache(maxsize=1)
-def sources_key() -> str:
-    """Hash of what an FMU is made of: `sources/`, units and names of `cosim/spec`, its makers.
-
-    What a wheel carries (`sources/distribution`) is no part of it.
-    """
-    digest = hashlib.sha256()
-    for folder in (_SOURCES, _SPEC):
-        for path in sorted(folder.rglob("*")):
-            name = path.relative_to(folder)
-            if path.suffix in (".py", ".c", ".toml") and name.parts[0] != "distribution":
-                digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
-    for package in ("casadi", "pythonfmu", "ziglang"):
-        digest.update(importlib.metadata.version(package).encode())
-    digest.update(f"{rights.attributes()}".encode() + rights.LICENSE.read_bytes())
-    return digest.hexdigest()
-
-
-def _platforms(choice: str) -> list[str]:
-    return list(native.PLATFORMS) if choice == "all" else [host_platform()]
-
-
-def host_platform() -> str:
-    """This machine's entry of `native.PLATFORMS`.
-
-    Raises:
-        ValueError: no FMU can be built for this machine.
-    """
-    machine = host.machine().lower()
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
-    name = f"{machine}-{host.system().lower()}"
-    if name not in native.PLATFORMS:
-        raise ValueError(f"no FMUs for {name}; there are {', '.join(native.PLATFORMS)}")
-    return name
-
-
-def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
-    """Where the FMU of a variant lies below the output folder."""
-    folder = "python" if kind == "python" else f"fmi{fmi}"
-    return out / folder / f"{name.filename}.fmu"
-
-
-def _stamp(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
-    """A file that holds the hash of the FMU built from these very sources."""
-    key = f"{sources_key()} {name} {fmi} {kind} {_platforms(platform)}"
-    own = devices.find(name.component, name.device)
-    if own is not None:
-        key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
-    return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
-
-
-def ready(
-    name: str, *, out: Path, fmi: int = 2, kind: Kind = "native", platform: str = "host"
-) -> Path | None:
-    """Path of the FMU of a variant if it is there and up to date, else None; arguments as `build`.
-
-    Raises:
-        UnknownVariantError: the name does not follow the grammar.
-    """
-    parsed = parse_name(name)
-    path = target_path(parsed, out, fmi, kind)
-    if path.exists():
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        for served in dict.fromkeys((platform, "all")):  # an FMU for all platforms serves the host
-            stamp = _stamp(parsed, fmi, kind, served)
-            if stamp.exists() and stamp.read_text() == digest:
-                return path
-    return None
 
 
 def build(
@@ -303,7 +237,7 @@ def build(
     path = target_path(parsed, out, fmi, kind)
     content = _packed(name, fmi, kind, platform)
     write_atomically(path, content)
-    stamp = _stamp(parsed, fmi, kind, platform)
+    stamp = stamp_path(parsed, fmi, kind, platform)
     write_atomically(stamp, hashlib.sha256(content).hexdigest().encode())
     return path
 
@@ -342,7 +276,7 @@ def _packed(
         files["extra/cosim/component.json"] = component_json(variant)
         files |= rights.files()
     if kind == "native":
-        files |= _libraries(source, variant.name.identifier, fmi, _platforms(platform))
+        files |= _libraries(source, variant.name.identifier, fmi, platforms(platform))
     return pack(files)
 
 

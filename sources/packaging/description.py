@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 from xml.etree import ElementTree as ET
 
 from ..function import Functions
@@ -11,8 +10,8 @@ from ..model import Model
 from ..units import base_exponents, coherent
 from . import rights
 from .layout import METHODS, Entry
+from .ready import Kind
 
-Kind = Literal["native", "python"]
 SOURCE_FILES = ("all.c",)
 LOG_CATEGORIES = ("logStatusDiscard", "logStatusError")
 

@@ -17,7 +17,7 @@ def build_kernel(sources: Sequence[Path], target: Path, platform: str) -> Path:
     Args:
         sources: the first is compiled and includes the others.
         target: the library.
-        platform: key of `native.PLATFORMS`.
+        platform: key of `PLATFORMS`.
     """
     if not (target.exists() and sealed(target, target.read_bytes())):
         files = {path.name: path.read_text(encoding="utf-8") for path in sources}

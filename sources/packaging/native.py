@@ -12,7 +12,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import casadi as ca
@@ -24,35 +23,11 @@ from .c_code import Wanted, Writer
 from .cache import cache_folder, keep
 from .elimination import eliminate
 from .layout import Entry, owners
+from .platforms import PLATFORMS
 
 C_SOURCES = Path(__file__).parent / "c"
 _COMPILERS = threading.BoundedSemaphore(os.cpu_count() or 1)
 """As many compilers at a time as there are processors."""
-
-
-@dataclass(frozen=True)
-class Platform:
-    """A target platform.
-
-    Attributes:
-        target: zig's target triple; glibc 2.17 and macOS 11 are the oldest systems served.
-        suffix: of the shared library.
-        fmi2, fmi3: folder names below `binaries/`.
-    """
-
-    target: str
-    suffix: str
-    fmi2: str
-    fmi3: str
-
-
-PLATFORMS: dict[str, Platform] = {
-    "x86_64-linux": Platform("x86_64-linux-gnu.2.17", ".so", "linux64", "x86_64-linux"),
-    "aarch64-linux": Platform("aarch64-linux-gnu.2.17", ".so", "aarch64-linux", "aarch64-linux"),
-    "x86_64-windows": Platform("x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
-    "x86_64-darwin": Platform("x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
-    "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
-}
 
 
 class CompilerError(RuntimeError):

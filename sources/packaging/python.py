@@ -106,8 +106,37 @@ def _below_the_line(module: ModuleType) -> str:
     return inspect.getsource(module).split("# -- run time ", 1)[1].split("\n", 1)[1]
 
 
-def slave_source(model: Model, functions: Functions, entries: list[Entry], name: Name) -> str:
-    """The slave file of a variant: generated functions, tables, and the generic run time."""
+def slave_source(model: Model, name: Name, equations: str) -> str:
+    """The slave file of a variant: the class that pythonfmu makes instances of.
+
+    pythonfmu looks for the class in the text of this file whenever it makes an instance, which
+    takes 0.1 s for the equations of an arm: those are in a module of their own.
+
+    Args:
+        model: of the variant.
+        name: of the variant.
+        equations: the module with its equations, see `equations_source`.
+    """
+    class_name = re.sub(r"\W", "_", name.identifier)
+    body = _below_the_line(runtime).replace("class Slave(", f"class {class_name}(")
+    return "\n".join(
+        [
+            f'"""{model.component.text} Variant {name}; generated from its equations."""',
+            "",
+            "import math as _math",
+            "from typing import Any",
+            "",
+            "from pythonfmu import Fmi2Slave",
+            "",
+            f"from {equations} import *",
+            "",
+            body.replace("  # type: ignore[misc]", ""),
+        ]
+    )
+
+
+def equations_source(model: Model, functions: Functions, entries: list[Entry], name: Name) -> str:
+    """The file of a variant's equations: generated functions and tables."""
     nx = sum(entry.part == "state" for entry in entries)
     elimination = eliminate(nx, functions.jacobian_pattern)
     used = [functions.outputs, functions.derivatives]
@@ -130,8 +159,6 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
     def bounds(values: list[float | None], default: str) -> str:
         return "[" + ", ".join(default if v is None else repr(float(v)) for v in values) + "]"
 
-    class_name = re.sub(r"\W", "_", name.identifier)
-    body = "\n\n".join(map(_below_the_line, (c_functions, runtime)))
     fixed = [e.part == "parameter" and e.quantity.variability == "fixed" for e in entries]
     nominal = [float(e.quantity.nominal or 1.0) for e in entries if e.part == "state"]
     tables = [
@@ -157,15 +184,14 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
     updates = ", ".join(function.name() for function in functions.updates)
     return "\n".join(
         [
-            f'"""{model.component.text} Variant {name}; generated from its equations."""',
+            f'"""Equations of {name}, as functions that fill lists, and its variables."""',
             "",
             "import math as _math",
             "from typing import Any",
             "",
-            "from pythonfmu import Fmi2Slave",
-            "",
             *tables,
             "",
+            _below_the_line(c_functions),
             *(function_source(function) for function in used),
             *factor,
             "",
@@ -173,9 +199,6 @@ def slave_source(model: Model, functions: Functions, entries: list[Entry], name:
             "",
             f"UPDATES = [{updates}]",
             "",
-            body.replace("class Slave(", f"class {class_name}(").replace(
-                "  # type: ignore[misc]", ""
-            ),
         ]
     )
 

@@ -21,9 +21,9 @@ import fmpy
 import numpy as np
 import pytest
 
-from sources.packaging import native
-from sources.packaging.build import build, host_platform
+from sources.packaging.build import build
 from sources.packaging.cache import cache_folder
+from sources.packaging.platforms import PLATFORMS, host_platform
 
 pytestmark = pytest.mark.emulated
 
@@ -35,7 +35,7 @@ QEMU = ("qemu-aarch64", "qemu-aarch64-static")
 @lru_cache
 def driver(platform: str) -> Path:
     """The driver as a program for a platform."""
-    target = native.PLATFORMS[platform].target
+    target = PLATFORMS[platform].target
     path = cache_folder("emulated") / (f"driver-{platform}" + ".exe" * ("windows" in platform))
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-std=c99", "-O1", "-s"]
     command += ["-o", str(path), str(DRIVER), *([] if "windows" in platform else ["-ldl"])]
@@ -104,7 +104,7 @@ def results(
 ) -> np.ndarray:
     path = fmu_of_all_platforms(variant, fmi)
     description = fmpy.read_model_description(str(path))
-    names = native.PLATFORMS[platform]
+    names = PLATFORMS[platform]
     binary = f"{names.fmi2 if fmi == 2 else names.fmi3}/{description.coSimulation.modelIdentifier}"
     library = folder / f"{platform}{names.suffix}"
     with zipfile.ZipFile(path) as archive:

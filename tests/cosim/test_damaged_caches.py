@@ -62,6 +62,6 @@ def test_a_seal_is_kept_beside_its_file(tmp_path: Path) -> None:
 
 
 def compiling_platform() -> str:
-    from sources.packaging.build import host_platform
+    from sources.packaging.platforms import host_platform
 
     return host_platform()

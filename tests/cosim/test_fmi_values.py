@@ -13,8 +13,8 @@ from cosim import Constant, Master, Recording, System, Table, read_recording
 from cosim.errors import CosimError, GraphError, ScenarioError, StepError, ValueRangeError
 from cosim.files import flatten
 from cosim.master import kernel
-from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
+from sources.packaging.platforms import host_platform
 from tests.tiny_fmus import V, tiny
 
 BIG = 2**63 - 1

@@ -44,6 +44,19 @@ def test_a_run_loads_neither_command_line_nor_pictures() -> None:
     rooms = {name.split(".")[1] for name in found if name.startswith("cosim.")}
     assert not rooms & {"calibrate", "cli", "control", "diagnose", "report", "study"}
     assert not found & {"matplotlib", "pandas", "rich", "scipy.integrate", "typer"}
+    # unless its FMUs had to be built, which a second run in the same cache needs no more
+    again = loaded("import cosim\ncosim.run('motor_bench/ST1', duration=0.01)")
+    assert "sources.packaging.ready" in again and "casadi" not in again
+
+
+@pytest.mark.slow
+def test_what_is_built_loads_what_builds(tmp_path: Path) -> None:
+    """The twin of the test above: CasADi would be seen."""
+    found = loaded(
+        "from pathlib import Path\nfrom cosim.installation.builder import Builder\n"
+        f"Builder(Path({str(tmp_path)!r})).path('gearbox/ratio')"
+    )
+    assert {"casadi", "sources.packaging.build"} <= found
 
 
 @pytest.mark.slow

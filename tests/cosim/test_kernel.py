@@ -15,8 +15,8 @@ from cosim.master import algorithms, kernel
 from cosim.master.kernel import instructions
 from cosim.master.plan import operations
 from cosim.spec import cache
-from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
+from sources.packaging.platforms import host_platform
 from tests.cosim_fmus import slave
 from tests.fmus import fmu
 

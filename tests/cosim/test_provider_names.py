@@ -8,7 +8,7 @@ import pytest
 
 from cosim import FolderProvider
 from cosim.errors import VariantError
-from sources.packaging.build import target_path
+from sources.packaging.ready import target_path
 from sources.variant import parse_name
 
 

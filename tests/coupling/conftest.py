@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from cosim.master import kernel
-from sources.packaging.build import host_platform
 from sources.packaging.kernel import build_kernel
+from sources.packaging.platforms import host_platform
 from tests.cosim_fmus import SLAVE2, slave
 from tests.fmus import fmu
 

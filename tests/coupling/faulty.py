@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
-from sources.packaging.build import host_platform
 from sources.packaging.native import compile_c
+from sources.packaging.platforms import host_platform
 
 MODES = {"error": 1, "discard": 2, "fatal": 3, "nan": 4, "crash": 5, "hang": 6, "exit": 7}
 

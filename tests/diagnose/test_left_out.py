@@ -42,12 +42,16 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     folder = tmp_path_factory.mktemp("discs")
 
     def found(
-        law: str, *without: str, seconds: float = 4.0, names: Iterable[str] = disc.RUNS
+        law: str,
+        *without: str,
+        seconds: float = 4.0,
+        names: Iterable[str] = disc.RUNS,
+        made: bool = False,
     ) -> Diagnosis:
         place = folder / f"{law}_{seconds}"
         if not place.is_dir():
             disc.write(place, LAWS[law], seconds=seconds, names=names)
-        return diagnose(read_problem(place), without=without)
+        return diagnose(read_problem(place), without=without, law=made)
 
     return found
 
@@ -77,23 +81,24 @@ def test_a_disc_that_lacks_nothing_has_no_name_whatever_is_left_out(diagnosed: P
 
 
 @pytest.mark.parametrize(
-    ("law", "without"),
+    ("law", "without", "made"),
     [
-        ("drag", ("quadratic_drag",)),
-        ("unbalance", ("unbalance", "cogging", "harmonic_ripple")),
-        ("teeth", ("cogging", "harmonic_ripple")),
+        ("drag", ("quadratic_drag",), True),  # a law from the data takes 4 times the rest
+        ("unbalance", ("unbalance", "cogging", "harmonic_ripple"), False),
+        ("teeth", ("cogging", "harmonic_ripple"), False),
     ],
 )
 @pytest.mark.slow
 def test_a_law_that_the_catalogue_lacks_gets_no_name_but_its_place(
-    diagnosed: Plant, law: str, without: tuple[str, ...]
+    diagnosed: Plant, law: str, without: tuple[str, ...], made: bool
 ) -> None:
-    found = diagnosed(law, *without, seconds=1.6, names=FEW)
+    found = diagnosed(law, *without, seconds=1.6, names=FEW, made=made)
     assert found.verdict == "unexplained" and not found.answer.laws
     assert found.after is found.before and not found.files
     assert found.answer.force is not None and found.answer.force.label == "load.flange"
     content = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert content["effects"] == [] and content["withheld"] == sorted(without)
+    assert (found.law is not None) == made
     for hint in content["hints"]:
         assert hint["why"] and not {e["effect"] for e in hint["effects"]} & set(without)
     shown = page(found)

@@ -16,8 +16,8 @@ from cosim.errors import CosimError, StepError
 from cosim.fmu.archive import platform_folders
 from cosim.master.master import Master
 from cosim.system.system import System
-from sources.packaging.build import host_platform
 from sources.packaging.native import compile_c
+from sources.packaging.platforms import host_platform
 from tests.coupling.faulty import XML
 from tests.faults import others
 

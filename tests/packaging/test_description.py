@@ -12,6 +12,7 @@ import pytest
 from sources.packaging import native
 from sources.packaging.build import Variant
 from sources.packaging.description import terminals
+from sources.packaging.platforms import PLATFORMS
 from tests.fmus import catalogue, fmu
 from tests.packaging.described import described as texts_of
 
@@ -190,7 +191,7 @@ def test_binaries_of_all_platforms_are_where_the_standards_say(fmi: int) -> None
             *("aarch64-linux", "aarch64-darwin"),
         },
     }
-    found = {p.fmi2 if fmi == 2 else p.fmi3 for p in native.PLATFORMS.values()}
+    found = {p.fmi2 if fmi == 2 else p.fmi3 for p in PLATFORMS.values()}
     assert found == folders[fmi]
 
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from sources.packaging import c_code, c_functions, native, runtime
-from sources.packaging.build import host_platform
 from sources.packaging.elimination import Elimination, eliminate
+from sources.packaging.platforms import PLATFORMS, host_platform
 
 
 def run(elimination: Elimination, j: np.ndarray, d: float, b: np.ndarray) -> np.ndarray:
@@ -121,7 +121,7 @@ VALUES = (*SPECIAL, math.inf, -math.inf, math.nan)
 
 @pytest.fixture(scope="module")
 def c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    suffix = native.PLATFORMS[host_platform()].suffix
+    suffix = PLATFORMS[host_platform()].suffix
     path = tmp_path_factory.mktemp("c") / f"functions{suffix}"
     trigonometry = (native.C_SOURCES / "trigonometry.c").read_text(encoding="utf-8")
     files = {"functions.c": C_SOURCE, "trigonometry.c": trigonometry}

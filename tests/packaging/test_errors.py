@@ -110,7 +110,7 @@ def test_a_failing_compiler_leaves_the_old_fmu(
 ) -> None:
     path = build("inertia/disc", out=tmp_path)
     old = path.read_bytes()
-    monkeypatch.setattr("sources.packaging.build.sources_key", lambda: "sources have changed")
+    monkeypatch.setattr("sources.packaging.ready.sources_key", lambda: "sources have changed")
     good = native.with_token
     monkeypatch.setattr(native, "with_token", lambda *a: good(*a) + "#error changed\n")
     with pytest.raises(native.CompilerError, match="changed"):
