@@ -1,6 +1,6 @@
 """Error of the coupling against the same equations solved as one, and energy that it invents.
 
-    python -m benchmarks.coupling [CASE ...] [--quick] [--steps SECONDS ...]
+    python -m benchmarks.coupling [CASE ...] [--quick] [--steps SECONDS ...] [--solver-step SECONDS]
 
 A case is `motor_bench` (its system with a motor in continuous time) or a run of a scenario as it is
 (`mobile_manipulator/IY`). Its table has, over algorithms and communication steps, the largest error
@@ -232,6 +232,13 @@ def unsampled(system: System) -> System:
     return found
 
 
+def limit_solvers(system: System, step: float) -> None:
+    """Let the solvers inside the FMUs make steps up to this long [s], where they have steps."""
+    for name, member in system.members.items():
+        if "solver.step" in member.description.variables:
+            system.set(f"{name}.solver.step", step)
+
+
 def constants(system: System, inputs: Mapping[str, Driver]) -> dict[str, float]:
     """Inputs as numbers in the units of the FMUs, for the monolithic solution."""
     found = {}
@@ -376,12 +383,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="without iterated coupling")
     parser.add_argument("--whole", action="store_true", help="check references to their ends")
     parser.add_argument("--steps", type=float, nargs="+", help="communication steps [s]")
+    parser.add_argument("--solver-step", type=float, help="longest step of solvers inside [s]")
     arguments = parser.parse_args()
     for name in arguments.cases or ("motor_bench", *RUNS):
         case = motor_bench() if name == "motor_bench" else None
         case = case or (in_parts if name.startswith("mir250_parts") else of_scenario)(name)
         if arguments.steps:
             case = replace(case, steps=tuple(arguments.steps))
+        if arguments.solver_step:
+            limit_solvers(case.system, arguments.solver_step)
         if arguments.whole:
             case = replace(case, checked=case.duration)
         table(name, case, arguments.quick)

@@ -1,6 +1,7 @@
 """How much faster than real time a scenario runs, and where the time goes.
 
-    python -m benchmarks.speed [RUN] [--duration SECONDS] [--repeats N]
+    python -m benchmarks.speed [RUN] [--step SECONDS] [--solver-step SECONDS]
+                               [--duration SECONDS] [--repeats N]
 
 Set-up is left out. One core: least processor time of several runs. Two at once: two prepared runs
 in two threads against one after the other, wall time, best of several; beside it what two SHA-256
@@ -21,7 +22,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from benchmarks.coupling import of_scenario
+from benchmarks.coupling import limit_solvers, of_scenario
 from cosim.master import kernel
 from cosim.master.initialization import initialize
 from cosim.master.master import Master
@@ -31,14 +32,25 @@ from cosim.master.session import Session
 RECORD = ["base.x"]
 
 
-def prepared(name: str, duration: float) -> tuple[Master, dict[str, Any]]:
-    """The master of a run and how its sessions are made."""
+def prepared(
+    name: str, duration: float, step: float | None = None, solver_step: float | None = None
+) -> tuple[Master, dict[str, Any]]:
+    """The master of a run and how its sessions are made.
+
+    Args:
+        name: of the run.
+        duration: simulated time [s].
+        step: communication step in place of the run's own [s].
+        solver_step: longest step of the solvers inside, in place of their own [s].
+    """
     case = of_scenario(name)
     if case.usual is None:
         raise ValueError(f"{name} is no run of a scenario")
-    algorithm, options, step = case.usual
+    algorithm, options, usual = case.usual
+    if solver_step is not None:
+        limit_solvers(case.system, solver_step)
     settings = {"duration": duration, "inputs": case.inputs, "record": RECORD, "every": 5}
-    return Master(case.system, algorithm, step, options=options), settings
+    return Master(case.system, algorithm, step or usual, options=options), settings
 
 
 def least(function: Callable[[], object], repeats: int, clock: Callable[[], float]) -> float:
@@ -97,10 +109,14 @@ def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", nargs="?", default="mobile_manipulator/IY")
+    parser.add_argument("--step", type=float, help="communication step [s], not the run's own")
+    parser.add_argument("--solver-step", type=float, help="longest step of solvers inside [s]")
     parser.add_argument("--duration", type=float, default=30.0, help="simulated time [s]")
     parser.add_argument("--repeats", type=int, default=5)
     arguments = parser.parse_args()
-    master, settings = prepared(arguments.run, arguments.duration)
+    master, settings = prepared(
+        arguments.run, arguments.duration, arguments.step, arguments.solver_step
+    )
     duration, steps = arguments.duration, round(arguments.duration / master.step)
     with Session(master, **settings) as first, Session(master, **settings) as second:
         alone = least(first.run, arguments.repeats, time.process_time)

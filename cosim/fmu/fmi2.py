@@ -28,6 +28,7 @@ class _Callbacks(ct.Structure):
     ]
 
 
+@functools.cache  # a library opened anew is some kilobytes, which would lie between instances
 def _allocator() -> tuple[Any, Any]:
     runtime = ct.cdll.msvcrt if sys.platform == "win32" else ct.CDLL(None)
     return _CALLOC(("calloc", runtime)), _FREE(("free", runtime))

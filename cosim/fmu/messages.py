@@ -13,7 +13,8 @@ from collections.abc import Sequence
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 _LIMIT = 50
-_messages: dict[int, deque[str]] = {}
+_messages: dict[int, deque[str] | None] = {}
+"""By key; none yet: None, for an empty deque is half a kilobyte."""
 _keys = itertools.count(1)
 
 
@@ -27,7 +28,7 @@ def status_name(status: int) -> str:
 def new_key(address: int = 0) -> int:
     """A key under which an instance's messages are kept; an address of its own where it has one."""
     key = address or next(_keys)
-    _messages[key] = deque(maxlen=_LIMIT)
+    _messages[key] = None
     return key
 
 
@@ -57,8 +58,11 @@ def forget(key: int) -> None:
 
 
 def _keep(key: int | None, status: int, message: bytes | None) -> None:
-    kept = _messages.get(key or 0)
-    if kept is not None:
+    key = key or 0
+    if key in _messages:
+        kept = _messages[key]
+        if kept is None:
+            kept = _messages[key] = deque(maxlen=_LIMIT)
         text = " ".join((message or b"").decode("utf-8", "replace").split())
         kept.append(text if status == 0 else f"{STATUS[min(status, 5)]}: {text}")
 
