@@ -113,8 +113,8 @@ def equations(m: Model) -> None:
     m.derivative(x.current_d, (z.set_d - x.current_d) / p.T_i)
     m.derivative(x.current_s, (z.set_s - x.current_s) / p.T_i)
 
-    rolling = -p.N_d * p.K_d * z.mean_d
-    turning = p.N_s * p.K_s * z.mean_s
+    rolling = -p.N_d * constant(m, "rolling_torque_constant", p.K_d, z.mean_d) * z.mean_d
+    turning = p.N_s * constant(m, "steering_torque_constant", p.K_s, z.mean_s) * z.mean_s
     m.supply(ca.dot(rolling, u.phid) + ca.dot(turning, u.betad))
     m.loss("rolling_gears", (1 - p.eta_d) * ca.dot(rolling, u.phid))
     m.loss("steering_gears", (1 - p.eta_s) * ca.dot(turning, u.betad))
@@ -128,10 +128,20 @@ def equations(m: Model) -> None:
     m.output(qs.P_MEASURED, angle)
 
 
-def each(m: Model, name: str, unit: str, value: SX) -> SX:
+def constant(m: Model, name: str, value: SX, current: SX) -> SX:
+    """Torque constants of three motors with what effects add [N.m/A]."""
+    values = ca.repmat(value, 3)
+    return values + each(m, name, "N.m/A", values, "coefficient", current=current)
+
+
+def each(m: Model, name: str, unit: str, value: SX, kind: str = "signal", **others: SX) -> SX:
     """Open a balance for a signal of all three axles and one for each; what effects add."""
-    together = m.balance(name, "signal", unit=unit, value=value)
+    together = m.balance(name, kind, unit=unit, value=value, **others)
     single = [
-        m.balance(f"{name}_{i + 1}", "signal", unit=unit, value=value[i]).effort for i in range(3)
-    ]
+        m.balance(
+            f"{name}_{i + 1}", kind, unit=unit, value=value[i],
+            **{key: signal[i] for key, signal in others.items()},
+        ).effort
+        for i in range(3)
+    ]  # fmt: skip
     return together.effort + ca.vertcat(*single)
