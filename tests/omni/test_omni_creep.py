@@ -183,3 +183,16 @@ def test_a_motor_that_saturates_loses_its_own_torque_only() -> None:
     left = vector(after, "tau_phi") / vector(before, "tau_phi")
     # the mean over a period is the current at its end but for 1e-3 of it (the loop's integral)
     np.testing.assert_allclose(left, [1.0, 1.0 - s * square / (square + i_s**2), 1.0], rtol=1e-3)
+
+
+def test_a_current_loop_believes_its_sensor() -> None:
+    g, place = 0.05, "rolling_current_2"
+    plain = Stepper("twist_drive/sampled")
+    wrong = Stepper(f"twist_drive/sampled+current_gain@{place}", {f"{place}.current_gain.g": g})
+    before, after = ([d.step({"vx_set": 0.1}, TICK) for _ in range(50)][-1] for d in (plain, wrong))
+    # what it shows is what was asked for, but for 3e-3 of it: the integral rises while it settles
+    shown = vector(after, "i_d_measured")
+    np.testing.assert_allclose(shown, vector(before, "i_d_measured"), rtol=3e-3)
+    np.testing.assert_allclose(vector(after, "i_d"), shown / [1.0, 1.0 + g, 1.0], rtol=1e-12)
+    torque = vector(after, "tau_phi") / vector(before, "tau_phi")
+    np.testing.assert_allclose(torque, [1.0, 1.0 / (1.0 + g), 1.0], rtol=3e-3)
