@@ -54,7 +54,7 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "slope": (0.01, ("floor_slope",)),
     "cable": (8.0, ("cable_force",)),
     "air": (30.0, ("body_drag",)),
-    "turning_torque": (3.0, ("pivot_torque",)),
+    "turning_torque": (3.0, ()),
     "command_late": (0.03, ("delay",)),
     "camera_late": (0.04, ("delay",)),
     "camera_skew": (2e-3, ("clock_skew",)),
@@ -65,14 +65,15 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "current_offset": (0.3, ("current_offset", "bias")),
     "scrub": (0.01, ()),
     "axis_moved": (5e-3, ()),
-    "saturation": (0.15, ()),
+    "saturation": (0.15, ("torque_constant_saturation",)),
     "soft_creep": (0.3, ()),
 }
-"""Name -> size, and the names of the catalogue that are the same law; none: no catalogue has it.
+"""Name -> size, and the names of the catalogue that are the same law, or nearly; none: it has none.
 
 drive_*: at wheel 2; steering_*, scrub: at wheel 1. one_radius, runout: wheel 3 [m]. current_*:
 drive 3's sensor, in its loop. payload: [kg] at (0.2, -0.15) m. slope, cable: at P, in a direction
-of the floor. air: [N/(m/s)^2] at P. turning_torque: against turning, whatever the speed [N.m].
+of the floor. air: [N/(m/s)^2] at P. turning_torque: against turning, whatever the speed [N.m],
+on the platform alone (patches that scrub turn the forks as well). steering_hose: straight at 0.
 scrub: the patch of wheel 1 resists turning on the floor by this length times its load. axis_moved:
 axis 3 sits this much further forward. saturation: drives lose this share of their torque at 10 A.
 soft_creep: c_y is less by this share at twice the mean load.
@@ -189,7 +190,6 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
 
     x, y, phi = np.repeat([r.pose for r in chosen], count, axis=0).T.copy()
     b = np.repeat([r.steering for r in chosen], count, axis=0).T.copy()
-    hung = b.copy()
     v_x, v_y, w = np.zeros(n), np.zeros(n), np.zeros(n)  # of P, in body axes
     b_rate, wheel_angle, p_rate = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, n))
     i_d, i_s, set_d, set_s = (np.zeros((3, n)) for _ in range(4))
@@ -261,7 +261,7 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         motor = 40 * p["eta_s"] * 0.06 * i_s - p["b_s"] * b_rate
         motor = motor - stuck * np.tanh(b_rate / 0.02)
         if has["hose"]:
-            motor = motor - hose * (b - hung)
+            motor = motor - hose * b
         ground = -p["e"] * f_n
         if has["scrub"]:
             ground = ground - scrub * load * np.tanh((w + b_rate) / 0.05)

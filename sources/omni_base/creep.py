@@ -106,7 +106,9 @@ def equations(m: Model) -> None:
     )  # fmt: skip
     m.port(qs.STEERING, u.tau_beta, beta_rate)
     m.port(qs.ROLLING, u.tau_phi, phi_rate)
-    pivot = base.pivot_torques(m, g.r, motion, beta_rate, phi_rate, normal)
+    pivot = each(
+        m, "pivot", "pivot", **base.pivot_signals(g.r, motion, beta_rate, phi_rate, normal)
+    )
 
     f, coupling = inertia_blocks(g, masses, motion.beta)
     h_pose, h_beta = velocity_forces(g, masses, motion.beta, motion.u[2], beta_rate)

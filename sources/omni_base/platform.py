@@ -162,7 +162,8 @@ def forces(
     )
     rolling = m.balance("rolling", "rotation", velocity=phi_rate, angle=motion.phi, load=u.tau_phi)
     normal = ca.repmat(body.weight / 3, 3)
-    pivot = pivot_torques(m, g.r, motion, beta_rate, phi_rate, normal)
+    signals = pivot_signals(g.r, motion, beta_rate, phi_rate, normal)
+    pivot = m.balance("pivot", "pivot", **signals).effort
 
     friction_beta = p.f_s * ca.tanh(beta_rate / p.w_0) + p.f_v * beta_rate
     friction_phi = p.f_s * ca.tanh(phi_rate / p.w_0) + p.f_v * phi_rate
@@ -174,11 +175,10 @@ def forces(
     return body.masses, Forces(on_pose(body.wrench, pivot), on_beta, on_phi, normal)
 
 
-def pivot_torques(m: Model, r: SX, motion: Motion, beta_rate: SX, phi_rate: SX, normal: SX) -> SX:
-    """Open the balance of the contact patches' torques about the vertical."""
+def pivot_signals(r: SX, motion: Motion, beta_rate: SX, phi_rate: SX, normal: SX) -> dict[str, SX]:
+    """Signals of the contact patches' torques about the vertical."""
     speed = ca.sqrt((r * phi_rate) ** 2 + ROLLING_FLOOR**2)
-    spin = beta_rate + motion.u[2]
-    return m.balance("pivot", "pivot", spin=spin, rolling=speed, normal=normal).effort
+    return {"spin": beta_rate + motion.u[2], "rolling": speed, "normal": normal}
 
 
 def on_pose(wrench: SX, pivot: SX) -> SX:

@@ -5,14 +5,16 @@ With v_i the set velocity of steering axis A_i, t_i and n_i along and across whe
     every T:  e = t . v/r_c - p',   v = Kp_d e + I,   i_set = sat(v, i_d_max)
               I += Ki_d e T         unless |v| >= i_d_max
               i_set = sat(Kp_s (n . v/e_c - w_set - beta'), i_s_max)        (steering)
-              i_mean = i_set + (i - i_set) (1 - exp(-T/T_i)) T_i/T
-    between:  T_i i' = i_set - i
+              i_goal = i_set - (i_measured - i)
+              i_mean = i_goal + (i - i_goal) (1 - exp(-T/T_i)) T_i/T
+    between:  T_i i' = i_goal - i
               tau_phi = -N_d eta_d K_d i_mean,   tau_beta = N_s eta_s K_s i_mean
 
-i_mean is the mean of the coming period, known when it begins, so that a master which steps the
-drive before the base, period by period, gives it the impulse of that period. The rotors turn with
-the axles, so their inertia belongs to the base. The factors eta act in both directions of power
-flow, as on the sheet.
+i_goal is where the current goes: its loop believes its sensor, whose error at the tick counts for
+the period. i_mean is the mean of the coming period, known when it begins, so that a master which
+steps the drive before the base, period by period, gives it the impulse of that period. The rotors
+turn with the axles, so their inertia belongs to the base. The factors eta act in both directions of
+power flow, as on the sheet.
 
 Not modelled: voltage limit, elasticity and play of the gears, resolution of the loops' speeds.
 
@@ -61,8 +63,8 @@ ETA_S = Quantity(
 )
 CURRENT_D = Quantity("current_d", "A", "state behind i_d", size=3)
 CURRENT_S = Quantity("current_s", "A", "state behind i_s", size=3)
-SET_D = Quantity("set_d", "A", "set currents of the rolling motors", size=3)
-SET_S = Quantity("set_s", "A", "set currents of the steering motors", size=3)
+GOAL_D = Quantity("goal_d", "A", "rolling currents that the loops hold", size=3)
+GOAL_S = Quantity("goal_s", "A", "steering currents that the loops hold", size=3)
 INTEGRAL = Quantity("integral", "A", "integral parts of the rolling speed loops", size=3)
 MEAN_D = Quantity("mean_d", "A", "mean rolling currents of the present period", size=3)
 MEAN_S = Quantity("mean_s", "A", "mean steering currents of the present period", size=3)
@@ -81,7 +83,7 @@ def equations(m: Model) -> None:
         N_D, N_S, K_D, K_S, ETA_D, ETA_S,
     )  # fmt: skip
     x = m.states(CURRENT_D, CURRENT_S)
-    z = m.discretes(SET_D, SET_S, INTEGRAL, MEAN_D, MEAN_S)
+    z = m.discretes(GOAL_D, GOAL_S, INTEGRAL, MEAN_D, MEAN_S)
 
     command = ca.vertcat(u.vx_set, u.vy_set, u.w_set)
     command += m.balance("command", "bundle", value=command).effort
@@ -103,18 +105,21 @@ def equations(m: Model) -> None:
     set_s = ca.fmax(-p.i_s_max, ca.fmin(steering, p.i_s_max))
     free = ca.fabs(wanted) < p.i_d_max
     share = -ca.expm1(-p.T / p.T_i) * p.T_i / p.T
+    error_d = each(m, "rolling_current", "A", x.current_d)
+    error_s = each(m, "steering_current", "A", x.current_s)
+    goal_d, goal_s = set_d - error_d, set_s - error_s
 
     tick = m.clock("loops", p.T)
-    m.update(tick, z.set_d, set_d)
-    m.update(tick, z.set_s, set_s)
+    m.update(tick, z.goal_d, goal_d)
+    m.update(tick, z.goal_s, goal_s)
     m.update(tick, z.integral, z.integral + free * p.Ki_d * error * p.T)
-    m.update(tick, z.mean_d, set_d + (x.current_d - set_d) * share)
-    m.update(tick, z.mean_s, set_s + (x.current_s - set_s) * share)
-    m.derivative(x.current_d, (z.set_d - x.current_d) / p.T_i)
-    m.derivative(x.current_s, (z.set_s - x.current_s) / p.T_i)
+    m.update(tick, z.mean_d, goal_d + (x.current_d - goal_d) * share)
+    m.update(tick, z.mean_s, goal_s + (x.current_s - goal_s) * share)
+    m.derivative(x.current_d, (z.goal_d - x.current_d) / p.T_i)
+    m.derivative(x.current_s, (z.goal_s - x.current_s) / p.T_i)
 
-    rolling = -p.N_d * p.K_d * z.mean_d
-    turning = p.N_s * p.K_s * z.mean_s
+    rolling = -p.N_d * constant(m, "rolling_torque_constant", p.K_d, z.mean_d) * z.mean_d
+    turning = p.N_s * constant(m, "steering_torque_constant", p.K_s, z.mean_s) * z.mean_s
     m.supply(ca.dot(rolling, u.phid) + ca.dot(turning, u.betad))
     m.loss("rolling_gears", (1 - p.eta_d) * ca.dot(rolling, u.phid))
     m.loss("steering_gears", (1 - p.eta_s) * ca.dot(turning, u.betad))
@@ -122,16 +127,26 @@ def equations(m: Model) -> None:
     m.port(qs.ROLLING, m.output(omni_base.TAU_PHI, p.eta_d * rolling), u.phid)
     m.output(qs.I_D, x.current_d)
     m.output(qs.I_S, x.current_s)
-    m.output(qs.I_D_MEASURED, x.current_d + each(m, "rolling_current", "A", x.current_d))
-    m.output(qs.I_S_MEASURED, x.current_s + each(m, "steering_current", "A", x.current_s))
+    m.output(qs.I_D_MEASURED, x.current_d + error_d)
+    m.output(qs.I_S_MEASURED, x.current_s + error_s)
     m.output(qs.BETA_MEASURED, beta)
     m.output(qs.P_MEASURED, angle)
 
 
-def each(m: Model, name: str, unit: str, value: SX) -> SX:
+def constant(m: Model, name: str, value: SX, current: SX) -> SX:
+    """Torque constants of three motors with what effects add [N.m/A]."""
+    values = ca.repmat(value, 3)
+    return values + each(m, name, "N.m/A", values, "coefficient", current=current)
+
+
+def each(m: Model, name: str, unit: str, value: SX, kind: str = "signal", **others: SX) -> SX:
     """Open a balance for a signal of all three axles and one for each; what effects add."""
-    together = m.balance(name, "signal", unit=unit, value=value)
+    together = m.balance(name, kind, unit=unit, value=value, **others)
     single = [
-        m.balance(f"{name}_{i + 1}", "signal", unit=unit, value=value[i]).effort for i in range(3)
-    ]
+        m.balance(
+            f"{name}_{i + 1}", kind, unit=unit, value=value[i],
+            **{key: signal[i] for key, signal in others.items()},
+        ).effort
+        for i in range(3)
+    ]  # fmt: skip
     return together.effort + ca.vertcat(*single)

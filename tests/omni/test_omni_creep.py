@@ -143,3 +143,56 @@ def test_integral_stands_still_at_the_current_limit(speed: float, left: float) -
     # 50 ms are 33 time constants; the last tick's 0.03 A of the integral is on its way
     np.testing.assert_allclose(vector(held, "i_d"), min(25.0, 60 * speed + left), atol=0.07)
     np.testing.assert_allclose(vector(rest, "i_d"), left, atol=1e-6)
+
+
+def test_scrub_of_one_wheel_is_its_share_of_that_of_all() -> None:
+    state = named(
+        yaw_rate=0.4, vel_x=0.3, steering_angle=[0.3, -0.2, 1.0],
+        steering_rate=[0.3, -0.9, 0.2], rolling_rate=[-2.0, -3.0, -1.0],
+    )  # fmt: skip
+    rates = ["vel_x", "vel_y", "yaw_rate", *(f"steering_rate[{k}]" for k in (1, 2, 3))]
+
+    def change(port: str) -> np.ndarray:
+        base = oracle_of(f"omni_base/creep+pivot_torque@{port}")
+        some, none = (
+            base.derivatives({**state, f"{port}.pivot_torque.M_pa": size}) for size in (6.0, 0.0)
+        )
+        return np.array([some[name] - none[name] for name in rates])
+
+    single = [change(f"pivot_{k}") for k in (1, 2, 3)]
+    # accelerations are linear in torques; differences of terms of 1e3 rad/s2 (creep)
+    np.testing.assert_allclose(sum(single), change("pivot"), atol=1e-11)
+    for k, moved in enumerate(single):
+        spin = state["yaw_rate"] + state[f"steering_rate[{k + 1}]"]
+        assert moved[3 + k] * spin < 0.0  # its own fork gives way to the patch's torque
+
+
+def test_a_motor_that_saturates_loses_its_own_torque_only() -> None:
+    s, i_s, place = 0.2, 8.0, "rolling_torque_constant_2"
+    law = "torque_constant_saturation"
+    plain, weak = (
+        Stepper(
+            f"twist_drive/sampled+{law}@{place}",
+            {f"{place}.{law}.s": size, f"{place}.{law}.i_s": i_s},
+        )
+        for size in (0.0, s)
+    )
+    before, after = ([d.step({"vx_set": 0.1}, TICK) for _ in range(50)][-1] for d in (plain, weak))
+    np.testing.assert_array_equal(vector(before, "i_d"), vector(after, "i_d"))  # the base is held
+    square = after["i_d[2]"] ** 2
+    left = vector(after, "tau_phi") / vector(before, "tau_phi")
+    # the mean over a period is the current at its end but for 1e-3 of it (the loop's integral)
+    np.testing.assert_allclose(left, [1.0, 1.0 - s * square / (square + i_s**2), 1.0], rtol=1e-3)
+
+
+def test_a_current_loop_believes_its_sensor() -> None:
+    g, place = 0.05, "rolling_current_2"
+    plain = Stepper("twist_drive/sampled")
+    wrong = Stepper(f"twist_drive/sampled+current_gain@{place}", {f"{place}.current_gain.g": g})
+    before, after = ([d.step({"vx_set": 0.1}, TICK) for _ in range(50)][-1] for d in (plain, wrong))
+    # what it shows is what was asked for, but for 3e-3 of it: the integral rises while it settles
+    shown = vector(after, "i_d_measured")
+    np.testing.assert_allclose(shown, vector(before, "i_d_measured"), rtol=3e-3)
+    np.testing.assert_allclose(vector(after, "i_d"), shown / [1.0, 1.0 + g, 1.0], rtol=1e-12)
+    torque = vector(after, "tau_phi") / vector(before, "tau_phi")
+    np.testing.assert_allclose(torque, [1.0, 1.0 / (1.0 + g), 1.0], rtol=3e-3)
