@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..errors import UnknownNameError, listing
 from ..spec.hints import SearchHints
+from ..spec.units import Unit, parse
 from .parts import CLOCK, DRIFT, Channel, Parameter
 
 if TYPE_CHECKING:
@@ -110,6 +111,11 @@ def check_clock(target: str, channels: Iterable[str], inputs: Iterable[str], whe
             f"{where}: {target!r}: there is no channel {name!r} that is measured, and no input of "
             f"this name that a column drives; {listing(known, name)}"
         )
+
+
+def clock_unit(target: str) -> Unit:
+    """Of a lateness, or of a drift."""
+    return parse("1" if target.startswith(CLOCK + DRIFT) else "s")
 
 
 def clocked(parameters: Iterable[Parameter]) -> set[str]:

@@ -16,24 +16,15 @@ from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
 from ..master.master import Master
 from ..reading.schema import shown
-from ..spec.units import Unit, parse
+from ..spec.units import Unit
 from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
-from .clocks import bounds, check_clock, masked
+from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
-from .parts import (
-    CLOCK,
-    COINCIDENT,
-    DRIFT,
-    Channel,
-    Coarse,
-    MeasuredRun,
-    Parameter,
-    check_parameters,
-)
+from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
 
@@ -332,7 +323,7 @@ class Joined(MappedLogs):
     def _wanted(self, name: str) -> Unit | None:
         """Unit of a target, None where that is unknown."""
         if name.startswith(CLOCK):
-            return parse("1" if name.startswith(CLOCK + DRIFT) else "s")
+            return clock_unit(name)
         try:
             return self.system.variables(name)[1][0].unit
         except UnknownNameError:

@@ -23,6 +23,7 @@ from .candidates import Candidate, new_parameters
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
+from .redundant import without_redundant
 from .secant import FLOOR, patience
 from .signature import Signature
 from .verdict import wanted
@@ -375,7 +376,7 @@ class Fitter(Judge):
                     value = count * lattice
                     if not p.minimum <= value <= p.maximum:
                         continue
-                    found = self._held(winner, p.name, value)
+                    found = self.held(winner, p.name, value)
                     least = -GATE if best is winner else GATE
                     if found is not None and self.gain(best, found) > least:
                         best, nearest = found, count
@@ -389,7 +390,7 @@ class Fitter(Judge):
                 winner = found if self.gain(winner, found) > -GATE else winner
         return winner
 
-    def _held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:
+    def held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:
         """A model quickly fitted with one parameter held; None if it cannot be simulated."""
         place = fitted.problem.index(name)
         theta = fitted.estimate.theta.copy()
@@ -433,13 +434,11 @@ class Fitter(Judge):
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
         result = self.again(result, fitted, base)
-        better = self.gain(fitted, result) > GATE
-        if (
-            not better
-            or not compare(self.check_data, fitted.check, result.check, self.checking).passed
-        ):
+        unused = compare(self.check_data, fitted.check, result.check, self.checking)
+        if self.gain(fitted, result) <= GATE or not unused.passed:
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
+        result = without_redundant(self, result, others)
         return result if quick else self.sharpened(result, base, draft=True)
 
     def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:

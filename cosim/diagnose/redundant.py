@@ -1,0 +1,48 @@
+"""Parameters of a law that undo each other: one of them is held.
+
+Where only a product of two shows in the data (a thermal resistance and a temperature coefficient),
+both are open, and the interval of the strength holds absence though the law is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from ..calibrate.parts import Parameter
+from .models import GATE, Fitted
+
+
+class Fits(Protocol):
+    """Fits models (`Fitter`)."""
+
+    def say(self, text: str, /) -> None:
+        """Told what is done."""
+
+    def held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:
+        """A model quickly fitted with one parameter held; None if it cannot be simulated."""
+
+    def gain(self, fitted: Fitted, other: Fitted) -> float:
+        """How much better the other one is [nats]."""
+
+
+def without_redundant(search: Fits, fitted: Fitted, others: Sequence[Parameter]) -> Fitted:
+    """A model with open parameters of its last effect at their usual values, if nothing is lost.
+
+    Args:
+        search: fits.
+        fitted: the model.
+        others: parameters of the effect beside its strength.
+    """
+    fixed = fitted.signature.fixed if fitted.signature else {}
+    for p in others:
+        estimate = fitted.estimate
+        if p.name not in estimate.values or estimate.identifiable[estimate.problem.index(p.name)]:
+            continue
+        value = fixed.get(p.name, p.nominal)
+        less = search.held(fitted, p.name, value)
+        if less is not None and search.gain(less, fitted) <= GATE:
+            search.say(f"{p.name} = {value:g} {p.unit}: the data do not tell it from the others")
+            less.effects, less.signature = fitted.effects, fitted.signature
+            fitted = less
+    return fitted
