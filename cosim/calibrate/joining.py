@@ -24,22 +24,12 @@ from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
 from .mapped_logs import MappedLogs
 from .model import Model
+from .named import named, readings
 from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
 
 Vector = NDArray[np.float64]
-
-
-def _targets(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
-    """`"a.b"`, a list of such, or a table variable -> factor."""
-    if isinstance(entry, str):
-        return ((entry, 1.0),)
-    if isinstance(entry, list):
-        return tuple((str(item), 1.0) for item in entry)
-    if isinstance(entry, dict):
-        return tuple((name, float(factor)) for name, factor in flatten(entry).items())
-    raise ScenarioError(f"{where}: {entry!r} names no variables")
 
 
 def lookup(values: Mapping[str, Any], key: str, where: str) -> float:
@@ -98,7 +88,7 @@ class Joined(MappedLogs):
         for key, entry in table.get("fixed", {}).items():
             value = lookup(fixed, key, f"{self.path}: [fixed]")
             constants.update({name: factor * value for name, factor in
-                              _targets(entry, f"{self.path}: {key}")})  # fmt: skip
+                              named(entry, f"{self.path}: {key}")})  # fmt: skip
         self.columns: dict[str, str] = {}
         self.converted: dict[str, tuple[float, float]] = {}
         self.told: set[str] = set()  # channels whose noise the mapping states
@@ -130,6 +120,7 @@ class Joined(MappedLogs):
             relative=[tuple(names) for names in self.table.get("relative", [])],
             late=[p for p in stated if p.late],
             source=self._source(present),
+            readings=readings(self.table, f"{self.path}: [readings]"),
         )
 
     def _source(self, present: list[Channel]) -> Source:
@@ -307,7 +298,7 @@ class Joined(MappedLogs):
         """
         found = []
         source = known(unit, where) if unit else None
-        for name, factor in _targets(entry, where):
+        for name, factor in named(entry, where):
             if name.startswith(CLOCK):
                 inputs = [target for target, _, _ in self.drivers()]
                 check_clock(name, self.columns, inputs, where)

@@ -59,6 +59,8 @@ class Problem:
         further: give runs of the data set that need another system; read when they are asked for.
         source: where the data come from, for their checks.
         shafts: angle of an effect (see `shaft`) -> what it is in proportion with, and the ratio.
+        readings: error that an effect adds to a sensor -> starts of runs that it has read, with
+            factors: a run begins there less the error.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Problem:
     further: Sequence[Callable[[], Problem]] = ()
     source: Source = NO_SOURCE
     shafts: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    readings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("parameters", "channels", "runs", "relative", "late", "further"):
@@ -247,7 +250,16 @@ class Problem:
         """Full variable name -> value for a run."""
         run = self.run(run) if isinstance(run, str) else run
         assigned = self._assigned(run)
-        return {**assigned.known, **assigned.of(theta, assigned.variables)}
+        set_here = assigned.of(theta, assigned.variables)
+        values = {**assigned.known, **set_here}
+        for error, starts in self.readings.items():
+            if off := values.get(error, 0.0):
+                for name, factor in starts.items():
+                    if (
+                        name in values and name not in set_here
+                    ):  # an estimated start is the true one
+                        values[name] -= factor * off
+        return values
 
     def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
         """How late the clocks of channels are in a run [s], where that is estimated or held.

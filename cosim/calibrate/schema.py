@@ -149,7 +149,7 @@ MAPPING: dict[str, Check] = {
     "time": text, "resample": positive, "gap": positive, "only": table,
     "relative": list_of(list_of(text, 3)), "variants": table_of(text), "without": texts,
     "parameters": constants, "sheet": targets_by_name, "fixed": targets_by_name,
-    "starts": targets_by_name, "inputs": _tables(INPUT, (), text),
+    "starts": targets_by_name, "readings": targets_by_name, "inputs": _tables(INPUT, (), text),
     "columns": _tables(COLUMN, ()), "channels": _tables(CHANNEL, ("signal",)),
     "parameter": _list(PARAMETER, ("name", "nominal", "targets")),
     "nuisance": _list(PARAMETER, ("name", "nominal", "targets")),
