@@ -40,6 +40,7 @@ def checkout_stays_clean() -> Iterator[None]:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[BEGIN] = time.perf_counter()
+    gc.disable()  # until all tests are collected: the looking was a quarter of it
     # each worker of xdist has its share of the processors: more threads would only wait
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     if workers > 1 or getattr(config.option, "numprocesses", None):
@@ -52,6 +53,7 @@ def pytest_collection_finish() -> None:
     """Thousands of collected tests stay to the end: nobody has to look through them for garbage."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
