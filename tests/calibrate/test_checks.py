@@ -378,7 +378,10 @@ def test_a_column_on_a_late_clock_is_told_by_a_fit(noisy, column: str, samples: 
 
 @pytest.mark.slow
 def test_a_late_column_is_no_fault_where_something_else_is_wrong_too(noisy) -> None:
-    """It is a delay among what is missing then: laws are asked. (Alone, it is one: the test above.)"""
+    """It is a delay among what is missing then: laws are asked.
+
+    Alone it is a fault, see the test above.
+    """
 
     def delayed(x: np.ndarray) -> np.ndarray:
         return np.concatenate([np.full(12, x[0]), x[:-12]])
