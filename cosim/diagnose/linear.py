@@ -169,7 +169,15 @@ class Absorber:
     def _share(self, vector: Vector) -> Vector:
         size = float(np.max(np.abs(vector), initial=0.0)) or 1.0  # squares must fit float32
         share = _product((vector / size).astype(np.float32), self._basis)
-        return np.asarray(share * size, dtype=np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):  # asked next
+            return _finite(share * np.float32(size)).astype(np.float64)
+
+
+def _finite(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values, which must be finite."""
+    if not np.all(np.isfinite(values)):
+        raise CosimError("values of a model, or their derivatives, are not finite")
+    return values
 
 
 def _product(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -179,10 +187,7 @@ def _product(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray
     and leave it out of the result (numpy issue 24067), which warns of nothing, now and then.
     """
     with np.errstate(invalid="ignore"):
-        found: NDArray[np.float32] = np.asarray(first @ second)
-    if not np.all(np.isfinite(found)):
-        raise CosimError("values of a model, or their derivatives, are not finite")
-    return found
+        return _finite(np.asarray(first @ second))
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,8 @@ def test_values_that_are_not_finite_are_refused_when_something_is_absorbed() -> 
     assert absorber.rest(np.ones(4)) == pytest.approx([0.0, 0.0, 1.0, 1.0])
     with pytest.raises(CosimError, match="not finite"):
         absorber.rest(np.array([np.nan, 0.0, 1.0, 1.0]))
+    with pytest.raises(CosimError, match="not finite"):  # and without a warning
+        absorber.rest(np.array([1e39, 0.0, 1.0, 1.0]))
 
 
 def test_windows_that_are_far_off_count_by_their_logarithm() -> None:
