@@ -1,4 +1,4 @@
-"""Parameters of a law that undo each other: one of them is held.
+"""Parameters of a law that undo its strength are held.
 
 Where only a product of two shows in the data (a thermal resistance and a temperature coefficient),
 both are open, and the interval of the strength holds absence though the law is there.
@@ -29,17 +29,28 @@ class Fits(Protocol):
 def without_redundant(search: Fits, fitted: Fitted, others: Sequence[Parameter]) -> Fitted:
     """A model with open parameters of its last effect at their usual values, if nothing is lost.
 
+    Only where its strength is open: parameters that another law undoes (the place of a payload
+    beside a shift of the load) say which of the two is one too many.
+
     Args:
         search: fits.
         fitted: the model.
         others: parameters of the effect beside its strength.
     """
-    fixed = fitted.signature.fixed if fitted.signature else {}
-    for p in others:
+    item = fitted.signature
+    if item is None:
+        return fitted
+
+    def is_open(name: str) -> bool:
         estimate = fitted.estimate
-        if p.name not in estimate.values or estimate.identifiable[estimate.problem.index(p.name)]:
+        return not estimate.identifiable[estimate.problem.index(name)]
+
+    for p in others:
+        if not is_open(item.strength.name):
+            break
+        if p.name not in fitted.estimate.values or not is_open(p.name):
             continue
-        value = fixed.get(p.name, p.nominal)
+        value = item.fixed.get(p.name, p.nominal)
         less = search.held(fitted, p.name, value)
         if less is not None and search.gain(less, fitted) <= GATE:
             search.say(f"{p.name} = {value:g} {p.unit}: the data do not tell it from the others")
