@@ -21,6 +21,7 @@ from .adding import made_of
 from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
+from .established import examined
 from .exchange import elsewhere, reconsidered, simplified
 from .experiment import propose
 from .facts import Table
@@ -214,7 +215,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     """The verdict on all fits; the set that it proposes is fitted to the end before it is named."""
     rounds, ended = search.rounds, result.ended
     forces = {frozenset[str](): result.located} if result.located else {}
-    current = search.examined(current, candidates_of(rounds))
+    current = examined(search, current, candidates_of(rounds))
     declared = search.memo.get(frozenset())
     assert declared is not None
     simple: set[frozenset[str]] = set()
@@ -233,7 +234,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
             known = search.memo.get(labels)
             assert known is not None
             search.say(f"do fewer laws do as well? {', '.join(sorted(labels))}")
-            search.examined(known, candidates_of(rounds))
+            examined(search, known, candidates_of(rounds))
         if fewer:
             result.table = table_of(search, rounds, forces, ended)
             place = proposal(result.table)

@@ -6,12 +6,19 @@ start values of the runs, or beside moments that no model gets right.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from ..errors import CosimError
+from .candidates import Candidate
+from .composed import composed
 from .exchange import challenged
 from .late import LateFitter
 from .models import GATE, Fitted, compare
+from .redundant import at_usual
 from .rounds import Round
-from .verdict import HAIR
+from .verdict import HAIR, wanted
 
 PART = 0.2
 """Share of what a model leaves beyond noise that a further effect must explain where runs may turn
@@ -95,3 +102,76 @@ def needed(search: LateFitter, base: Fitted, stage: Round) -> None:
         found.effects, found.signature = base.effects, base.signature
         found.gate, found.p_value = base.gate, base.p_value
         stage.base = found
+
+
+def examined(search: LateFitter, fitted: Fitted, candidates: int) -> Fitted:
+    """The model without effects that may be absent, or that unused runs do not miss.
+
+    What it is without each of the others has been fitted, and is in the memo.
+
+    Args:
+        search: fits and judges.
+        fitted: the model, with intervals.
+        candidates: number of effects that there were to choose from.
+    """
+
+    def missed(effect: Candidate) -> bool:
+        law = search.law(fitted, effect)
+        return law.there and wanted(law.missed, candidates)
+
+    for effect in fitted.effects if len(fitted.effects) > 1 else ():
+        try:
+            less = search.without(fitted, effect)
+        except CosimError as error:  # it is needed
+            search.say(f"without {effect.label}: {error}")
+            search.memo.failed.add(fitted.labels - {effect.label})
+            continue
+        if missed(effect):
+            less = search.approached(less, fitted, fitted)
+        if missed(effect):
+            less = freed(search, less, fitted)
+        if not missed(effect):
+            search.say(f"dropped again: {effect.label}")
+            return examined(search, search.sharpened(less, fitted), candidates)
+    return fitted
+
+
+def freed(search: LateFitter, less: Fitted, fitted: Fitted) -> Fitted:
+    """A model with all parameters of its effects, from where one with a further effect ended.
+
+    A payload that stands aside is a payload in the middle and a shift of the load: parameters that
+    nothing asked for beside the one law are what does the work of the other.
+
+    Args:
+        search: fits and judges.
+        less: the model as it is.
+        fitted: with the further effect.
+    """
+    problem = composed(search.raw, fitted, less.effects)
+    whole = composed(search.raw, fitted, ())
+    for effect in less.effects:
+        whole = effect.added_to(whole)
+    held = [p for p in whole.parameters if p.name not in problem.names]
+    if not held:
+        return less
+    values = {**problem.constants, **fitted.estimate.values}
+    spans = {p.name: p.span for p in problem.parameters}
+    whole = whole.with_parameters(
+        [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
+    )
+    theta = np.array([values.get(name, p.nominal) for name, p in zip(
+        whole.names, whole.parameters, strict=True)])  # fmt: skip
+    try:
+        found = search.fitted(search.simulator.of(whole), theta, fitted.estimate)
+    except CosimError as error:
+        search.say(f"with {', '.join(p.name for p in held)}: {error}")
+        return less
+    found.effects, found.signature = less.effects, less.signature
+    found = search.approached(found, fitted, fitted)
+    if search.gain(less, found) <= GATE:
+        return less
+    found = at_usual(search, found, {p.name: values.get(p.name, p.nominal) for p in held})
+    more = [p.name for p in held if p.name in found.estimate.values]
+    search.say(f"{', '.join(more)} instead of a further effect")
+    search.note(found)
+    return found

@@ -26,7 +26,6 @@ from .models import GATE, Fitted, absent, compare, is_open
 from .redundant import without_redundant
 from .secant import FLOOR, patience
 from .signature import Signature
-from .verdict import wanted
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -469,30 +468,3 @@ class Fitter(Judge):
         result.signature = fitted.signature
         self.note(result)
         return result
-
-    def examined(self, fitted: Fitted, candidates: int) -> Fitted:
-        """The model without effects that may be absent, or that unused runs do not miss.
-
-        What it is without each of the others has been fitted, and is in the memo.
-
-        Args:
-            fitted: the model, with intervals.
-            candidates: number of effects that there were to choose from.
-        """
-        for effect in fitted.effects if len(fitted.effects) > 1 else ():
-            try:
-                less = self.without(fitted, effect)
-            except CosimError as error:  # it is needed
-                self.say(f"without {effect.label}: {error}")
-                self.memo.failed.add(fitted.labels - {effect.label})
-                continue
-            if self._missed(fitted, effect, candidates):
-                less = self.approached(less, fitted, fitted)
-            if not self._missed(fitted, effect, candidates):
-                self.say(f"dropped again: {effect.label}")
-                return self.examined(self.sharpened(less, fitted), candidates)
-        return fitted
-
-    def _missed(self, fitted: Fitted, effect: Candidate, candidates: int) -> bool:
-        law = self.law(fitted, effect)
-        return law.there and wanted(law.missed, candidates)

@@ -6,7 +6,7 @@ both are open, and the interval of the strength holds absence though the law is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from ..calibrate.parts import Parameter
@@ -40,20 +40,37 @@ def without_redundant(search: Fits, fitted: Fitted, others: Sequence[Parameter])
     item = fitted.signature
     if item is None:
         return fitted
+    usual = {p.name: item.fixed.get(p.name, p.nominal) for p in others}
+    return at_usual(search, fitted, usual, lambda now: is_open(now, item.strength.name))
 
-    def is_open(name: str) -> bool:
-        estimate = fitted.estimate
-        return not estimate.identifiable[estimate.problem.index(name)]
 
-    for p in others:
-        if not is_open(item.strength.name):
+def at_usual(
+    search: Fits,
+    fitted: Fitted,
+    usual: Mapping[str, float],
+    wanted: Callable[[Fitted], bool] = lambda now: True,
+) -> Fitted:
+    """A model with open parameters at their usual values, one after another, if nothing is lost.
+
+    Args:
+        search: fits.
+        fitted: the model.
+        usual: values of parameters, which may be free.
+        wanted: whether to go on.
+    """
+    for name, value in usual.items():
+        if not wanted(fitted):
             break
-        if p.name not in fitted.estimate.values or not is_open(p.name):
+        if name not in fitted.estimate.values or not is_open(fitted, name):
             continue
-        value = item.fixed.get(p.name, p.nominal)
-        less = search.held(fitted, p.name, value)
+        less = search.held(fitted, name, value)
         if less is not None and search.gain(less, fitted) <= GATE:
-            search.say(f"{p.name} = {value:g} {p.unit}: the data do not tell it from the others")
+            search.say(f"{name} = {value:g}: the data do not tell it from the others")
             less.effects, less.signature = fitted.effects, fitted.signature
             fitted = less
     return fitted
+
+
+def is_open(fitted: Fitted, name: str) -> bool:
+    """Whether the data leave a parameter open."""
+    return not fitted.estimate.identifiable[fitted.estimate.problem.index(name)]

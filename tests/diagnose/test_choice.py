@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.simulator import Simulator
+from cosim.diagnose.established import examined
 from cosim.diagnose.exchange import kin
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
@@ -206,7 +207,7 @@ def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
     model: Any = SimpleNamespace(
         effects=(needed, last), labels=frozenset((needed.label, last.label))
     )
-    assert Search.examined(search, model, 80) is model
+    assert examined(search, model, 80) is model
     assert memo.failed == {frozenset({needed.label}), frozenset({last.label})}
     assert said == ["without delay at motor.command: unstable", "without b: unstable"]
 

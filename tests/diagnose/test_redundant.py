@@ -48,7 +48,7 @@ def test_a_parameter_that_undoes_the_strength_keeps_its_usual_value() -> None:
     found = without_redundant(search, model({"r_th": False, "alpha": False, "t_th": True}), OTHERS)
     assert search.asked == {"alpha": 5e-3}  # as the effect was tried with, not the nominal value
     assert set(found.estimate.values) == {"r_th", "t_th"} and found.effects == ("heating",)
-    assert search.said == ["alpha = 0.005 1/K: the data do not tell it from the others"]
+    assert search.said == ["alpha = 0.005: the data do not tell it from the others"]
 
 
 @pytest.mark.parametrize(
