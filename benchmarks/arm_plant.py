@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, drawn_form, parameters
+from benchmarks.bench import Bench, beside, drawn_form, parameters
 
 Vector = NDArray[np.float64]
 TICK, SAMPLE, HOLD = 5e-4, 8e-3, 2.0
@@ -65,15 +65,14 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
 }
 """Name -> size, and the names of the catalogue that are the same law; none: no catalogue has it.
 
-At joint 2: coulomb [N.m], stribeck, load_friction, warm_up, heating (rise of R, after a minute of
-5 A), soft_gear [rad/(N.m)], gear_error (link behind motor, [rad], twice per turn of the motor). At
-joint 3: asymmetric_coulomb (share of 4 N.m), wave_gear, current_offset. At joint 1: quadratic
-[N.m s2/rad2], asymmetric_viscous, brushes [V], unbalance [N.m] about the upright axis (nothing
-turns there but what a tilted axis would: at joint 4), rail (its viscous friction changes by this
-share with the sine of its angle). hose, cogging, encoder_turned: at joint 4 or 5. current_gain,
-speed_gain: the log's of joint 2, in no loop. payload: [kg] on the flange. cable: [N] from the
-flange to a point of the room. wrist_coupling: joint 6 is turned by joint 5 through this share of
-its torque. heavy_link: the forearm has this much more mass, at its elbow.
+Joint 1: asymmetric_viscous, quadratic [N.m s2/rad2], brushes [V], rail (its viscous friction
+changes by this share with the sine of its angle). Joint 2: coulomb [N.m], stribeck, load_friction,
+warm_up, heating (share of R that 5 A add in the long run), soft_gear [rad/(N.m)], gear_error (of
+the link behind the motor [rad], twice per turn of the motor). Joint 3: asymmetric_coulomb (share of
+4 N.m), wave_gear, current_offset. Joint 4: hose, encoder_turned. Joint 5: cogging, unbalance [N.m].
+In no loop: current_gain, speed_gain of joint 2, current_offset. payload: [kg] on the flange. cable:
+[N] from the flange to a point of the room. wrist_coupling: joint 6 is turned by joint 5 through
+this share of its torque. heavy_link: the forearm has this much more mass.
 """
 USUAL = {"stribeck": 0.1, "warm_up": 120.0, "heating": 60.0, "cogging": 60.0, "hose": 0.5}
 SHAPES: dict[str, tuple[float, float]] = {
@@ -398,16 +397,7 @@ def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, d
     twins = [Bench(bench.parameters) for bench in benches]
     chosen = runs(seed)
     values = simulate([*benches, *twins], chosen, seconds)
-    count = 2 * len(benches)
-    found: list[dict[str, dict[str, Vector]]] = []
-    for column in range(len(benches)):
-        entry = {}
-        for k, run in enumerate(chosen):
-            mine, twin = k * count + column, k * count + column + len(benches)
-            rows = slice(0, min(len(run.angles), round(seconds / SAMPLE) + 1))
-            entry[run.name] = {n: v[rows, mine] - v[rows, twin] for n, v in values.items()}
-        found.append(entry)
-    return found
+    return beside(values, [(run.name, len(run.angles)) for run in chosen], len(benches))
 
 
 def write_sets(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,3 +91,26 @@ def camera(poses: Vector, skew: Vector, late: Vector, sample: float) -> Vector:
         for k in range(3):
             seen[:, k, column] = np.interp(when, times, poses[:, k, column])
     return seen
+
+
+def beside(
+    values: Mapping[str, Vector], runs: Sequence[tuple[str, int]], count: int
+) -> list[dict[str, dict[str, Vector]]]:
+    """How individuals differ from their twins: for each, run -> channel -> values.
+
+    Args:
+        values: channel -> (times, columns): of each run all individuals, then all their twins.
+        runs: names, and how many samples count.
+        count: number of individuals.
+    """
+    return [
+        {
+            name: {
+                channel: table[:rows, 2 * k * count + column]
+                - table[:rows, (2 * k + 1) * count + column]
+                for channel, table in values.items()
+            }
+            for k, (name, rows) in enumerate(runs)
+        }
+        for column in range(count)
+    ]

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, camera, drawn_form, parameters
+from benchmarks.bench import Bench, beside, camera, drawn_form, parameters
 
 Vector = NDArray[np.float64]
 STEP, TICKS, SAMPLE = 5e-5, 20, 0.01  # mechanics; steps per control period; of the log [s]
@@ -362,16 +362,7 @@ def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, d
     twins = [Bench(bench.parameters) for bench in benches]
     chosen = runs(seed)
     values = _channels(simulate([*benches, *twins], chosen, seconds), exact=True)
-    count = 2 * len(benches)
-    found: list[dict[str, dict[str, Vector]]] = []
-    for column in range(len(benches)):
-        entry = {}
-        for k, run in enumerate(chosen):
-            mine, twin = k * count + column, k * count + column + len(benches)
-            rows = slice(0, min(len(run.twist), round(seconds / SAMPLE) + 1))
-            entry[run.name] = {n: v[rows, mine] - v[rows, twin] for n, v in values.items()}
-        found.append(entry)
-    return found
+    return beside(values, [(run.name, len(run.twist)) for run in chosen], len(benches))
 
 
 def write_sets(

@@ -254,11 +254,9 @@ class Problem:
         values = {**assigned.known, **set_here}
         for error, starts in self.readings.items():
             if off := values.get(error, 0.0):
-                for name, factor in starts.items():
-                    if (
-                        name in values and name not in set_here
-                    ):  # an estimated start is the true one
-                        values[name] -= factor * off
+                # an estimated start is the true one
+                for name in starts.keys() & values.keys() - set_here.keys():
+                    values[name] -= starts[name] * off
         return values
 
     def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
