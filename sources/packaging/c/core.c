@@ -255,53 +255,26 @@ static void release(Instance *c) {
   free(c);
 }
 
-enum { ROW = 6 }; /* so many neighbours are worth being moved together */
-#if defined(__clang__) /* one by one: a wide load waits until what has just been written in parts is in the cache */
-#define ONE_BY_ONE _Pragma("clang loop vectorize(disable) unroll_count(4)")
-#else
-#define ONE_BY_ONE
-#endif
-
-static inline void move(double *to, const double *from, size_t n) {
-  ONE_BY_ONE
-  for (size_t i = 0; i < n; i++) to[i] = from[i];
-}
-
-/* How many of these value references, of n >= ROW and no more than `most`, follow each other; 1 if few. */
-static size_t in_a_row(const uint32_t vr[], size_t n, size_t most) {
-  size_t length = 1;
-  if (n > most) n = most;
-  while (length < n && vr[length] == vr[0] + length) length++;
-  return length < ROW ? 1 : length;
-}
-
 static int get_values(Instance *c, const uint32_t vr[], size_t n, double values[]) {
 #if INTERMEDIATE
   if (n && c->m.mode == UPDATING) return only_in(c, 0, "getting a value");
 #endif
   double *const v = c->m.v;
+  const uint32_t first = c->first;
   for (size_t i = 0; i < n;) {
-    const uint32_t k = vr[i] - c->first;
+    const uint32_t k = vr[i] - first;
     if (k >= METHOD && (k >= NV || k == METHOD))
       return report(c, ERROR, "%s: value reference %u is no real variable", MODEL, vr[i]);
     if (c->m.stale && k >= IXD && k < IP && !(k >= IU && k < IY)) refresh_for(c, k);
-    if (n - i >= ROW) { /* what follows may be as fresh: the rest of a vector */
-      const char *known = c->m.stale == COUPLED_DONE ? ASKED : c->m.stale == QUICK_DONE ? QUICK : 0;
-      size_t row = 1;
-      if (c->m.stale == FRESH && k < METHOD) row = in_a_row(vr + i, n - i, METHOD - k);
-      else if (known && k >= IY && k < IP)
-        while (row < n - i && vr[i + row] == vr[i] + row && k + row < IP && known[k + row - IY]) row++;
-      int odd = 0;
-      ONE_BY_ONE
-      for (size_t j = 0; j < row; j++) odd |= !(fabs(v[k + j]) <= DBL_MAX);
-      move(values + i, v + k, row);
-      if (odd) return check_finite(c, k, (int)row);
-      i += row;
-      continue;
+    values[i++] = v[k];
+    if (!(fabs(v[k]) <= DBL_MAX)) return check_finite(c, k, 1);
+    if (c->m.stale == ALL) continue;
+    const char *const known = c->m.stale == QUICK_DONE ? QUICK : ASKED;
+    for (; i < n; i++) { /* the hot path, in one pass: outputs that are as fresh */
+      const uint32_t y = vr[i] - first - IY;
+      if (y >= NY || (c->m.stale && !known[y]) || !(fabs(v[IY + y]) <= DBL_MAX)) break;
+      values[i] = v[IY + y];
     }
-    const double value = v[k];
-    values[i++] = value;
-    if (!isfinite(value)) return check_finite(c, k, 1);
   }
   return OK;
 }
@@ -354,35 +327,24 @@ static int set_any(Instance *c, const uint32_t vr[], size_t n, const double valu
 }
 
 static int set_values(Instance *c, const uint32_t vr[], size_t n, const double values[]) {
-  double *v = c->m.v;
-  if (n && c->m.mode >= TERMINATED) return only_in(c, 0, "setting a value");
-  for (size_t i = 0; i < n;) {
-    const uint32_t k = vr[i] - c->first;
-    if (k < IU || k >= IY || !isfinite(values[i])) return set_any(c, vr + i, n - i, values + i);
-    /* the hot path: inputs, from now on held */
-    const size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
-    if (row == 1) {
-      if (v[k] != values[i] && !UPDATED(c)) c->m.stale = ALL;
-      v[k] = values[i++];
-      if (c->m.moving) c->m.slope[k - IU] = c->m.curve[k - IU] = 0;
-      continue;
-    }
-    int changed = 0, odd = 0;
-    ONE_BY_ONE
-    for (size_t j = 0; j < row; j++) {
-      changed |= v[k + j] != values[i + j];
-      odd |= !(fabs(values[i + j]) <= DBL_MAX);
-    }
-    if (odd) return set_any(c, vr + i, n - i, values + i);
-    if (changed && !UPDATED(c)) c->m.stale = ALL;
-    move(v + k, values + i, row);
-    if (c->m.moving) {
-      memset(c->m.slope + k - IU, 0, row * sizeof *v);
-      memset(c->m.curve + k - IU, 0, row * sizeof *v);
-    }
-    i += row;
+  Memory *const m = &c->m;
+  double *const v = m->v;
+  if (n && m->mode >= TERMINATED) return only_in(c, 0, "setting a value");
+  const uint32_t first = c->first + IU;
+  const int moving = m->moving;
+  int changed = 0;
+  size_t i = 0;
+  /* the hot path, in one pass: inputs, from now on held */
+  for (; i < n; i++) {
+    const uint32_t k = vr[i] - first;
+    const double value = values[i];
+    if (k >= NU || !(fabs(value) <= DBL_MAX)) break;
+    changed |= v[IU + k] != value;
+    v[IU + k] = value;
+    if (moving) m->slope[k] = m->curve[k] = 0;
   }
-  return OK;
+  if (changed && !UPDATED(c)) m->stale = ALL;
+  return i < n ? set_any(c, vr + i, n - i, values + i) : OK;
 }
 
 /* Derivatives of inputs, which move with them until they are set again. */
@@ -390,33 +352,16 @@ static int set_input_derivatives(Instance *c, const uint32_t vr[], size_t n, con
   Memory *m = &c->m;
   const unsigned modes = IN(INITIALIZING) | IN(STEPPING);
   if (n && only_in(c, modes, "setting derivatives of inputs") != OK) return ERROR;
-  for (size_t i = 0; i < n;) {
-    const uint32_t k = vr[i];
-    if (k < IU || k >= IY) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, k);
+  for (size_t i = 0; i < n; i++) {
+    const uint32_t k = vr[i] - IU;
+    if (k >= NU) return report(c, ERROR, "%s: value reference %u is no input with derivatives", MODEL, vr[i]);
     if (order[i] < 1 || order[i] > 2)
-      return report(c, ERROR, "%s: derivative of order %d of input %s; must be 1 or 2", MODEL, order[i], NAMES[k]);
-    size_t row = n - i >= ROW ? in_a_row(vr + i, n - i, IY - k) : 1;
-    int odd = 0, other = 0;
-    ONE_BY_ONE
-    for (size_t j = 0; j < row; j++) {
-      other |= order[i + j] != order[i];
-      odd |= !(fabs(values[i + j]) <= DBL_MAX);
-    }
-    if (other) row = 1;
-    if (row == 1 && isfinite(values[i])) {
-      (order[i] == 1 ? m->slope : m->curve)[k - IU] = values[i];
-      m->moving = 1;
-      i++;
-      continue;
-    }
-    if (odd)
-      for (size_t j = 0; j < row; j++)
-        if (!isfinite(values[i + j]))
-          return report(c, ERROR, "%s: a derivative of input %s cannot be set to %g at time %.9g s: not finite", MODEL,
-                        NAMES[k + j], values[i + j], m->v[0]);
-    move((order[i] == 1 ? m->slope : m->curve) + k - IU, values + i, row);
+      return report(c, ERROR, "%s: derivative of order %d of input %s; must be 1 or 2", MODEL, order[i], NAMES[vr[i]]);
+    if (!(fabs(values[i]) <= DBL_MAX))
+      return report(c, ERROR, "%s: a derivative of input %s cannot be set to %g at time %.9g s: not finite", MODEL,
+                    NAMES[vr[i]], values[i], m->v[0]);
+    (order[i] == 1 ? m->slope : m->curve)[k] = values[i];
     m->moving = 1;
-    i += row;
   }
   return OK;
 }
