@@ -22,7 +22,6 @@ from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
 from .established import examined
-from .exchange import elsewhere, reconsidered, simplified
 from .experiment import propose
 from .facts import Table
 from .foreign import Adapter, attached
@@ -35,6 +34,7 @@ from .localise import localise
 from .models import Fitted, is_open
 from .power import power
 from .result import PURPOSES, Diagnosis
+from .rivals import elsewhere, reconsidered, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of

@@ -10,8 +10,8 @@ import pytest
 
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.established import examined
-from cosim.diagnose.exchange import kin
 from cosim.diagnose.linear import SampleStack
+from cosim.diagnose.rivals import kin
 from cosim.diagnose.search import Search
 from cosim.diagnose.secant import PATIENCE
 from cosim.diagnose.shortlist import REFITS, promising
@@ -127,8 +127,8 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
         raise CosimError("unstable")
 
     simulator = SimpleNamespace(costs={}, limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.released", fail)
+    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
+    monkeypatch.setattr("cosim.diagnose.late_values.released", fail)
     estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
     problem = SimpleNamespace(runs=(), late=())
     winner: Any = SimpleNamespace(problem=problem, simulator=simulator, estimate=estimate)
@@ -153,10 +153,10 @@ def test_start_values_stay_where_a_joint_fit_loses_them(
         return SimpleNamespace(problem=None, simulator=simulator, estimate=estimate)
 
     simulator = SimpleNamespace(limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.released", lambda *_: (simulator, None, 5.0))
-    monkeypatch.setattr("cosim.diagnose.late.late_estimated", lambda _: True)
-    monkeypatch.setattr("cosim.diagnose.late.patience", lambda _: {})
+    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
+    monkeypatch.setattr("cosim.diagnose.late_values.released", lambda *_: (simulator, None, 5.0))
+    monkeypatch.setattr("cosim.diagnose.late_values.late_estimated", lambda _: True)
+    monkeypatch.setattr("cosim.diagnose.late_values.patience", lambda _: {})
     said: list[str] = []
     search: Any = SimpleNamespace(
         raw=SimpleNamespace(late=(1,)), lacking=lambda f: f.estimate.robust > 4.0, say=said.append,

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, cast
 import pytest
 
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.exchange import MOST, _alike, _others, restarted
 from cosim.diagnose.models import GATE, Gate
+from cosim.diagnose.rivals import MOST, _alike, _others, restarted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import CLOSE, Search
 from tests.problems import simulator
@@ -158,8 +158,8 @@ def test_a_general_law_begins_where_a_simpler_one_has_done_better(
         retried=retried, sharper=lambda fitted, base: fitted, say=lambda text: None,
         check_data=None, checking=None,
     )  # fmt: skip
-    monkeypatch.setattr("cosim.diagnose.exchange.exchanged", lambda *_: rough("a", reached))
-    monkeypatch.setattr("cosim.diagnose.exchange.compare", lambda *_: None)
+    monkeypatch.setattr("cosim.diagnose.rivals.exchanged", lambda *_: rough("a", reached))
+    monkeypatch.setattr("cosim.diagnose.rivals.compare", lambda *_: None)
     known = [] if simple is None else [rough("coulomb", simple)]
     found = restarted(cast(Any, search), general, rough("", 9e9), known)
     assert bool(begun) is anew
