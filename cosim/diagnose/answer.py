@@ -104,10 +104,11 @@ class Verdict:
                 "beyond noise. The gain holds on runs that were not used for fitting, and no other "
                 "effect of the catalogue does as well."
             )
-            return text + tail + self._ended()
+            return text + self._elsewhere() + tail + self._ended()
         if self.kind == "confounded":
             others = ", ".join(" and ".join(labels) for labels in self.others)
-            return f"{names} {explain} the data, but so does {others}.{tail}{self._ended()}"
+            text = f"{names} {explain} the data, but so does {others}."
+            return text + self._elsewhere() + tail + self._ended()
         if self.kind == "nothing_missing":
             return (
                 "The calibrated model leaves noise in all channels, and no effect of the catalogue "
@@ -127,6 +128,12 @@ class Verdict:
                 f"{percent(self.force.explained)} of it in the worst run."
             )
         return text + self._ended()
+
+    def _elsewhere(self) -> str:
+        return "".join(
+            f" The data do not tell {label} from the same at {', '.join(places)}."
+            for label, places in self.places.items()
+        )
 
     def _ended(self) -> str:
         if not self.ended:

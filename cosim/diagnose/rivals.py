@@ -24,11 +24,11 @@ from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .composed import composed
 from .fitter import QUICKLY
-from .judge import ALIKE, Judge
 from .late_values import LateValueFitter
 from .models import GATE, Fitted, compare, more_general
 from .probes import single
 from .rounds import Round
+from .shortlist import kin
 from .signature import HIDDEN, Signature, unscored
 
 Vector = NDArray[np.float64]
@@ -275,26 +275,6 @@ def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
             settled = {best.effects[-1]: best}  # others were fitted from a poor place
         winner = best  # its places and simpler laws have not been compared yet
     return winner
-
-
-def kin(judge: Judge, base: Fitted, stage: Round) -> list[Signature]:
-    """Twins of what was fitted that the winner must be compared with: they have not been.
-
-    To first order they are one, but where an effect explains millions of nats, what differs in
-    the sixth digit tells its place, and a simpler law there from the winner.
-    """
-    winner = stage.winner
-    if winner is None or winner.signature is None:
-        return []
-    if ALIKE * judge.total(base, winner) < GATE:
-        return []
-    last, tuned = winner.effects[-1], winner.signature.tuned
-    twins = [t for f in stage.fitted if f.signature is not None for t in f.signature.twins]
-    return [
-        t for t in twins
-        if t.candidate.effect == last.effect
-        or (t.candidate.place == last.place and t.tuned < tuned)
-    ]  # fmt: skip
 
 
 def _alike(
