@@ -7,7 +7,8 @@
     confounded       it does, and the data do not tell another set from it that has no more laws,
                      each of them there; the other set is not asked whether it stands up
     nothing_missing  no set stands up, and the declared model leaves noise
-    unexplained      anything else, with the nearest laws as hints; a hint is not a name
+    unexplained      anything else, with the nearest laws as hints; a hint is not a name. A search
+                     that was stopped ends so, too: rivals have not been asked
 
 Sentence, tables and JSON are written from the same facts: `answer.Verdict`.
 """
@@ -56,15 +57,15 @@ def decide(table: Table) -> Verdict:
     if table.errors:
         return Verdict("bad_data", errors=table.errors)
     declared, unused = table.models[0], table.unused_count > 0
-    best = proposal(table)
+    best = None if table.stopped else proposal(table)
     if best is not None and stands(table, best) and beaten(table, best) is None:
         return _named(table, best)
     left = above(declared)
-    if best is None and not left:
+    if best is None and not left and not table.stopped:
         return Verdict("nothing_missing", unused=unused, ended=table.ended)
     force = declared.forces[0] if declared.forces else None
     return Verdict("unexplained", left=left, hints=_hints(table), force=force, unused=unused,
-                   ended=table.ended)  # fmt: skip
+                   ended=table.ended, stopped=table.stopped)  # fmt: skip
 
 
 def proposal(table: Table) -> int | None:
@@ -402,6 +403,8 @@ def _hints(table: Table) -> tuple[Hint, ...]:
             continue
         left = above(model)
         why = doubts(table, model)
+        if table.stopped:
+            why.append("not all others were asked")
         if not why and (better := beaten(table, i)) is not None:
             names = ", ".join(law.label for law in table.models[better].laws)
             why.append(f"{names} does better, and cannot be named")
