@@ -18,6 +18,7 @@ import numpy as np
 
 from ..master.elsewhere import Elsewhere, Workers
 from ..master.session import RUNAWAY, Session
+from .budget import Budget
 from .parts import Vector
 
 MOST = 128
@@ -63,9 +64,14 @@ class Ran(NamedTuple):
 
 
 class SessionPool:
-    """Idle sessions and what they gave, the ones used last."""
+    """Idle sessions and what they gave, the ones used last.
 
-    def __init__(self) -> None:
+    Args:
+        budget: how much may be simulated; no limit if not given.
+    """
+
+    def __init__(self, budget: Budget | None = None) -> None:
+        self.budget = budget or Budget()
         self._lock = threading.Lock()
         self._ran: OrderedDict[tuple[Key, Hashable], Ran] = OrderedDict()
         self._size = 0

@@ -21,6 +21,7 @@ from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
+from .budget import Budget
 from .parts import CLOCK, COINCIDENT, DRIFT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
@@ -69,6 +70,11 @@ class Simulator:
     def limited(self, limits: Mapping[str, float]) -> Simulator:
         """The same with these limits instead."""
         return Simulator(self.problem, workers=self.workers, limits=limits, pool=self._pool)
+
+    @property
+    def budget(self) -> Budget:
+        """How much may be simulated, by all simulators with these sessions."""
+        return self._pool.budget
 
     # -- one run -----------------------------------------------------------------------------------
 
@@ -119,6 +125,7 @@ class Simulator:
 
         Raises:
             StepError: an FMU failed, or the run exceeded its limit.
+            StoppedError: no more may be simulated, see `Budget`.
             ValueRangeError: a value outside the bounds that its FMU declares.
         """
         problem = self.problem
@@ -144,6 +151,7 @@ class Simulator:
         found = []
         try:
             for given in inputs:
+                self.budget.spend()
                 session.drive(given)
                 times, rows = session.run(problem.values(theta, run))
                 ran = Ran(session.names, times, rows, session.work, run.inputs)
@@ -191,6 +199,7 @@ class Simulator:
         which = frozenset((values | clocks).items())
         if (known := self._pool.ran(key, which, limit)) is not None:
             return known
+        self.budget.spend()
         with self._lock:
             session = self._pool.take(key)
             if later:

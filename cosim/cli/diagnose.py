@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +23,7 @@ from .streams import print_json
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..calibrate.budget import Budget
     from ..diagnose import Diagnosis
     from ..diagnose.further import Further
 
@@ -53,6 +58,14 @@ def diagnose_command(
             "should end as unexplained, not with a wrong name. Repeatable.",
         ),
     ] = None,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Simulated runs at most; what is found until then is reported, "
+            "as after Ctrl-C [no limit].",
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON value to stdout.")
     ] = False,
@@ -61,6 +74,7 @@ def diagnose_command(
 
     Example: `cosim diagnose MB-12 --out out/MB-12`
     """
+    from ..calibrate.budget import Budget
     from ..calibrate.mapping import read_problem
     from ..diagnose import diagnose
     from ..report.page import write_page
@@ -76,10 +90,15 @@ def diagnose_command(
             stage = text
             display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
 
-        with display.watch("diagnosing", lambda: stage if display.on_terminal else ""):
+        budget = Budget(runs)
+        with (
+            display.watch("diagnosing", lambda: stage if display.on_terminal else ""),
+            _ended_by_hand(budget, display.say),
+        ):
             result = diagnose(
-                problem, folder, told, workers=workers, without=without or (), law_at=law_from_data
-            )
+                problem, folder, told, workers=workers, without=without or (),
+                law_at=law_from_data, budget=budget,
+            )  # fmt: skip
     page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
     result.files += [models, page, table]
     write_page(result, page)
@@ -90,6 +109,26 @@ def diagnose_command(
         print_json(content)
     else:
         _print(result)
+
+
+@contextmanager
+def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]:
+    """Ctrl-C ends the search and reports; a second one ends the program."""
+
+    def end(*_: object) -> None:
+        if budget.stopped:
+            raise KeyboardInterrupt
+        budget.stop("by hand")
+        say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")
+
+    if threading.current_thread() is not threading.main_thread():  # gets no signals
+        yield
+        return
+    before = signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _print(result: Diagnosis) -> None:

@@ -72,7 +72,7 @@ class Verdict:
         hints: nearest sets, of `unexplained`.
         force: the free force that explains most of the rest.
         unused: whether there were unused runs.
-        errors, ended: see `Table`.
+        errors, ended, stopped: see `Table`.
     """
 
     kind: str
@@ -89,6 +89,7 @@ class Verdict:
     unused: bool = True
     errors: tuple[str, ...] = ()
     ended: tuple[tuple[str, float], ...] = ()
+    stopped: str = ""
 
     @property
     def reason(self) -> str:
@@ -104,10 +105,11 @@ class Verdict:
                 "beyond noise. The gain holds on runs that were not used for fitting, and no other "
                 "effect of the catalogue does as well."
             )
-            return text + tail + self._ended()
+            return text + self._elsewhere() + tail + self._ended()
         if self.kind == "confounded":
             others = ", ".join(" and ".join(labels) for labels in self.others)
-            return f"{names} {explain} the data, but so does {others}.{tail}{self._ended()}"
+            text = f"{names} {explain} the data, but so does {others}."
+            return text + self._elsewhere() + tail + self._ended()
         if self.kind == "nothing_missing":
             return (
                 "The calibrated model leaves noise in all channels, and no effect of the catalogue "
@@ -116,8 +118,12 @@ class Verdict:
                 else "The calibrated model leaves noise in all channels; no run was kept to judge "
                 "effects by."
             )
-        text = f"{tail.strip()} No effect of the catalogue can be named".strip()
-        text += "." if self.unused else ": no run was kept unused to judge by."
+        if self.stopped:
+            state = tail.strip() or "The calibrated model leaves noise in all channels."
+            text = f"{state} The search was stopped {self.stopped}, so no effect is named."
+        else:
+            text = f"{tail.strip()} No effect of the catalogue can be named".strip()
+            text += "." if self.unused else ": no run was kept unused to judge by."
         if self.hints:
             text += f" Nearest, but no name: {self.hints[0]}"
             text += "." if self.hints[0].left else f"; {self.hints[0].why[0]}."
@@ -127,6 +133,12 @@ class Verdict:
                 f"{percent(self.force.explained)} of it in the worst run."
             )
         return text + self._ended()
+
+    def _elsewhere(self) -> str:
+        return "".join(
+            f" The data do not tell {label} from the same at {', '.join(places)}."
+            for label, places in self.places.items()
+        )
 
     def _ended(self) -> str:
         if not self.ended:
@@ -167,6 +179,7 @@ class Verdict:
                 for labels, (_, score) in zip(self.others, self.rivals, strict=True)
             ],
             "hints": [hint.to_dict() for hint in self.hints],
+            "stopped": self.stopped,
         }
 
 

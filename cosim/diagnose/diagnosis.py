@@ -9,11 +9,13 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from ..calibrate.budget import Budget, StoppedError
 from ..calibrate.checks.examine import check_data, examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
 from ..calibrate.deferred import step_error
 from ..calibrate.input_noise import propagated
+from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
@@ -22,7 +24,6 @@ from .answer import Verdict
 from .bursts import bursts, times
 from .carriers import leave_fmus
 from .established import examined
-from .exchange import elsewhere, reconsidered, simplified
 from .experiment import propose
 from .facts import Table
 from .foreign import Adapter, attached
@@ -35,6 +36,7 @@ from .localise import localise
 from .models import Fitted, is_open
 from .power import power
 from .result import PURPOSES, Diagnosis
+from .rivals import elsewhere, reconsidered, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of
@@ -57,6 +59,7 @@ def diagnose(
     without: Iterable[str] = (),
     law_at: str = "",
     law: bool = True,
+    budget: Budget | None = None,
 ) -> Diagnosis:
     """Calibrate, look for what is missing, and judge: all that `cosim diagnose` does on a data set.
 
@@ -71,16 +74,41 @@ def diagnose(
             sources), and do not ask the catalogue.
         law: make one from the data where no law of the catalogue fits, too; takes several times as
             long as to see that none does.
+        budget: how much may be simulated. A search that it ends is `unexplained`, with what it has
+            found as hints.
 
     Raises:
-        CosimError: the declared system cannot be simulated, no effect of that name fits it, or no
-            law can enter there.
+        CosimError: the declared system cannot be simulated, no effect of that name fits it, no law
+            can enter there, or the budget ends before the declared parameters are fitted.
         UnknownNameError: there is no such place.
     """
     begun = time.perf_counter()
     problem, adapters = attached(problem)
     asked = site(problem, placed(law_at, adapters)) if law_at else None
-    simulator = Simulator(problem, workers=workers)
+    budget = budget or Budget()
+    try:
+        return _diagnosed(
+            problem, Simulator(problem, workers=workers, pool=SessionPool(budget)), asked, adapters,
+            out, say, without, law, begun,
+        )  # fmt: skip
+    except StoppedError as stopped:
+        raise CosimError(
+            f"{problem.name}: stopped {stopped}, before the declared parameters were fitted; there "
+            "is nothing to report yet, so let it go on for longer"
+        ) from stopped
+
+
+def _diagnosed(
+    problem: Problem,
+    simulator: Simulator,
+    asked: Site | None,
+    adapters: tuple[Adapter, ...],
+    out: Path | None,
+    say: Callable[[str], None],
+    without: Iterable[str],
+    law: bool,
+    begun: float,
+) -> Diagnosis:
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
         return _refused(problem, findings, begun)
@@ -129,6 +157,34 @@ def _searched(
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
+    result.asked = asked is not None
+    try:
+        _judged(result, search, _found(result, search, base, asked))
+        assert result.after is not None
+        if asked or (law and result.verdict == "unexplained"):
+            result.law = unnamed(search, result.after, result.located, asked)
+    except StoppedError as stopped:
+        _stopped(result, search, str(stopped))
+    assert result.after is not None
+    search.simulator.budget.over()
+    if not search.lacking(result.after):
+        sudden = bursts(search.fit_data - result.after.fit, search.fitting)
+        result.bursts = times(sudden, list(search.fitting.runs))
+    _tested(result)
+    if result.law is not None:
+        result.files += result.law.leave_fmu(out)
+    _look_further(result)
+    if out is not None and result.answer.laws:
+        result.files += leave_fmus(problem, result.after.effects, out, result.warnings)
+        made = made_of(problem, result.after)
+        result.files += leave_system(problem, adapters, made, out, result.warnings)
+    result.wall = time.perf_counter() - begun
+    return result
+
+
+def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) -> Fitted:
+    """The best model that rounds, and sets of effects along the log's motion, lead to."""
+    say = search.say
     current = base
     winners: list[Round] = []
     proposed, whole = asked is not None, None
@@ -179,24 +235,18 @@ def _searched(
         current = _together(result, current)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
-    _judged(result, search, current)
-    assert result.after is not None
-    if not search.lacking(result.after):
-        sudden = bursts(search.fit_data - result.after.fit, search.fitting)
-        result.bursts = times(sudden, list(search.fitting.runs))
-    _tested(result)
-    result.asked = asked is not None
-    if asked or (law and result.verdict == "unexplained"):
-        result.law = unnamed(search, result.after, result.located, asked)
-    if result.law is not None:
-        result.files += result.law.leave_fmu(out)
-    _look_further(result)
-    if out is not None and result.answer.laws:
-        result.files += leave_fmus(problem, result.after.effects, out, result.warnings)
-        made = made_of(problem, result.after)
-        result.files += leave_system(problem, adapters, made, out, result.warnings)
-    result.wall = time.perf_counter() - begun
-    return result
+    return current
+
+
+def _stopped(result: Diagnosis, search: Search, why: str) -> None:
+    """The verdict on the fits that there are; one that was reached before stays."""
+    search.say(f"stopped {why}")
+    if result.verdict:
+        result.warnings.append(f"no law was made from the data: stopped {why}")
+        return
+    forces = {frozenset[str](): result.located} if result.located else {}
+    result.table = table_of(search, search.rounds, forces, result.ended, why)
+    result.answer, result.after = decide(result.table), result.before
 
 
 def _together(result: Diagnosis, current: Fitted) -> Fitted:

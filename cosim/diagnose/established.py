@@ -13,10 +13,10 @@ import numpy as np
 from ..errors import CosimError
 from .candidates import Candidate
 from .composed import composed
-from .exchange import challenged
-from .late import LateFitter
+from .late_values import LateValueFitter
 from .models import GATE, Fitted, compare
 from .redundant import at_usual
+from .rivals import challenged
 from .rounds import Round
 from .verdict import HAIR, wanted
 
@@ -25,7 +25,7 @@ PART = 0.2
 unstable: moments that come too early are most of that, and any law moves them a little."""
 
 
-def settle(search: LateFitter, base: Fitted, stage: Round) -> None:
+def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """Replace a winner by a simpler law where nothing else of it is determined.
 
     Args:
@@ -44,7 +44,7 @@ def settle(search: LateFitter, base: Fitted, stage: Round) -> None:
     stage.follow(search.sharpened(stage.winner, base))
 
 
-def _simpler(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
+def _simpler(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
     """The best simpler law of the same quantity, if nothing else of the winner is determined."""
     winner = stage.winner
     assert winner is not None and winner.signature is not None
@@ -71,7 +71,7 @@ def _simpler(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
     return max(laws, key=lambda f: search.total(base, f), default=winner)
 
 
-def needed(search: LateFitter, base: Fitted, stage: Round) -> None:
+def needed(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """Take a further effect back that the model from where it ended does as well without.
 
     Only where runs may turn unstable. The round then has no winner, and perhaps a better base.
@@ -104,7 +104,7 @@ def needed(search: LateFitter, base: Fitted, stage: Round) -> None:
         stage.base = found
 
 
-def examined(search: LateFitter, fitted: Fitted, candidates: int) -> Fitted:
+def examined(search: LateValueFitter, fitted: Fitted, candidates: int) -> Fitted:
     """The model without effects that may be absent, or that unused runs do not miss.
 
     What it is without each of the others has been fitted, and is in the memo.
@@ -136,7 +136,7 @@ def examined(search: LateFitter, fitted: Fitted, candidates: int) -> Fitted:
     return fitted
 
 
-def freed(search: LateFitter, less: Fitted, fitted: Fitted) -> Fitted:
+def freed(search: LateValueFitter, less: Fitted, fitted: Fitted) -> Fitted:
     """A model with all parameters of its effects, from where one with a further effect ended.
 
     A payload that stands aside is a payload in the middle and a shift of the load: parameters that

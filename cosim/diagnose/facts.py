@@ -215,6 +215,7 @@ class Table:
             run was kept unused.
         errors: what makes the data useless.
         ended: run -> time from which it did not count for later laws.
+        stopped: why the search was ended before its end, "" if it was not.
     """
 
     models: tuple[Model, ...] = ()
@@ -224,6 +225,7 @@ class Table:
     unused_count: int = 0
     errors: tuple[str, ...] = ()
     ended: tuple[tuple[str, float], ...] = ()
+    stopped: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """For a file; `read` is the inverse."""

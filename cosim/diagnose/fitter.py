@@ -39,7 +39,7 @@ order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
 DOUBLINGS = 6
-"""Times at most that a strength to begin with is doubled."""
+"""Times at most that a strength to begin with is doubled, from the usual one up and down."""
 SHARP = 0.01
 """Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
 AGAIN, BRINGS = 3, 0.1
@@ -197,8 +197,10 @@ class Fitter(Judge):
         try:
             costs = [self.cost(simulator, theta) for theta in starts]
             first, *rest = [starts[i] for i in np.argsort(costs, kind="stable")]
-            if is_open(base.estimate):
-                first = self._doubled(simulator, first, min(costs), item.strength.name)
+            bend = abs(item.score.amplitude - 1.0) > EXACT and self.lacking(base)
+            if bend or is_open(base.estimate):
+                usual = item.strength.span if bend else 0.0
+                first = self._doubled(simulator, first, min(costs), item.strength.name, usual)
             result = self.fitted(simulator, first, base.estimate)
             if result.estimate.unkept > GATE:
                 result = self._elsewhere(simulator, rest, result)
@@ -225,21 +227,39 @@ class Fitter(Judge):
                 break
         return best
 
-    def _doubled(self, simulator: Simulator, theta: Vector, cost: float, name: str) -> Vector:
+    def _doubled(
+        self, simulator: Simulator, theta: Vector, cost: float, name: str, usual: float = 0.0
+    ) -> Vector:
         """A place to begin with a larger strength, as long as that is better.
 
-        First orders ask for too little of what shifts oscillations, such as play.
+        First orders ask for too little of what shifts oscillations, such as play, and a little of
+        it may do more harm than none: up to the usual strength all are tried.
+
+        Args:
+            simulator: of the problem.
+            theta: where to begin else.
+            cost: there.
+            name: of the strength.
+            usual: where it is, 0 if the first order holds.
         """
         problem = simulator.problem
         place = problem.index(name)
-        for _ in range(DOUBLINGS):
-            trial = theta.copy()
-            trial[place] = np.clip(2.0 * theta[place], problem.lower[place], problem.upper[place])
-            now = self.cost(simulator, trial)
-            if not now < cost - GATE:
+        low, high = problem.lower[place], problem.upper[place]
+        trial, best = theta.copy(), theta
+        least = 0.5**DOUBLINGS * usual
+        for _ in range(2 * DOUBLINGS):
+            size = 2.0 * trial[place]
+            trial = trial.copy()
+            trial[place] = np.clip(max(size, least) if size >= 0.0 else size, low, high)
+            try:
+                now = self.cost(simulator, trial)
+            except CosimError:
                 break
-            theta, cost = trial, now
-        return theta
+            if now < cost - GATE:
+                best, cost = trial, now
+            elif abs(trial[place]) >= usual:
+                break
+        return best
 
     @staticmethod
     def effects(fitted: Fitted) -> dict[str, float]:

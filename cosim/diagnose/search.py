@@ -20,13 +20,13 @@ from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
 from .established import needed, settle
-from .exchange import challenged, nearly, reconsidered, restarted
 from .fitter import ITERATIONS, Say
 from .grounding import grounded
-from .late import LateFitter
+from .late_values import LateValueFitter
 from .linear import SampleStack, holm
 from .models import GATE, Fitted, compare, is_open, more_general
 from .probes import batches
+from .rivals import challenged, nearly, reconsidered, restarted
 from .rounds import Round
 from .secant import Bench, model_values
 from .shafts import geared
@@ -59,7 +59,7 @@ ROUNDS = 4
 CHECK = "validation"
 
 
-class Search(LateFitter):
+class Search(LateValueFitter):
     """Attribution on one problem.
 
     Args:

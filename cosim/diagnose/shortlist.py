@@ -1,13 +1,13 @@
-"""Which of the scored candidates of a round are refitted."""
+"""Which of the scored candidates of a round are refitted, and which compared with its winner."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 from .candidates import balances
-from .judge import Judge
+from .judge import ALIKE, Judge
 from .linear import MATERIAL
-from .models import GATE, GATE_Z, LEVEL, is_open
+from .models import GATE, GATE_Z, LEVEL, Fitted, is_open
 from .rounds import Round
 from .signature import WHOLES, Signature, groups_of, kind
 
@@ -94,3 +94,25 @@ def remaining(judge: Judge, current: Round, tried: list[Signature]) -> list[Sign
     best = max((s.score.gain for s in seen), default=0.0)
     few = [s for s in seen if s.score.gain > PART * best]
     return [s for s in few if s.candidate.label not in known][:REFITS]
+
+
+def kin(judge: Judge, base: Fitted, stage: Round) -> list[Signature]:
+    """Twins of what was fitted that the winner must be compared with: they have not been.
+
+    To first order they are one, but where an effect explains millions of nats, what differs in
+    the sixth digit tells its place, and a simpler law there from the winner. Another law is another
+    answer: where a current never turns round, a dead zone is an offset.
+    """
+    winner = stage.winner
+    if winner is None or winner.signature is None:
+        return []
+    told = ALIKE * judge.total(base, winner) >= GATE
+    last, tuned = winner.effects[-1], winner.signature.tuned
+    twins = [t for f in stage.fitted if f.signature is not None for t in f.signature.twins]
+    found = [
+        t for t in (twins if told else ())
+        if t.candidate.effect == last.effect
+        or (t.candidate.place == last.place and t.tuned < tuned)
+    ]  # fmt: skip
+    laws = (t for t in winner.signature.twins if t.candidate.effect != last.effect)
+    return found + [t for t in laws if t.tuned == tuned]

@@ -31,6 +31,7 @@ def table_of(
     rounds: Sequence[Round],
     forces: dict[frozenset[str], list[Place]],
     ended: dict[str, float],
+    stopped: str = "",
 ) -> Table:
     """All that the verdict needs of a search.
 
@@ -38,7 +39,7 @@ def table_of(
         judge: the data, and the fits that were made.
         rounds: scores of the candidates.
         forces: what free forces explain of what a set of effects leaves.
-        ended: see `Table`.
+        ended, stopped: see `Table`.
     """
     declared = judge.memo.get(frozenset())
     assert declared is not None
@@ -69,6 +70,7 @@ def table_of(
         judge.fitting.size,
         judge.checking.size if unused else 0,
         ended=tuple(ended.items()),
+        stopped=stopped,
     )
 
 

@@ -2,12 +2,13 @@
 
     bad_data         the data cannot be used
     effect_found     the best set of laws stands up: unused runs want it, each of its laws is there,
-                     is missed if left out and matters, and what it leaves is noise, or so little
-                     that it asks for no further law (`stands`)
+                     is missed if left out and matters, what it leaves is noise, or so little that
+                     it asks for no further law (`stands`), and no other set does better (`beaten`)
     confounded       it does, and the data do not tell another set from it that has no more laws,
                      each of them there; the other set is not asked whether it stands up
     nothing_missing  no set stands up, and the declared model leaves noise
-    unexplained      anything else, with the nearest laws as hints; a hint is not a name
+    unexplained      anything else, with the nearest laws as hints; a hint is not a name. A search
+                     that was stopped ends so, too: rivals have not been asked
 
 Sentence, tables and JSON are written from the same facts: `answer.Verdict`.
 """
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import permutations
 
 from .answer import Hint, Verdict, over, percent
@@ -55,15 +57,15 @@ def decide(table: Table) -> Verdict:
     if table.errors:
         return Verdict("bad_data", errors=table.errors)
     declared, unused = table.models[0], table.unused_count > 0
-    best = proposal(table)
-    if best is not None and stands(table, best):
+    best = None if table.stopped else proposal(table)
+    if best is not None and stands(table, best) and beaten(table, best) is None:
         return _named(table, best)
     left = above(declared)
-    if best is None and not left:
+    if best is None and not left and not table.stopped:
         return Verdict("nothing_missing", unused=unused, ended=table.ended)
     force = declared.forces[0] if declared.forces else None
     return Verdict("unexplained", left=left, hints=_hints(table), force=force, unused=unused,
-                   ended=table.ended)  # fmt: skip
+                   ended=table.ended, stopped=table.stopped)  # fmt: skip
 
 
 def proposal(table: Table) -> int | None:
@@ -184,6 +186,44 @@ def stands(table: Table, place: int) -> bool:
         return False
     left = _excess(table, model)
     return left <= TENTH**2 * (_excess(table, declared) - left)
+
+
+def beaten(table: Table, place: int) -> int | None:
+    """Place of a set that does clearly better and has no name, for a strength that may be 0.
+
+    Of a law whose parameters only show as a product, no strength is known; that other laws, whose
+    strengths are, do worse makes them no better names. Special cases, and sets with more laws or
+    all of these, are no objection.
+
+    Args:
+        table: of all models.
+        place: of the set that would be named.
+    """
+    model, found = table.models[place], []
+    for i, rival in enumerate(table.models):
+        mine, other = _differ(model, rival)
+        if (
+            mine and other and not rival.rough and len(rival.laws) <= len(model.laws)
+            and not all(law.there for law in rival.laws) and wanted(rival.gain, table.candidates)
+            and not _one_answer(model, rival) and _better(table, place, i)
+        ):  # fmt: skip
+            found.append(i)
+    return max(found, key=lambda i: table.models[i].score, default=None)
+
+
+def _better(table: Table, first: int, second: int) -> bool:
+    """Whether unused runs want the second of two models instead of the first, or would.
+
+    By their likelihoods alone, if they were not compared: they differ too much for that.
+    """
+    for c in table.comparisons:
+        if {c.first, c.second} == {first, second}:
+            g, sign = c.gain, 1.0 if c.first == first else -1.0
+            gain = replace(g, fitted=sign * g.fitted, unused=sign * g.unused,
+                           unused_z=sign * g.unused_z)  # fmt: skip
+            return wanted(gain, table.candidates)
+    one, two = table.models[first], table.models[second]
+    return two.fitted > one.fitted and two.unused - one.unused > gate(table.candidates)
 
 
 def carries_over(model: Model) -> bool:
@@ -355,14 +395,19 @@ def _hints(table: Table) -> tuple[Hint, ...]:
     """
     declared, found = table.models[0], []
     shares = [
-        (model, share) for model in table.models[1:]
+        (i, model, share) for i, model in enumerate(table.models[1:], 1)
         if model.laws and (share := _explained(table, model, declared)) >= LEAST
     ]  # fmt: skip
-    for model, explained in sorted(shares, key=lambda pair: (pair[0].rough, -pair[0].score)):
-        if any(m.labels < model.labels and share > explained - LEAST for m, share in shares):
+    for i, model, explained in sorted(shares, key=lambda x: (x[1].rough, -x[1].score)):
+        if any(m.labels < model.labels and share > explained - LEAST for _, m, share in shares):
             continue
         left = above(model)
         why = doubts(table, model)
+        if table.stopped:
+            why.append("not all others were asked")
+        if not why and (better := beaten(table, i)) is not None:
+            names = ", ".join(law.label for law in table.models[better].laws)
+            why.append(f"{names} does better, and cannot be named")
         if left:
             why.append(f"it leaves more than noise in {over(left)}")
         if left and not carries_over(model):

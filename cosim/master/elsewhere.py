@@ -60,6 +60,7 @@ class _Process:
         self.popen = subprocess.Popen(
             [sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            start_new_session=True,  # Ctrl-C is for who asks; the end of its input ends this one
         )  # fmt: skip
         self.known: set[int] = set()
 

@@ -252,6 +252,7 @@ def compile_c(files: dict[str, str], main: str, identifier: str, platform: str) 
                 capture_output=True,
                 text=True,
                 check=False,
+                start_new_session=True,  # Ctrl-C is for the program, which may have more to do
             )
         if result.returncode:
             raise CompilerError(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.parts import Parameter
-from cosim.diagnose import exchange
+from cosim.diagnose import rivals
 from cosim.diagnose.fitter import Fitter
 from cosim.diagnose.secant import Bench
 from cosim.errors import FmuCallError
@@ -31,6 +31,26 @@ def test_a_strength_is_doubled_as_long_as_that_is_better(best: float, found: flo
     assert end[0] == found and start[0] == 1.0
 
 
+def test_up_to_the_usual_strength_all_are_tried() -> None:
+    """Play far below the right one shifts an oscillation the wrong way, and does harm."""
+    costs = {1e-4: 50.0, 2e-4: 90.0, 4e-4: 120.0, 8e-4: 99.0, 1.6e-3: 10.0, 3.2e-3: 80.0}
+    asked: list[float] = []
+
+    def cost(_: Any, theta: Any) -> float:
+        asked.append(theta[0])
+        return costs[min(costs, key=lambda gap: abs(gap - theta[0]))]
+
+    problem: Any = SimpleNamespace(index=lambda _: 0, lower=np.array([0.0]), upper=np.array([1.0]))
+    it, start = SimpleNamespace(cost=cost), np.array([1e-4])
+    simulator: Any = SimpleNamespace(problem=problem)
+    end = Fitter._doubled(it, simulator, start, 50.0, "gap", 1e-3)  # type: ignore[arg-type]
+    assert end[0] == pytest.approx(1.6e-3) and len(asked) == 5
+    # not where the first order holds
+    asked.clear()
+    end = Fitter._doubled(it, simulator, start, 50.0, "gap")  # type: ignore[arg-type]
+    assert end[0] == 1e-4 and len(asked) == 1
+
+
 @pytest.mark.parametrize(("best", "power"), [(2e-3, 0), (1e-5, 2), (1e-9, 3)])
 def test_a_law_begins_as_sharp_as_the_data_want_it(
     monkeypatch: pytest.MonkeyPatch, best: float, power: int
@@ -38,11 +58,9 @@ def test_a_law_begins_as_sharp_as_the_data_want_it(
     w_0 = Parameter("w_0", "rad/s", 2e-3, 1e-6, 1.0, ())
     angle = Parameter("angle", "rad", 0.1, -1.0, 1.0, ())  # smooths nothing: its bound is not 0
     whole: Any = SimpleNamespace(parameters=[w_0, angle])
-    monkeypatch.setattr(
-        exchange, "_begun", lambda _, values, fixed: (None, np.array([fixed["w_0"]]))
-    )
+    monkeypatch.setattr(rivals, "_begun", lambda _, values, fixed: (None, np.array([fixed["w_0"]])))
     fixed = {"w_0": 2e-3, "angle": 0.1}
-    found = exchange._sharpest(search(best), whole, {}, fixed)
+    found = rivals._sharpest(search(best), whole, {}, fixed)
     assert found == {"w_0": pytest.approx(2e-3 * 0.1**power), "angle": 0.1}
 
 

@@ -10,11 +10,10 @@ import pytest
 
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.established import examined
-from cosim.diagnose.exchange import kin
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
 from cosim.diagnose.secant import PATIENCE
-from cosim.diagnose.shortlist import REFITS, promising
+from cosim.diagnose.shortlist import REFITS, kin, promising
 from cosim.errors import CosimError
 
 MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
@@ -108,14 +107,15 @@ def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> N
     simpler = signature("coulomb", "load.flange", 0)
     general = signature("asymmetric_coulomb", "load.flange", 1)
     same = signature("asymmetric_coulomb", "gearbox.flange_b", 1)
-    others = [signature("stribeck", "gearbox.flange_b", 0), signature("hose", "load.flange", 1)]
+    law = signature("hose", "load.flange", 1)
+    others = [signature("stribeck", "gearbox.flange_b", 0), law]
     winner = model(signature("asymmetric_coulomb", "load.flange", 1, same, *others))
     elsewhere = model(signature("coulomb", "gearbox.flange_a", 0, simpler, general))
     found: Any = SimpleNamespace(winner=winner, fitted=[winner, elsewhere])
     search: Any = SimpleNamespace(total=lambda *_: 1e6)  # nats, of which the data see 1e-5
-    assert kin(search, winner, found) == [same, simpler, general]
-    search.total = lambda *_: 1e5  # of these they do not
-    assert kin(search, winner, found) == []
+    assert kin(search, winner, found) == [same, simpler, general, law]
+    search.total = lambda *_: 1e5  # of these they do not, but another law is another answer
+    assert kin(search, winner, found) == [law]
     search.total, found.winner = lambda *_: 1e6, elsewhere
     assert kin(search, winner, found) == [simpler]
 
@@ -127,8 +127,8 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
         raise CosimError("unstable")
 
     simulator = SimpleNamespace(costs={}, limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.released", fail)
+    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
+    monkeypatch.setattr("cosim.diagnose.late_values.released", fail)
     estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
     problem = SimpleNamespace(runs=(), late=())
     winner: Any = SimpleNamespace(problem=problem, simulator=simulator, estimate=estimate)
@@ -153,10 +153,10 @@ def test_start_values_stay_where_a_joint_fit_loses_them(
         return SimpleNamespace(problem=None, simulator=simulator, estimate=estimate)
 
     simulator = SimpleNamespace(limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late.released", lambda *_: (simulator, None, 5.0))
-    monkeypatch.setattr("cosim.diagnose.late.late_estimated", lambda _: True)
-    monkeypatch.setattr("cosim.diagnose.late.patience", lambda _: {})
+    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
+    monkeypatch.setattr("cosim.diagnose.late_values.released", lambda *_: (simulator, None, 5.0))
+    monkeypatch.setattr("cosim.diagnose.late_values.late_estimated", lambda _: True)
+    monkeypatch.setattr("cosim.diagnose.late_values.patience", lambda _: {})
     said: list[str] = []
     search: Any = SimpleNamespace(
         raw=SimpleNamespace(late=(1,)), lacking=lambda f: f.estimate.robust > 4.0, say=said.append,

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.exchange import elsewhere
+from cosim.diagnose.rivals import elsewhere
 from cosim.diagnose.search import Search
 from cosim.intake.example import drive, write_csv
 from tests.diagnose.test_late_columns import MAPPING

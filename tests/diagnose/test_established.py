@@ -138,3 +138,50 @@ def test_first_effects_and_calm_systems_are_not_asked(
     search = SimpleNamespace(raw=SimpleNamespace(unstable=unstable))  # fits nothing
     established.needed(search, SimpleNamespace(effects=effects), stage)  # type: ignore[arg-type]
     assert stage.winner is not None
+
+
+@pytest.mark.parametrize(
+    ("held", "gain", "instead"),
+    [((), 900.0, False), (("x", "y"), 900.0, True), (("x", "y"), 0.1, False)],
+    ids=["nothing is held", "it does the work", "it does not"],
+)
+def test_a_law_beside_another_gives_way_to_all_parameters_of_that_one(
+    monkeypatch: pytest.MonkeyPatch, held: tuple[str, ...], gain: float, instead: bool
+) -> None:
+    """A payload in the middle and a shift of the load are a payload that stands aside."""
+    mass = Parameter("payload.m", "kg", 0.0, 0.0, 99.0, (), strength=True, span=5.0)
+    places = [Parameter(f"payload.{n}", "m", 0.0, -1.0, 1.0, ()) for n in held]
+
+    def problem(parameters: list[Parameter]) -> Any:
+        return SimpleNamespace(
+            parameters=parameters, names=[p.name for p in parameters], constants={},
+            with_parameters=problem,
+        )  # fmt: skip
+
+    payload: Any = SimpleNamespace(label="payload", added_to=lambda _: problem([mass, *places]))
+    monkeypatch.setattr(
+        established, "composed", lambda raw, fitted, effects: problem([mass] if effects else [])
+    )
+    monkeypatch.setattr(established, "at_usual", lambda search, found, usual: found)
+    begun: list[list[float]] = []
+
+    def fitted(whole: Any, theta: Any, close: Any) -> Any:
+        begun.append(theta.tolist())
+        return SimpleNamespace(
+            estimate=SimpleNamespace(values=dict.fromkeys(whole.names, 1.0)), gain=gain
+        )
+
+    noted: list[Any] = []
+    search: Any = SimpleNamespace(
+        raw=None, simulator=SimpleNamespace(of=lambda p: p), fitted=fitted, note=noted.append,
+        approached=lambda found, goal, base: found, gain=lambda less, found: found.gain,
+        say=lambda text: None,
+    )  # fmt: skip
+    less: Any = SimpleNamespace(effects=(payload,), signature=3)
+    both: Any = SimpleNamespace(estimate=SimpleNamespace(values={"payload.m": 25.0}))
+    found: Any = established.freed(search, less, both)
+    assert begun == ([[25.0, 0.0, 0.0]] if held else [])  # from where both laws ended
+    assert (found is less) is not instead
+    assert noted == ([found] if instead else [])
+    if instead:
+        assert (found.effects, found.signature) == ((payload,), 3)

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple, cast
 import pytest
 
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.exchange import MOST, _alike, _others, restarted
 from cosim.diagnose.models import GATE, Gate
+from cosim.diagnose.rivals import MOST, _alike, _others, restarted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import CLOSE, Search
+from cosim.diagnose.shortlist import kin
 from tests.problems import simulator
 
 
@@ -21,10 +22,12 @@ class Law(NamedTuple):
     place: str
 
 
-def fit(effect: str, place: str, gain: float, own: int = 1) -> Any:
-    """A fit with what it gains, and how many parameters its law has."""
+def fit(effect: str, place: str, gain: float, own: int = 1, twins: tuple[Any, ...] = ()) -> Any:
+    """A fit with what it gains, how many parameters its law has, and what is one with it."""
     law = Law(effect, place)
-    signature = SimpleNamespace(candidate=law, probe=SimpleNamespace(own=own), same=())
+    signature = SimpleNamespace(
+        candidate=law, probe=SimpleNamespace(own=own), same=(), tuned=0, twins=twins
+    )
     return SimpleNamespace(effects=(law,), signature=signature, complexity=9, gain=gain)
 
 
@@ -66,6 +69,17 @@ def test_another_law_elsewhere_is_fitted_as_far_if_it_is_close(
 def test_another_law_at_the_same_place_is_not() -> None:
     winner, other = fit("coulomb", "wheel", 100.0), fit("stribeck", "wheel", 99.0)
     assert _alike(SEARCH, None, stage([winner, other]), set()) == []  # type: ignore[arg-type]
+
+
+def test_another_law_that_is_one_with_the_winner_is_fitted_whatever_the_winner_gains() -> None:
+    """The same law elsewhere only where so much is explained that the sixth digit tells it."""
+    offset = fit("current_offset", "sensor", 0.0).signature
+    elsewhere = fit("command_dead_zone", "joint", 0.0).signature
+    for gain, compared in ((1e3, [offset]), (1e8, [elsewhere, offset])):
+        winner = fit("command_dead_zone", "sensor", gain, twins=(offset, elsewhere))
+        assert kin(SEARCH, None, stage([winner])) == compared  # type: ignore[arg-type]
+    offset.tuned = 1  # with a parameter more that the data chose
+    assert kin(SEARCH, None, stage([winner])) == [elsewhere]  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -158,8 +172,8 @@ def test_a_general_law_begins_where_a_simpler_one_has_done_better(
         retried=retried, sharper=lambda fitted, base: fitted, say=lambda text: None,
         check_data=None, checking=None,
     )  # fmt: skip
-    monkeypatch.setattr("cosim.diagnose.exchange.exchanged", lambda *_: rough("a", reached))
-    monkeypatch.setattr("cosim.diagnose.exchange.compare", lambda *_: None)
+    monkeypatch.setattr("cosim.diagnose.rivals.exchanged", lambda *_: rough("a", reached))
+    monkeypatch.setattr("cosim.diagnose.rivals.compare", lambda *_: None)
     known = [] if simple is None else [rough("coulomb", simple)]
     found = restarted(cast(Any, search), general, rough("", 9e9), known)
     assert bool(begun) is anew

@@ -13,8 +13,8 @@ import pytest
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.composed import composed
-from cosim.diagnose.exchange import simplified
 from cosim.diagnose.models import GATE, Fitted
+from cosim.diagnose.rivals import simplified
 from cosim.diagnose.search import Search
 from tests.diagnose import disc
 from tests.problems import simulator

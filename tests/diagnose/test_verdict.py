@@ -12,7 +12,7 @@ import pytest
 
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.facts import Comparison, Force, Gain, Law, Left, Model, Table, Value
-from cosim.diagnose.verdict import above, decide, gate, proposal, unasked
+from cosim.diagnose.verdict import above, beaten, decide, gate, proposal, unasked
 
 COUNT = 4000
 """Measured values in identification runs, and in unused ones."""
@@ -147,7 +147,7 @@ def test_nothing_is_named_that_leaves_what_a_force_explains_or_that_is_much(
         if above(named):
             assert named.forces is not None and named.forces[0].explained < 0.5
             assert named.left[0].rms < 0.2 * declared.left[0].rms
-        assert one.unused_count > 0
+        assert one.unused_count > 0 and beaten(one, verdict.model) is None
 
 
 def test_nothing_is_missing_only_where_the_declared_model_leaves_noise(
@@ -321,6 +321,27 @@ def test_two_laws_that_the_data_do_not_tell_apart_are_confounded() -> None:
     found = decide(table(FAR, *rivals, alike=((1, 2),)))
     assert found.kind == "confounded" and found.others == (("cogging at motor.shaft",),)
     assert decide(table(FAR, *rivals)).kind == "effect_found"
+
+
+def test_a_law_is_no_name_where_one_without_a_known_strength_does_better() -> None:
+    """Of a winding that warms up a product of two parameters shows; a wrong gain is no answer."""
+    product = law("temperature_drift", value=0.3, half=0.4)
+    vague = model(product, gain=50.0)
+    found = decide(table(FAR, model(law()), vague))
+    assert found.kind == "unexplained"
+    first, second = found.hints
+    assert first.laws == (product,) and "absence" in first.why[0]
+    assert second.why == ("temperature_drift at load.flange does better, and cannot be named",)
+    # not where it does no better, has the law, is a general case of it, or takes more laws
+    assert decide(table(FAR, model(law()), vague, alike=((1, 2),))).kind == "effect_found"
+    others = (
+        model(product, gain=1.0),
+        model(law(), product, gain=50.0),
+        model(law("bristle", value=0.3, half=0.4, contains=("coulomb",)), gain=50.0),
+        model(product, law("delay", "motor.shaft"), gain=50.0),
+    )
+    for other in others:
+        assert decide(table(FAR, model(law()), other)).kind == "effect_found"
 
 
 def test_fewer_laws_that_do_the_same_are_named() -> None:

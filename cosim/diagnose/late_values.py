@@ -1,7 +1,4 @@
-"""Fits of models whose runs begin with values that matter only once an effect is known.
-
-Columns of the log that are late are another matter: `calibrate.checks.late`, `candidates.delays`.
-"""
+"""Fits of models whose runs begin with values that matter only once an effect is known."""
 
 from __future__ import annotations
 
@@ -30,7 +27,7 @@ WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
 
 
-class LateFitter(Fitter):
+class LateValueFitter(Fitter):
     """Fits models with late values (start angles of casters)."""
 
     _settled: Estimate | None = None

@@ -14,8 +14,8 @@ from benchmarks.motor_plant import draw, write_sets
 from benchmarks.own_plant import catalogue, example, made
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.exchange import challenged, reconsidered
 from cosim.diagnose.models import Fitted
+from cosim.diagnose.rivals import challenged, reconsidered
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
 from tests.problems import simulator

@@ -5,8 +5,6 @@
     simplified     before the verdict, each law of a set with its special cases
     elsewhere      likewise, the same law where it does nothing of its own beside the set's
 
-Nothing here is about the exchange of values between FMUs.
-
 Where several effects are missing, a round ends far from the noise whichever of them it adds, and
 rivals of the added one are not told apart by models that lack the rest. With the rest added they
 are: each rival takes the effect's place in the last model, is refitted, and stays if it is better.
@@ -26,11 +24,11 @@ from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .composed import composed
 from .fitter import QUICKLY
-from .judge import ALIKE, Judge
-from .late import LateFitter
+from .late_values import LateValueFitter
 from .models import GATE, Fitted, compare, more_general
 from .probes import single
 from .rounds import Round
+from .shortlist import kin
 from .signature import HIDDEN, Signature, unscored
 
 Vector = NDArray[np.float64]
@@ -53,13 +51,13 @@ MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens."""
 
 
-def nearly(search: LateFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:
+def nearly(search: LateValueFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:
     """Candidates whose fits gain nearly as much as the best quick one did."""
     least = NEARLY * stage.quick
     return frozenset(f.effects[-1] for f in stage.fitted if search.total(base, f) > least)
 
 
-def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:
+def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:
     """The model with early choices exchanged where that is better.
 
     Rounds get the winner that the last model shows. One that was not open is asked
@@ -105,7 +103,7 @@ def reconsidered(search: LateFitter, fitted: Fitted, rounds: list[Round]) -> Fit
     return fitted
 
 
-def simplified(search: LateFitter, fitted: Fitted, known: Sequence[Candidate]) -> None:
+def simplified(search: LateValueFitter, fitted: Fitted, known: Sequence[Candidate]) -> None:
     """Fit a set with the special case of each of its laws instead, from where its own fit ended.
 
     The memo gets the fits, and the verdict decides. A special case that had its turn before the
@@ -134,7 +132,7 @@ def simplified(search: LateFitter, fitted: Fitted, known: Sequence[Candidate]) -
                 search.say(f"{candidate.label} instead: {error}")
 
 
-def elsewhere(search: LateFitter, fitted: Fitted, rounds: Sequence[Round]) -> None:
+def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) -> None:
     """Fit a set with each of its laws where, beside it, the same law does nothing of its own.
 
     A gain of one wheel is the inverse gain of the other one with another radius and track: beside
@@ -190,7 +188,10 @@ def _wider(first: Fitted, second: Fitted) -> bool:
 
 
 def _told_apart(
-    search: LateFitter, present: Fitted, base: Fitted, trials: list[tuple[Fitted, Fitted | None]]
+    search: LateValueFitter,
+    present: Fitted,
+    base: Fitted,
+    trials: list[tuple[Fitted, Fitted | None]],
 ) -> list[tuple[Fitted, Fitted | None]]:
     """Models that could take another's place, the best first, thoroughly fitted if they are near.
 
@@ -211,7 +212,7 @@ def _told_apart(
     return sorted(found, key=lambda pair: -search.gains(present, pair[0])[0])
 
 
-def challenged(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
+def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
     """The winner of a round, or its effect elsewhere or another law, if that does as well.
 
     Fits that end at different distances from their minima would tell laws apart that are one; so
@@ -276,28 +277,8 @@ def challenged(search: LateFitter, base: Fitted, stage: Round) -> Fitted:
     return winner
 
 
-def kin(judge: Judge, base: Fitted, stage: Round) -> list[Signature]:
-    """Twins of what was fitted that the winner must be compared with: they have not been.
-
-    To first order they are one, but where an effect explains millions of nats, what differs in
-    the sixth digit tells its place, and a simpler law there from the winner.
-    """
-    winner = stage.winner
-    if winner is None or winner.signature is None:
-        return []
-    if ALIKE * judge.total(base, winner) < GATE:
-        return []
-    last, tuned = winner.effects[-1], winner.signature.tuned
-    twins = [t for f in stage.fitted if f.signature is not None for t in f.signature.twins]
-    return [
-        t for t in twins
-        if t.candidate.effect == last.effect
-        or (t.candidate.place == last.place and t.tuned < tuned)
-    ]  # fmt: skip
-
-
 def _alike(
-    search: LateFitter, base: Fitted, stage: Round, known: set[Candidate]
+    search: LateValueFitter, base: Fitted, stage: Round, known: set[Candidate]
 ) -> list[tuple[Signature, Fitted | None]]:
     """The winner's effect at other places, simpler laws at its own, close ones elsewhere.
 
@@ -342,7 +323,7 @@ def _seen_last(fitted: Fitted, winner: Fitted) -> Fitted:
     return replace(fitted, effects=(*rest, last), signature=winner.signature)
 
 
-def _others(search: LateFitter, stage: Round) -> list[tuple[Signature, Fitted | None]]:
+def _others(search: LateValueFitter, stage: Round) -> list[tuple[Signature, Fitted | None]]:
     """Rivals of a round's winner with their quick fits, and its twins elsewhere."""
     winner = stage.winner
     assert winner is not None
@@ -375,7 +356,7 @@ def _simpler(stage: Round) -> list[tuple[Signature, Fitted | None]]:
 
 
 def exchanged(
-    search: LateFitter,
+    search: LateValueFitter,
     fitted: Fitted,
     item: Signature,
     known: Fitted | None,
@@ -432,7 +413,9 @@ def exchanged(
     return result
 
 
-def restarted(search: LateFitter, fitted: Fitted, base: Fitted, simpler: list[Fitted]) -> Fitted:
+def restarted(
+    search: LateValueFitter, fitted: Fitted, base: Fitted, simpler: list[Fitted]
+) -> Fitted:
     """A model that is far off fitted from nominal values; from where a simpler law does better.
 
     Args:
@@ -472,7 +455,7 @@ def _begun(
 
 
 def _sharpest(
-    search: LateFitter, whole: Problem, values: dict[str, float], fixed: dict[str, float]
+    search: LateValueFitter, whole: Problem, values: dict[str, float], fixed: dict[str, float]
 ) -> dict[str, float]:
     """Held parameters with those that smooth a law as small as the data want them.
 
