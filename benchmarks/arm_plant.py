@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, beside, drawn_form, parameters
+from benchmarks.bench import Bench, Logged, beside, drawn_form, parameters, write_set
 
 Vector = NDArray[np.float64]
 TICK, SAMPLE, HOLD = 5e-4, 8e-3, 2.0
@@ -409,13 +408,9 @@ def write_sets(
     values = simulate(benches, chosen, seconds)
     numbers = range(1, 7)
     names = [f"{kind}_{k}" for kind in ("q_set", *SIGMA) for k in numbers]
-    columns = ", ".join(f'"{n}"' for n in ["time", *names])
     places = []
     for column, _ in enumerate(benches):
-        place = folder / f"{RIG}_{column:03d}"
-        (place / "runs").mkdir(parents=True, exist_ok=True)
-        text = (f'rig = "{RIG}"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
-                f"sample_rate_hz = 125\ncolumns = [{columns}]\n")  # fmt: skip
+        logged = []
         for k, run in enumerate(chosen):
             rows = min(len(run.angles), round(seconds / SAMPLE) + 1)
             table: dict[str, Any] = {"time": np.arange(rows) * SAMPLE}
@@ -424,12 +419,7 @@ def write_sets(
                 clean = values[name][:rows, k * len(benches) + column]
                 sigma = SIGMA[name.rpartition("_")[0]]
                 table[name] = clean + sigma * random.standard_normal(rows)
-            pd.DataFrame(table).to_parquet(place / "runs" / f"{run.name}.parquet")
-            text += (
-                f'\n[[run]]\nname = "{run.name}"\nfile = "runs/{run.name}.parquet"\n'
-                f'purpose = "{run.purpose}"\nduration_s = {(rows - 1) * SAMPLE}\n'
-                f"started_s_after_power_on = {run.begun}\n"
-            )
-        (place / "set.toml").write_text(text, encoding="utf-8")
-        places.append(place)
+            entries = {"started_s_after_power_on": run.begun}
+            logged.append(Logged(run.name, run.purpose, table, entries))
+        places.append(write_set(folder / f"{RIG}_{column:03d}", RIG, sheet, 125, logged))
     return places

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
@@ -51,6 +54,32 @@ class Bench:
         """The individual with each of its laws alone, itself if it has none."""
         laws = self.laws or (Law("none", 0.0),)
         return [Bench(self.parameters, law.name, law.size, law.shape) for law in laws]
+
+
+@dataclass(frozen=True)
+class Logged:
+    """One run of a data set: columns, the time first, and what its entry says besides."""
+
+    name: str
+    purpose: str
+    columns: dict[str, Vector]
+    entries: dict[str, Any] = field(default_factory=dict)
+
+
+def write_set(place: Path, rig: str, sheet: Path, rate: int, runs: Sequence[Logged]) -> Path:
+    """Write a data set, its samples at a rate in Hz; returns its folder."""
+    (place / "runs").mkdir(parents=True, exist_ok=True)
+    columns = ", ".join(f'"{name}"' for name in runs[0].columns)
+    text = (f'rig = "{rig}"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
+            f"sample_rate_hz = {rate}\ncolumns = [{columns}]\n")  # fmt: skip
+    for run in runs:
+        pd.DataFrame(run.columns).to_parquet(place / "runs" / f"{run.name}.parquet")
+        last = next(iter(run.columns.values())).size - 1
+        text += (f'\n[[run]]\nname = "{run.name}"\nfile = "runs/{run.name}.parquet"\n'
+                 f'purpose = "{run.purpose}"\nduration_s = {last / rate}\n')  # fmt: skip
+        text += "".join(f"{name} = {value}\n" for name, value in run.entries.items())
+    (place / "set.toml").write_text(text, encoding="utf-8")
+    return place
 
 
 def parameters(

@@ -10,10 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, camera, drawn_form, parameters
+from benchmarks.bench import Bench, Logged, camera, drawn_form, parameters, write_set
 
 Vector = NDArray[np.float64]
 STEP = 5e-5
@@ -281,23 +280,16 @@ def write_sets(
     names += [f"m{k}_{axis}" for k in range(1, 6) for axis in "xy"]
     places = []
     for column, _ in enumerate(benches):
-        place = folder / f"{RIG}_{column:03d}"
-        (place / "runs").mkdir(parents=True, exist_ok=True)
-        listed = ", ".join(f'"{n}"' for n in ["time", *names])
-        text = (f'rig = "{RIG}"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
-                f"sample_rate_hz = 50\ncolumns = [{listed}]\n")  # fmt: skip
+        logged = []
         for k, (run, _) in enumerate(RUNS):
             table = {"time": np.arange(values["m1_x"].shape[0]) * SAMPLE}
             for name in names:
                 clean = values[name][:, k * len(benches) + column]
                 sigma = CAMERA if name.startswith("m") else SPEED_NOISE
                 table[name] = clean + sigma * random.standard_normal(clean.size)
-            pd.DataFrame(table).to_parquet(place / "runs" / f"{run}.parquet")
             near = starts[k] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
             purpose = "identification" if run.startswith(FITTED) else "validation"
-            text += (f'\n[[run]]\nname = "{run}"\nfile = "runs/{run}.parquet"\n'
-                     f'purpose = "{purpose}"\nduration_s = {seconds}\n'
-                     f"initial_pose = {[round(float(v), 4) for v in near]}\n")  # fmt: skip
-        (place / "set.toml").write_text(text, encoding="utf-8")
-        places.append(place)
+            pose = [round(float(v), 4) for v in near]
+            logged.append(Logged(run, purpose, table, {"initial_pose": pose}))
+        places.append(write_set(folder / f"{RIG}_{column:03d}", RIG, sheet, 50, logged))
     return places

@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, parameters
+from benchmarks.bench import Bench, Logged, parameters, write_set
 
 Vector = NDArray[np.float64]
 TICK = 5e-5
@@ -325,17 +324,11 @@ def write_sets(
         names: of the runs, all if empty.
     """
     random = np.random.default_rng([seed, 1])
-    places = [folder / f"bench_{number:03d}" for number in range(len(benches))]
-    columns = '["time", "speed_set", "speed", "current", "voltage", "angle"]'
-    texts = {
-        place: f'rig = "motor_bench"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
-        f"sample_rate_hz = 1000\ncolumns = {columns}\n"
-        for place in places
-    }
+    logged: list[list[Logged]] = [[] for _ in benches]
     runs = drives(seed, seconds, names)
     for drive, clean in zip(runs, driven(benches, runs), strict=True):
         w_ref = drive.w_ref
-        for column, place in enumerate(places):
+        for column, of_bench in enumerate(logged):
             table: dict[str, Any] = {"time": np.arange(w_ref.size) * 1e-3, "speed_set": w_ref}
             for channel, sigma, quantum in (
                 ("speed", 0.15, COUNT / 1e-3), ("current", 0.05, 0.0), ("voltage", 0.05, 0.0),
@@ -348,13 +341,9 @@ def write_sets(
                 elif quantum:
                     values = np.rint(values / quantum) * quantum
                 table[channel] = values + sigma * random.standard_normal(values.size)
-            (place / "runs").mkdir(parents=True, exist_ok=True)
-            pd.DataFrame(table).to_parquet(place / "runs" / f"{drive.name}.parquet")
-            texts[place] += (
-                f'\n[[run]]\nname = "{drive.name}"\nfile = "runs/{drive.name}.parquet"\n'
-                f'purpose = "{drive.purpose}"\nduration_s = {w_ref.size * 1e-3 - 1e-3}\n'
-                f"initial_motor_angle = {drive.start}\ninitial_speed = 0.0\n"
-            )
-    for place, text in texts.items():
-        (place / "set.toml").write_text(text, encoding="utf-8")
-    return places
+            entries = {"initial_motor_angle": drive.start, "initial_speed": 0.0}
+            of_bench.append(Logged(drive.name, drive.purpose, table, entries))
+    return [
+        write_set(folder / f"bench_{number:03d}", "motor_bench", sheet, 1000, of_bench)
+        for number, of_bench in enumerate(logged)
+    ]

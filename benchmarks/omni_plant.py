@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.bench import Bench, beside, camera, drawn_form, parameters
+from benchmarks.bench import Bench, Logged, beside, camera, drawn_form, parameters, write_set
 
 Vector = NDArray[np.float64]
 STEP, TICKS, SAMPLE = 5e-5, 20, 0.01  # mechanics; steps per control period; of the log [s]
@@ -374,13 +373,9 @@ def write_sets(
     values = _channels(simulate(benches, chosen, seconds), exact=False)
     names = ["x", "y", "phi"]
     names += [f"{kind}_{k}" for kind in list(SIGMA)[3:] for k in (1, 2, 3)]
-    columns = ", ".join(f'"{n}"' for n in ["time", "vx_set", "vy_set", "w_set", *names])
     places = []
     for column, _ in enumerate(benches):
-        place = folder / f"{RIG}_{column:03d}"
-        (place / "runs").mkdir(parents=True, exist_ok=True)
-        text = (f'rig = "{RIG}"\nset = "{place.name}"\nsheet = "{sheet.as_posix()}"\n'
-                f"sample_rate_hz = 100\ncolumns = [{columns}]\n")  # fmt: skip
+        logged = []
         for k, run in enumerate(chosen):
             rows = min(len(run.twist), round(seconds / SAMPLE) + 1)
             table: dict[str, Any] = {"time": np.arange(rows) * SAMPLE}
@@ -389,18 +384,16 @@ def write_sets(
                 clean = values[name][:rows, k * len(benches) + column]
                 sigma = SIGMA.get(name) or SIGMA[name.rpartition("_")[0]]
                 table[name] = clean + sigma * random.standard_normal(rows)
-            pd.DataFrame(table).to_parquet(place / "runs" / f"{run.name}.parquet")
             near = run.pose + random.standard_normal(3) * [1e-3, 1e-3, 2e-3]
             # what the encoders show before the run
             steering = values_at_start(values, k * len(benches) + column)
             steering = steering + 3e-5 * random.standard_normal(3)
-            at = [round(float(v), 4) for v in near]
-            angles = [round(float(v), 5) for v in steering]
-            text += (f'\n[[run]]\nname = "{run.name}"\nfile = "runs/{run.name}.parquet"\n'
-                     f'purpose = "{run.purpose}"\nduration_s = {(rows - 1) * SAMPLE}\n'
-                     f"initial_pose = {at}\ninitial_steering_angle = {angles}\n")  # fmt: skip
-        (place / "set.toml").write_text(text, encoding="utf-8")
-        places.append(place)
+            entries = {
+                "initial_pose": [round(float(v), 4) for v in near],
+                "initial_steering_angle": [round(float(v), 5) for v in steering],
+            }
+            logged.append(Logged(run.name, run.purpose, table, entries))
+        places.append(write_set(folder / f"{RIG}_{column:03d}", RIG, sheet, 100, logged))
     return places
 
 
