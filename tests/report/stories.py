@@ -92,6 +92,7 @@ def table(verdict: str) -> dict[str, Any]:
         "further_runs": [],
         "law_from_data": None,
         "withheld": [],
+        "stopped": "",
         "hints": [],
         "parameters": {
             "R_a": {"unit": "ohm", "before": value, "after": value},
