@@ -20,12 +20,13 @@ from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, UnbuiltError
 from .adding import made_of
-from .answer import Verdict
+from .answer import Verdict, percent
 from .bursts import bursts, times
 from .carriers import leave_fmus
 from .established import examined
 from .experiment import propose
 from .facts import Table
+from .fitter import BRINGS
 from .foreign import Adapter, attached
 from .foreign_file import leave_system
 from .foreign_words import placed
@@ -43,7 +44,7 @@ from .table import candidates_of, table_of
 from .together import ahead, together
 from .unstable import ends
 from .verdict import above, decide, proposal, unasked
-from .whiteness import WhitenessTest, whiteness_tests
+from .whiteness import CALIBRATED, WhitenessTest, whiteness_tests
 
 TURNS = 4
 """Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
@@ -206,6 +207,8 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
                 say("where does it enter?")
                 ranked = [s.candidate for s in stage.signatures]
                 result.located = localise(search, base, ranked, say)
+        if stage.winner is not None and winners and _slight(search, stage, say):
+            stage.winner = None
         if stage.winner is None:
             current = stage.base
             found = reconsidered(search, current, winners)
@@ -236,6 +239,22 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     return current
+
+
+def _slight(search: Search, stage: Round, say: Callable[[str], None]) -> bool:
+    """Whether a further law takes next to nothing of what is evidently still missing.
+
+    It is not what is missing then, and further ones on top of it would mislead.
+    """
+    base, winner = stage.base, stage.winner
+    assert winner is not None
+    noise = 0.5 * base.estimate.count
+    beyond, gained = base.estimate.robust - noise, search.gain(base, winner)
+    if search.raw.unstable or beyond < (CALIBRATED**2 - 1.0) * noise or gained > BRINGS * beyond:
+        return False
+    share = percent(max(gained, 0.0) / beyond)
+    say(f"not added: {winner.effects[-1].label}, {share} of what is left")
+    return True
 
 
 def _stopped(result: Diagnosis, search: Search, why: str) -> None:

@@ -23,7 +23,7 @@ from .candidates import balances, candidates, new_parameters
 from .choices import APART
 from .directions import Direction, Responses
 from .evidence import ALIKE, Chosen, Evidence
-from .fitter import AGAIN, QUICKLY
+from .fitter import AGAIN, BRINGS, QUICKLY
 from .following import follow
 from .localise import Place
 from .models import GATE, Fitted, compare
@@ -190,9 +190,14 @@ def _fitted(
 
 
 def _better(search: Search, declared: Fitted, one: Draft, found: Sequence[Draft]) -> bool:
-    """Whether a set explains more than all smaller ones."""
-    most = max((_total(search, declared, d.fitted) for d in found), default=0.0)
-    return _total(search, declared, one.fitted) > most
+    """Whether a set explains more than all smaller ones, and much of what these leave."""
+    before = [declared, *(d.fitted for d in found)]
+    best = max(before, key=lambda f: _total(search, declared, f))
+    beyond = best.estimate.robust - 0.5 * best.estimate.count
+    return (
+        _total(search, declared, one.fitted) > _total(search, declared, best)
+        and search.gain(best, one.fitted) > BRINGS * beyond
+    )
 
 
 def _fit(
