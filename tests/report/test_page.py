@@ -70,6 +70,19 @@ def test_a_place_is_named_only_where_it_explains_most() -> None:
     assert "flange" not in story.headline and "in several places" in "".join(story.meaning)
 
 
+def test_a_search_that_was_stopped_claims_nothing() -> None:
+    content = table("unexplained") | {"stopped": "after 300 simulated runs"}
+    story = told(Facts(content))
+    assert story.label == "The search was stopped before its end"
+    assert "stopped after 300 simulated runs: so far, the calibrated model misses" in story.headline
+    assert "nothing is named, and nothing is ruled out" in "".join(story.meaning)
+    assert "were tried" not in "".join(story.meaning) and "Let it go on" in story.steps[0]
+    for tests in content["structure"].values():
+        for test in tests:
+            test["structured"] = False
+    assert "leaves noise" in told(Facts(content)).headline
+
+
 def test_findings_that_cannot_be_let_pass_are_not_offered_to_be() -> None:
     content = table("bad_data")
     assert "allow = [&quot;spikes&quot;]" in "".join(told(Facts(content)).steps)

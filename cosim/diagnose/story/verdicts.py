@@ -21,6 +21,7 @@ LABELS = {
     "confounded": "Something is missing, with more than one explanation",
     "unexplained": "Something is missing that has no name here",
     "bad_data": "The data cannot be used",
+    "stopped": "The search was stopped before its end",
 }
 SMALL = 3
 """Effects whose smallest visible size is said beside `nothing_missing`."""
@@ -54,9 +55,11 @@ def told(facts: Facts) -> Story:
     write = {
         "effect_found": _effect_found, "nothing_missing": _nothing_missing,
         "confounded": _confounded, "unexplained": _unexplained, "bad_data": _bad_data,
-    }[facts.verdict]  # fmt: skip
-    headline, meaning, steps = write(facts)
-    return Story(LABELS[facts.verdict], headline, tuple(meaning), tuple(steps))
+        "stopped": _stopped,
+    }  # fmt: skip
+    kind = "stopped" if facts.table.get("stopped") else facts.verdict
+    headline, meaning, steps = write[kind](facts)
+    return Story(LABELS[kind], headline, tuple(meaning), tuple(steps))
 
 
 # -- parts -----------------------------------------------------------------------------------------
@@ -338,13 +341,7 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  "places.")
         )  # fmt: skip
     meaning.append(join(facts.table.get("inside", "")))
-    steps = []
-    hints = facts.table.get("hints") or []
-    if hints:
-        steps.append(
-            join(tag("b", "Compare"), " with the ", tag("a", "nearest laws", href="#hints"),
-                 ": what they would take, and what they leave.")
-        )  # fmt: skip
+    steps = _compare(facts)
     if where is not None:
         steps.append(
             join(tag("b", "Look"), " ", facts.in_words(at), ": what there depends on ",
@@ -357,6 +354,34 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
              "finer variant of the component, and diagnose again."),
     ]  # fmt: skip
     return headline, _some(meaning), steps
+
+
+def _compare(facts: Facts) -> list[Html]:
+    if not facts.table.get("hints"):
+        return []
+    return [
+        join(tag("b", "Compare"), " with the ", tag("a", "nearest laws", href="#hints"),
+             ": what they would take, and what they leave.")
+    ]  # fmt: skip
+
+
+def _stopped(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    why = str(facts.at("stopped"))
+    rest = (
+        join("the calibrated model misses ", tag("b", facts.worst), " by ",
+             _misses(facts, "after"), " its sensor's noise")
+        if facts.left else Html("the calibrated model leaves noise")
+    )  # fmt: skip
+    headline = join(f"The search was stopped {why}: so far, ", rest, ".")
+    meaning = [
+        join("Calibration went to its end, and not all effects of the catalogue were asked: "
+             "nothing is named, and nothing is ruled out."),
+    ]  # fmt: skip
+    steps = [
+        join(tag("b", "Let it go on"), " for longer: the same command with more simulated runs."),
+        *_compare(facts),
+    ]
+    return headline, meaning, steps
 
 
 def _bad_data(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
