@@ -236,6 +236,11 @@ class MeasuredRun:
         """The usual time between samples [s]."""
         return float(np.median(np.diff(self.times)))
 
+    @property
+    def logged(self) -> Vector:
+        """Times of the samples in the log, before which the model may have begun [s]."""
+        return self.times - self.lead
+
     def white(self, rows: Vector) -> Vector:
         """Residuals, or derivatives of model values, over their noise, made white."""
         return rows if self.noise is None else self.noise.white(rows)

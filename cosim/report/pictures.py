@@ -59,7 +59,7 @@ def run_pictures(
         shown = [
             i for i in range(len(problem.channels)) if np.isfinite(run.data[:, i]).any()
         ]  # fmt: skip
-        times = run.times - run.lead  # of the log
+        times = run.logged
         rows = math.ceil(len(shown) / COLUMNS)
         columns = min(len(shown), COLUMNS)
         figure = Figure(

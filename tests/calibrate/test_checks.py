@@ -16,6 +16,7 @@ from cosim.calibrate.checks.clipped import check_clipped
 from cosim.calibrate.checks.examine import check_data, check_model, examine
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding, Source, lines
 from cosim.calibrate.checks.late import check_late
+from cosim.calibrate.checks.spiking import check_spikes
 from cosim.calibrate.checks.swaps import check_channels
 from cosim.calibrate.checks.times import check_times
 from cosim.calibrate.fit import Effort, fit
@@ -249,6 +250,14 @@ def test_spikes_of_one_column_are_faults_of_the_log(noisy) -> None:
     assert [f.run for f in found] == ["sines", "stairs", "check"]
     assert "has 3 single samples that stand out, the first at 0.3 s" in found[0].text
     assert "the largest 1e+09 A at 1.5 s" in found[0].text
+
+
+def test_a_fault_is_told_at_the_time_of_the_log_where_the_model_begins_before_it(noisy) -> None:
+    problem = changed(noisy(0), "current", struck)
+    models = {run.name: other.data for run, other in zip(problem.runs, noisy(1).runs, strict=True)}
+    runs = [replace(run, times=run.times + 2.0, lead=2.0) for run in problem.runs]
+    found = list(check_spikes(problem.changed(runs=runs), models))
+    assert "the first at 0.3 s, the largest 1e+09 A at 1.5 s" in found[0].text
 
 
 def test_a_spike_that_hardly_adds_to_the_noise_stops_nothing(noisy) -> None:

@@ -54,8 +54,8 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             harm = float(np.nansum(((values[at] - beside) / channel.sigma) ** 2)) / values.size
             text = (
                 f"has {at.size} single samples that stand out, the first at "
-                f"{run.times[at[0]]:.6g} s, the largest {values[worst]:.6g} {channel.unit} at "
-                f"{run.times[worst]:.6g} s between {values[worst - 1]:.6g} and "
+                f"{run.logged[at[0]]:.6g} s, the largest {values[worst]:.6g} {channel.unit} at "
+                f"{run.logged[worst]:.6g} s between {values[worst - 1]:.6g} and "
                 f"{values[worst + 1]:.6g}: faults of the log; make gaps of them with "
                 "despike = true (or limit) in [columns]"
             )

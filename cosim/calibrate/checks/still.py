@@ -79,7 +79,7 @@ def _column(channel: Channel, run: MeasuredRun, data: Vector) -> Iterator[Findin
     start = int(edges[int(np.argmax(np.diff(edges)))]) + 1
     text = (
         f"stands at {values[start]:.6g} {channel.unit} for {longest} samples from "
-        f"{run.times[good][start]:.4g} s on, "
+        f"{run.logged[good][start]:.4g} s on, "
     )
     # rounding hides noise that is smaller than the quantum: a machine at rest reads so, too; and it
     # comes back to the value that it rests at, which no frozen sensor does

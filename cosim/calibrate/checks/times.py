@@ -84,13 +84,13 @@ def _run(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:
         yield Finding("error", "short", run.name, "time", text)
         return
     if np.any(steps <= 0.0):
-        at = run.times[int(np.flatnonzero(steps <= 0.0)[0])]
+        at = run.logged[int(np.flatnonzero(steps <= 0.0)[0])]
         text = f"does not increase after {at:.6g} s"
         yield Finding("error", "clock", run.name, "time", text)
         return
     usual = float(np.median(steps))
     if np.max(steps) > GAP * usual:
-        at = run.times[int(np.argmax(steps))]
+        at = run.logged[int(np.argmax(steps))]
         text = f"has a gap of {np.max(steps):.4g} s after {at:.6g} s (interval {usual:.4g} s)"
         yield Finding("warning", "gap", run.name, "time", text)
     even = np.abs(steps - usual) < EVEN * usual

@@ -45,7 +45,8 @@ def check_wraps(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Find
             at = np.flatnonzero(np.abs(steps / turn - 1.0) < NEAR)
             if at.size:
                 text = (
-                    f"jumps by a turn {at.size} times, first after {run.times[good][at[0]]:.6g} s, "
-                    "where the model counts on; give unwrap = true in [columns]"
+                    f"jumps by a turn {at.size} times, "
+                    f"first after {run.logged[good][at[0]]:.6g} s, where the model "
+                    "counts on; give unwrap = true in [columns]"
                 )
                 yield Finding("error", "wrapped", run.name, channel.name, text)
