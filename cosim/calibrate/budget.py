@@ -32,16 +32,16 @@ class Budget:
         if runs is not None and runs < 1:
             raise ValueError(f"a budget of {runs} simulated runs is none; give at least 1")
         self.runs, self.spent, self.stopped = runs, 0, ""
-        self._over = False
+        self._lifted = False
         self._lock = threading.Lock()
 
     def stop(self, why: str) -> None:
         """End the work before the next simulated run."""
         self.stopped = self.stopped or why
 
-    def over(self) -> None:
-        """What is left to do is not counted: the report on what was found."""
-        self._over = True
+    def lift(self) -> None:
+        """End nothing any more: what is left to do is the report on what was found."""
+        self._lifted = True
 
     def spend(self) -> None:
         """Count a run.
@@ -50,8 +50,9 @@ class Budget:
             StoppedError: it may not be simulated any more.
         """
         with self._lock:
-            if not self._over and self.spent == self.runs:
-                self.stop(f"after {self.runs} simulated runs")
-            if self.stopped and not self._over:
-                raise StoppedError(self.stopped)
+            if not self._lifted:
+                if self.spent == self.runs:
+                    self.stop(f"after {self.runs} simulated runs")
+                if self.stopped:
+                    raise StoppedError(self.stopped)
             self.spent += 1

@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -41,6 +40,7 @@ from .output import AsJson, new_table, open_console, say
 from .pairs import pairs, values
 from .progress import Display
 from .scenarios import scenarios_command
+from .signals import taken
 from .streams import print_json, stdout_for_json
 from .study import study_command
 from .twin import twin_command
@@ -242,18 +242,12 @@ def _unjudged(checks: list[dict[str, Any]]) -> dict[str, list[str]]:
 def leaving_nothing() -> Iterator[None]:
     """Let SIGTERM end the block like an error: what it has started and made is put away."""
 
-    def terminate(*_: Any) -> None:
+    def terminate() -> None:
         say("terminated")
         raise SystemExit(128 + signal.SIGTERM)
 
-    if threading.current_thread() is not threading.main_thread():
+    with taken(signal.SIGTERM, terminate):
         yield
-        return
-    before = signal.signal(signal.SIGTERM, terminate)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def main() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from ..files import make_folder, write_text
 from ..installation.builder import default_provider
 from .calibrate import clock_lines
 from .progress import Display
+from .signals import taken
 from .streams import print_json
 
 if TYPE_CHECKING:
@@ -115,20 +115,14 @@ def diagnose_command(
 def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]:
     """Ctrl-C ends the search and reports; a second one ends the program."""
 
-    def end(*_: object) -> None:
+    def end() -> None:
         if budget.stopped:
             raise KeyboardInterrupt
         budget.stop("by hand")
         say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")
 
-    if threading.current_thread() is not threading.main_thread():  # gets no signals
+    with taken(signal.SIGINT, end):
         yield
-        return
-    before = signal.signal(signal.SIGINT, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _print(result: Diagnosis) -> None:

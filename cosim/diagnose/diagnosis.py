@@ -158,16 +158,18 @@ def _searched(
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
-    result.asked = asked is not None
+    result.asked, why = asked is not None, ""
     try:
         _judged(result, search, _found(result, search, base, asked))
         assert result.after is not None
         if asked or (law and result.verdict == "unexplained"):
             result.law = unnamed(search, result.after, result.located, asked)
     except StoppedError as stopped:
-        _stopped(result, search, str(stopped))
+        why = str(stopped)
+    search.simulator.budget.lift()
+    if why:
+        _stopped(result, search, why)
     assert result.after is not None
-    search.simulator.budget.over()
     if not search.lacking(result.after):
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
