@@ -113,6 +113,9 @@ def run_command(
     ] = None,
     step: Annotated[float | None, typer.Option(help="Communication step [s].")] = None,
     duration: Annotated[float | None, typer.Option(help="Duration [s].")] = None,
+    record_period: Annotated[
+        float | None, typer.Option(help="Time between recorded points [s].")
+    ] = None,
     fmus: Annotated[
         Path | None, typer.Option(help="Take variants from this folder instead of building.")
     ] = None,
@@ -150,6 +153,7 @@ def run_command(
             options=chosen,
             step=step,
             duration=duration,
+            record_period=record_period,
             provider=provider,
             out=folder,
             progress=lambda item, fraction: display.update(item, fraction, 1.0),

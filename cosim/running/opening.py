@@ -23,6 +23,7 @@ def open(
     options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
+    record_period: float | None = None,
     provider: Provider | None = None,
     folder: Path | None = None,
 ) -> Twin:
@@ -30,7 +31,8 @@ def open(
 
     Args:
         name: `mobile_manipulator/IY`, a folder, a scenario.toml, an .ssp archive or .ssd file.
-        variants, parameters, algorithm, options, step, provider, folder: as of `cosim.run`.
+        variants, parameters, algorithm, options, step, record_period, provider, folder: as of
+            `cosim.run`.
         duration: how far it can go [s]; the scenario's if not given, `math.inf` for no end (its
             inputs are then held beyond their last values).
 
@@ -41,7 +43,7 @@ def open(
     need_text("the scenario to open", name, 'give its name, as in cosim.open("motor_bench/ST1")')
     need_table("variants of a twin", variants or {}, 'variants={"gearbox": "lossy"}')
     need_table("parameters of a twin", parameters or {}, 'parameters={"load.J": 0.09}')
-    for what, value in (("step", step), ("duration", duration)):
+    for what, value in (("step", step), ("duration", duration), ("record period", record_period)):
         if value is not None:
             need_number(f"{what} of a twin", value, "give it in seconds")
     whole, _, _, items = find_runs(name, folder, duration, step)
@@ -52,7 +54,7 @@ def open(
         )
     item = adjusted(
         next(iter(items.values())), algorithm=algorithm, options=options, step=step,
-        duration=duration,
+        duration=duration, record_period=record_period,
     )  # fmt: skip
     prepared = prepare(
         item, builder.default_provider() if provider is None else provider,

@@ -18,10 +18,11 @@ def recording_interval(scenario: Scenario) -> int:
     if scenario.period is None or not 0.0 < scenario.step < scenario.period:
         return 1  # a step that is not positive is refused by the master
     every = round(scenario.period / scenario.step)
-    if every < 1 or abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
+    if abs(every * scenario.step - scenario.period) > 1e-6 * scenario.step:
         raise ValueRangeError(
             f"{scenario.name}: record period {scenario.period:g} s is not a whole number of steps "
-            f"of {scenario.step:g} s"
+            f"of {scenario.step:g} s; record every {every * scenario.step:g} s, say "
+            "(--record-period, record_period, or period under [record])"
         )
     return every
 

@@ -344,6 +344,7 @@ def run(
     options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
+    record_period: float | None = None,
     provider: Provider | None = None,
     out: Path | str | None = None,
     folder: Path | None = None,
@@ -361,6 +362,7 @@ def run(
         options: of the algorithm; those of the scenario if that is its algorithm, too.
         algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
             does not reach.
+        record_period: replaces the scenario's [s]; a whole number of steps.
         provider: where variants come from; by default they are built from the sources, or taken
             from the installed FMUs where those are missing.
         out: folder for recording, plot and result; nothing is written without it.
@@ -381,7 +383,12 @@ def run(
         need_table(f"{what} of a run", table or {}, example)
     for key, wanted in (variants or {}).items():
         need_text(f"the variant of {key}", wanted, 'write variants={"gearbox": "lossy"}')
-    for what, value in (("step", step), ("duration", duration), ("time limit isolate", isolate)):
+    for what, value in (
+        ("step", step),
+        ("duration", duration),
+        ("record period", record_period),
+        ("time limit isolate", isolate),
+    ):
         if value is not None:
             need_number(f"{what} of a run", value, "give it in seconds")
     if algorithm is not None:
@@ -393,7 +400,8 @@ def run(
     with contextlib.nullcontext() if out is None else claimed(Path(out)):
         return _run(
             found, None if out is None else Path(out), provider, progress,
-            {"algorithm": algorithm, "options": options, "step": step, "duration": duration},
+            {"algorithm": algorithm, "options": options, "step": step, "duration": duration,
+             "record_period": record_period},
             {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard,
              "scene": True},
         )  # fmt: skip
@@ -452,14 +460,21 @@ def adjusted(
     options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
+    record_period: float | None = None,
 ) -> Scenario:
-    """A scenario with another algorithm, step or duration where these are given.
+    """A scenario with another algorithm, step, duration or record period where these are given.
 
     Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
     does not reach.
     """
     if duration is not None and duration < item.duration:
         item = _shortened(item, duration)
+    used = step if step is not None else item.step
+    if record_period is not None and record_period < used:
+        raise ValueRangeError(
+            f"{item.name}: the record period {record_period:g} s is shorter than a step of "
+            f"{used:g} s; record every {used:g} s, or take a shorter step"
+        )
     return replace(
         item,
         algorithm=algorithm or item.algorithm,
@@ -467,8 +482,9 @@ def adjusted(
             **(item.options if algorithm in (None, item.algorithm) else {}),
             **(options or {}),
         },
-        step=step if step is not None else item.step,
+        step=used,
         duration=duration if duration is not None else item.duration,
+        period=record_period if record_period is not None else item.period,
     )
 
 

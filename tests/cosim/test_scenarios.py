@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import InputError, ScenarioError, UnknownNameError, VariantError
+from cosim.errors import (
+    InputError,
+    ScenarioError,
+    UnknownNameError,
+    ValueRangeError,
+    VariantError,
+)
 from cosim.running.runner import run
 from cosim.scenario import scenario
 from cosim.scenario.checks import circle_radius
@@ -234,6 +240,18 @@ def test_a_shorter_run_keeps_only_the_checks_that_it_reaches(folder: Path, provi
     assert set(run("disc", provider=provider, folder=folder).checks) == {"final speed", "early"}
     short = run("disc", provider=provider, folder=folder, duration=0.05)
     assert set(short.checks) == {"early"}
+
+
+def test_another_step_and_record_period(folder: Path, provider) -> None:
+    again = run("disc", provider=provider, folder=folder, step=5e-3, record_period=0.01)
+    np.testing.assert_allclose(again.recording.time, np.linspace(0.0, 0.1, 11), atol=1e-12)
+    with pytest.raises(
+        ValueRangeError, match=r"0\.002 s is not a whole .* of 0\.0015 s; record every 0\.0015 s"
+    ):
+        run("disc", provider=provider, folder=folder, step=1.5e-3)
+    for period in (1e-3, -1.0):
+        with pytest.raises(ValueRangeError, match=r"shorter than a step of 0\.005 s; record every"):
+            run("disc", provider=provider, folder=folder, step=5e-3, record_period=period)
 
 
 def _with_checks(folder: Path, *holds: str) -> None:
