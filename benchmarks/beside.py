@@ -1,7 +1,7 @@
 """Twins beside streaming machines: false alarms in an hour, delays of alarms, lateness at a broker.
 
     python -m benchmarks.beside hour             clean hour of the motor bench, 1 kHz, unpaced
-    python -m benchmarks.beside effects          friction switched on: alarm after how long
+    python -m benchmarks.beside effects          friction, late commands switched on: alarm when
     python -m benchmarks.beside broker --minutes 5       through mosquitto at real time
 
 The machine is the model of `scenarios/motor_bench` with the noise of its sheet; set speeds change
@@ -31,6 +31,10 @@ from cosim.live.watch import Settings, Watch
 ENTRIES = {"initial_motor_angle": 0.0}
 STRENGTHS = (0.01, 0.02, 0.05, 0.1)
 """Dry friction at the load's flange [N.m]; the bench's viscous friction is 0.2 N.m at 3 rad/s."""
+DELAYS = (0.001, 0.002, 0.005, 0.02)
+"""By which commands begin to act later [s]; a sample is 1 ms."""
+BEGIN = 20.0
+"""When they are switched on [s]."""
 PORT, TOPIC = 18831, "bench"
 
 
@@ -63,17 +67,19 @@ def hour(reading: Reading, minutes: float) -> None:
 
 
 def effects(reading: Reading) -> None:
-    """Alarm delays for friction that begins after 20 s."""
-    for strength in STRENGTHS:
-        source = machine(
-            reading, 60.0, 2, variant={"load": "+coulomb"}, values={"load.coulomb.tau_c": 0.0},
-            change={20.0: {"load.coulomb.tau_c": strength}},
-        )  # fmt: skip
-        _, events = watched(reading, source)
+    """Alarm delays for friction, and for late commands, that begin in the middle of a run."""
+    friction = {"variant": {"load": "+coulomb"}, "values": {"load.coulomb.tau_c": 0.0}}
+    cases: list[tuple[dict[str, float], dict[str, Any]]] = [
+        *(({"tau_c_Nm": size}, {**friction, "change": {BEGIN: {"load.coulomb.tau_c": size}}})
+          for size in STRENGTHS),
+        *(({"late_s": delay}, {"late": (BEGIN, delay)}) for delay in DELAYS),
+    ]  # fmt: skip
+    for what, how in cases:
+        _, events = watched(reading, machine(reading, 3.0 * BEGIN, 2, **how))
         alarms = [event for event in events if event.get("event") == "alarm"]
         first = min(alarms, key=lambda alarm: alarm["t"], default=None)
-        delay = None if first is None else round(first["t"] - 20.0, 3)
-        print(json.dumps({"tau_c_Nm": strength, "alarm_after_s": delay, "first": first}))
+        after = None if first is None else round(first["t"] - BEGIN, 3)
+        print(json.dumps({**what, "alarm_after_s": after, "first": first}))
 
 
 def broker(reading: Reading, minutes: float) -> None:

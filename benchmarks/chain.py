@@ -150,12 +150,14 @@ def ours(path: Path, executor: str) -> Callable[[int], Answer]:
         def note(fraction: float) -> None:
             marks.append((fraction, time.process_time(), time.perf_counter()))
 
-        recording = master.run(count * STEP, record=RECORD, every=EVERY, progress=note)
+        # our last step ends at the end of the run, the others' by rounding beside it
+        more = count + 1
+        recording = master.run(more * STEP, record=RECORD, every=EVERY, progress=note)
         (f0, c0, w0), (f1, c1, w1) = marks[0], marks[-2]
-        timed = round((f1 - f0) * count)
+        timed = round((f1 - f0) * more)
         return _answer(
             (c1 - c0) * count / timed, (w1 - w0) * count / timed, count,
-            recording.values[-1, : len(FINAL)].tolist(),
+            recording.values[count // EVERY, : len(FINAL)].tolist(),
         )  # fmt: skip
 
     return run

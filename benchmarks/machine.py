@@ -8,6 +8,7 @@ noise and the effect is in the residual.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -31,6 +32,7 @@ class Machine:
         variant: changes of the model, e.g. `{"load": "+coulomb"}`.
         values: set at the begin: of the effect's parameters, its strength 0 among them.
         change: time -> values that are set then.
+        late: from when on commands act how much later than the stream says [s].
         seed: of the noise.
         clock: the first sample's time [s].
     """
@@ -43,6 +45,7 @@ class Machine:
         variant: Mapping[str, str] | None = None,
         values: Mapping[str, float] | None = None,
         change: Mapping[float, Mapping[str, float]] | None = None,
+        late: tuple[float, float] = (math.inf, 0.0),
         seed: int = 0,
         clock: float = 0.0,
     ) -> None:
@@ -50,7 +53,7 @@ class Machine:
         if variant:
             problem = problem.changed(model=problem.model.changed(variant))
         self.reading, self.commands, self.clock = reading, commands, clock
-        self.entries, self.change = dict(entries or {}), dict(change or {})
+        self.entries, self.change, self.late = dict(entries or {}), dict(change or {}), late
         own = Reading(reading.joined, reading.problem)
         own.theta, own.problem = reading.theta, problem
         first = Sample(0.0, {name: float(column[0]) for name, column in commands.items()})
@@ -64,7 +67,7 @@ class Machine:
         count = len(next(iter(self.commands.values())))
         times = reading.interval * np.arange(count)
         for driver in reading.drivers:
-            twin.set(driver.target, driver.table(times, self.commands[driver.column]))
+            twin.set(driver.target, driver.table(times, self._acting(driver.column, times)))
         for name, value in self.values.items():
             twin.set(name, value)
         record = {name: place for place, name in enumerate(twin.recorded)}
@@ -93,6 +96,12 @@ class Machine:
             names = [reading.clock, *found]
             table = np.column_stack([stamped, *found.values()]).tolist()
             yield [dict(zip(names, row, strict=True)) for row in table]
+
+    def _acting(self, column: str, times: Vector) -> Vector:
+        """A command as it acts."""
+        begin, delay = self.late
+        back = np.where(times >= begin, round(delay / self.reading.interval) if delay else 0, 0)
+        return np.asarray(self.commands[column][np.arange(times.size) - back])
 
     def lines(self, block: int = 2000) -> Iterator[list[bytes]]:
         """The same as lines of a stream, the begin of the run first."""
