@@ -38,7 +38,7 @@ def times(
     found: dict[str, NDArray[np.bool_]], runs: list[MeasuredRun]
 ) -> dict[str, list[tuple[float, float]]]:
     """First and last time of each burst, by run."""
-    return {run.name: _spans(run.times, found[run.name]) for run in runs if run.name in found}
+    return {run.name: _spans(run.logged, found[run.name]) for run in runs if run.name in found}
 
 
 def written(spans: list[tuple[float, float]]) -> str:

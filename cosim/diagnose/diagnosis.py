@@ -346,7 +346,7 @@ def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitt
     if not sizes:
         return current
     for name, size in sizes.items():
-        result.ended[name] = float(current.problem.run(name).times[size])
+        result.ended[name] = float(current.problem.run(name).logged[size])
     until = ", ".join(f"{name} to {result.ended[name]:.2f} s" for name in sizes)
     search.say(f"unstable from there on, so runs count up to where the model leaves them: {until}")
     current = reconsidered(search, current, winners)

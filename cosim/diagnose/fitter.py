@@ -20,6 +20,7 @@ from ..calibrate.parts import Sensitivity
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
+from .grounding import grounded
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
@@ -97,7 +98,8 @@ class Fitter(Judge):
         except CosimError as error:  # a step finer than that of the quick fit may be unstable
             self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
             return quick
-        return self.again(found, quick, base)
+        found = self.again(found, quick, base)
+        return found if draft else grounded(self, found, base)
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""

@@ -50,7 +50,7 @@ def calibration_page(content: Mapping[str, Any], estimate: Estimate, unused: Res
     problem = estimate.problem
     residuals = dict(estimate.residuals) | dict(unused)
     runs = tuple(
-        ShownRun(run.name, run.purpose, run.times, run.data,
+        ShownRun(run.name, run.purpose, run.logged, run.data,
                  {"before": residuals[run.name]} if run.name in residuals else {})
         for run in problem.runs
     )  # fmt: skip

@@ -116,7 +116,7 @@ def collected(result: Diagnosis) -> Material:
         kinds = ("before",) if result.after is result.before else ("before", "after")
         found = {k: result.residuals[k, run.name] for k in kinds if (k, run.name) in
                  result.residuals}  # fmt: skip
-        runs.append(ShownRun(run.name, run.purpose, run.times, run.data, found))
+        runs.append(ShownRun(run.name, run.purpose, run.logged, run.data, found))
     known = symbols(problem) | (symbols(result.after.problem) if result.after is not None else {})
     return Material(
         result.to_dict(), shown_channels(problem), tuple(runs), problem.plain(), known,

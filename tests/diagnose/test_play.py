@@ -48,8 +48,11 @@ def test_play_is_named_with_its_size(sets: dict[str, Path]) -> None:
     winner = searched(sets["backlash"]).winner
     assert winner is not None
     assert [e.label for e in winner.effects] == ["backlash at gearbox"]
-    # the plant moves in ticks, the model does not: a twentieth
-    assert winner.estimate.values["gearbox.backlash.gap"] == pytest.approx(GAP, rel=0.05)
+    estimate = winner.estimate
+    place = estimate.problem.index("gearbox.backlash.gap")
+    # at the search's own step alone a fit ends 2 % below, 400 nats above the minimum
+    assert estimate.theta[place] == pytest.approx(GAP, rel=0.01)
+    assert estimate.low[place] < GAP < estimate.high[place]
 
 
 def test_a_soft_gear_has_no_play(sets: dict[str, Path]) -> None:
@@ -57,5 +60,5 @@ def test_a_soft_gear_has_no_play(sets: dict[str, Path]) -> None:
     assert winner is not None
     assert [e.label for e in winner.effects] == ["elastic at gearbox"]
     value = winner.estimate.values["gearbox.elastic.1/k"]
-    # as above
+    # the plant moves in ticks, the model does not: a twentieth
     assert value == pytest.approx(COMPLIANCE, rel=0.05)
