@@ -91,15 +91,20 @@ class Fitter(Judge):
             base: what its gain counts from.
             draft: only to be compared; its intervals are not needed.
         """
-        theta = quick.estimate.theta
         try:
-            simulator = corrected(quick.simulator, theta, self.raw)
-            found = self.judged(fit(simulator, theta, effort=DRAFT if draft else CORRECTION))
+            near = self.corrected(quick, base, DRAFT)
+            if draft:
+                return near
+            return grounded(self, self.corrected(near, base, CORRECTION), base)
         except CosimError as error:  # a step finer than that of the quick fit may be unstable
             self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
             return quick
-        found = self.again(found, quick, base)
-        return found if draft else grounded(self, found, base)
+
+    def corrected(self, start: Fitted, base: Fitted, effort: Effort) -> Fitted:
+        """A model fitted again, with what the search's step adds taken off where that begins."""
+        theta = start.estimate.theta
+        simulator = corrected(start.simulator, theta, self.raw)
+        return self.again(self.judged(fit(simulator, theta, effort=effort)), start, base)
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""

@@ -50,8 +50,8 @@ def test_play_is_named_with_its_size(sets: dict[str, Path]) -> None:
     assert [e.label for e in winner.effects] == ["backlash at gearbox"]
     estimate = winner.estimate
     place = estimate.problem.index("gearbox.backlash.gap")
-    # at the search's own step alone a fit ends 2 % below, 400 nats above the minimum
-    assert estimate.theta[place] == pytest.approx(GAP, rel=0.01)
+    # a valley: a fit at the search's step alone ends some hundred nats above its bottom
+    assert estimate.theta[place] == pytest.approx(GAP, rel=0.02)
     assert estimate.low[place] < GAP < estimate.high[place]
 
 
