@@ -49,10 +49,12 @@ Vector = NDArray[np.float64]
 
 def model_of(problem: Problem, entry: Mapping[str, Any], known: Mapping[str, float]) -> Problem:
     """The problem with a model's variants; what is not free is held at its start value."""
+    start = {**known, **flatten(entry.get("start", {}))}
     for instance, effects in entry.get("add", {}).items():
         for effect in [effects] if isinstance(effects, str) else effects:
             problem = problem.with_effects({instance: f"+{effect}"})
-    start = {**known, **flatten(entry.get("start", {}))}
+    how = {n: v for n, v in flatten(entry.get("start", {})).items() if n not in problem.names}
+    problem = problem.changed(constants={**problem.constants, **how})
     free = set(entry.get("free", ()))
     held = {
         p.name: start.get(p.name, p.nominal)

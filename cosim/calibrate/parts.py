@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -394,6 +394,15 @@ def adjustable(variable: Variable) -> bool:
         and variable.size == 1
         and not variable.name.startswith("solver.")
     )
+
+
+def natural(variable: Variable, strengths: Collection[str]) -> bool:
+    """Whether a parameter of an effect is one of nature's, for which data may be asked.
+
+    What can only be set beforehand and is no strength says how a law is computed: grids, how far
+    back a memory reaches, seeds. Data prefer one by what it makes of rounding.
+    """
+    return adjustable(variable) and (variable.variability != "fixed" or variable.name in strengths)
 
 
 def check_parameters(parameters: Iterable[Parameter]) -> None:

@@ -32,8 +32,8 @@ from .parts import (
     Coarse,
     MeasuredRun,
     Parameter,
-    adjustable,
     free_parameter,
+    natural,
 )
 
 Vector = NDArray[np.float64]
@@ -320,8 +320,9 @@ class Problem:
     def with_effects(self, changes: Mapping[str, str]) -> Problem:
         """The problem on a system with changed variants.
 
-        Parameters that only the new variants have become parameters of the problem: strengths start
-        at 0, which reproduces this problem, the others at the FMU's values.
+        Parameters that only the new variants have become parameters of the problem, where they are
+        `natural`: strengths start at 0, which reproduces this problem, the others at the FMU's
+        values.
 
         Args:
             changes: see `Model.changed`.
@@ -342,7 +343,7 @@ class Problem:
             for variable in member.description.variables.values():
                 full = f"{name}.{variable.name}"
                 if (
-                    adjustable(variable)
+                    natural(variable, strengths)
                     and variable.name not in before
                     and full not in changed.constants
                     and full not in stated

@@ -93,6 +93,13 @@ def test_effects_without_strength_change_nothing(short, truth) -> None:
     )
 
 
+def test_how_a_law_is_computed_is_no_parameter(short) -> None:
+    late = short.with_effects({"motor": "+delay@command"})  # beside it, the grid of its memory
+    assert [p.name for p in late.parameters[len(short.parameters) :]] == ["motor.command.delay.t_d"]
+    warm = short.with_effects({"motor": "+winding_heating@winding"})  # nature has a time constant
+    assert "motor.winding.winding_heating.t_th" in warm.names
+
+
 def test_directional_derivatives_are_those_of_the_jacobian(short, truth) -> None:
     along = jacobian(simulator(short), truth, ["sines"], relative=1e-2)[0]
     random = np.random.default_rng(0)
