@@ -13,39 +13,52 @@ from typing import TYPE_CHECKING
 
 from ..calibrate.deferred import corrected
 from ..calibrate.descent import LOWER
-from ..calibrate.fit import CORRECTION, fit
-from ..errors import CosimError
+from ..calibrate.fit import CORRECTION, DRAFT, fit
 from .models import Fitted, is_open
 
 if TYPE_CHECKING:
     from .fitter import Fitter
 
+DRAFTS = 2
+"""Drafts at most: where the second one still ends elsewhere, a third does, too."""
 
-def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
-    """The model, with parameters from the rig's own step where they are better.
+
+def thorough(fitter: Fitter, quick: Fitted, base: Fitted) -> Fitted:
+    """A model fitted to its minimum, with intervals.
+
+    By drafts first, until one ends where what the step adds is what was taken off; if none does, at
+    the rig's own step.
 
     Args:
         fitter: of the search.
-        winner: a thorough fit.
+        quick: the model, fitted quickly.
         base: from which gains count.
+
+    Raises:
+        CosimError: it cannot be simulated.
     """
     raw = fitter.raw
-    coarse = raw.ticks and raw.search.step != raw.step
-    if not coarse or raw.unstable or is_open(winner.estimate) or astray(fitter, winner) < LOWER:
-        return winner
+    if not raw.ticks or raw.search.step == raw.step or raw.unstable or is_open(quick.estimate):
+        return fitter.corrected(quick, base, CORRECTION)
+    near = quick
+    for _ in range(DRAFTS):
+        near = fitter.corrected(near, base, DRAFT)
+        if astray(fitter, near) < LOWER:
+            found = fitter.corrected(near, base, CORRECTION)
+            return found if astray(fitter, found) < LOWER else _grounded(fitter, found, base)
+    return _grounded(fitter, near, base)
+
+
+def _grounded(fitter: Fitter, near: Fitted, base: Fitted) -> Fitted:
+    """The model fitted at the rig's own step from close by."""
+    raw = fitter.raw
     measured = {run.name: run.data for run in raw.runs}
-    problem = winner.problem.with_data(measured).changed(step=raw.step)
-    name = winner.effects[-1].label
-    try:
-        simulator = winner.simulator.limited({}).of(problem)
-        fine = fit(simulator, winner.estimate.theta, effort=CORRECTION)
-        near = corrected(winner.simulator, fine.theta, raw)
-    except CosimError as error:
-        fitter.say(f"{name} could not be fitted at the rig's step: {error}")
-        return winner
-    found = fitter.again(fitter.judged(replace(fine, simulator=near)), winner, base)
-    gained = _cost(fitter, winner) - _cost(fitter, found)
-    fitter.say(f"{name}: {gained:.0f} nats better at the rig's own step")
+    problem = near.problem.with_data(measured).changed(step=raw.step)
+    fine = fit(near.simulator.limited({}).of(problem), near.estimate.theta, effort=CORRECTION)
+    simulator = corrected(near.simulator, fine.theta, raw)
+    found = fitter.again(fitter.judged(replace(fine, simulator=simulator)), near, base)
+    gained = _cost(fitter, near) - _cost(fitter, found)
+    fitter.say(f"{near.effects[-1].label}: {gained:.0f} nats better at the rig's own step")
     return found
 
 
