@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..errors import CosimError
 from .estimate import Estimate
@@ -187,15 +188,17 @@ def calibrated(simulator: Simulator, theta: Vector | None = None) -> tuple[Estim
         theta: where to begin, the nominal values if not given.
     """
     problem = simulator.problem
-    estimate = fit(simulator, theta)
-    if problem.ticks:
-        text = f"the rig exchanges in ticks of {problem.step:g} s"
-        return estimate, StepError(problem.step, problem.step, text=text)
-    try:
-        return _corrected(simulator, estimate)
-    except CosimError as error:  # an FMU that takes this step need not take others
-        text = f"the error of the communication step could not be measured: {error}"
-        return estimate, StepError(problem.step, text=text)
+    # sums over more threads are rounded in another way, and jumps make much of that
+    with threadpool_limits(1, user_api="blas"):
+        estimate = fit(simulator, theta)
+        if problem.ticks:
+            text = f"the rig exchanges in ticks of {problem.step:g} s"
+            return estimate, StepError(problem.step, problem.step, text=text)
+        try:
+            return _corrected(simulator, estimate)
+        except CosimError as error:  # an FMU that takes this step need not take others
+            text = f"the error of the communication step could not be measured: {error}"
+            return estimate, StepError(problem.step, text=text)
 
 
 def _corrected(simulator: Simulator, first: Estimate) -> tuple[Estimate, StepError]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.deferred import corrected, step_error
 from ..calibrate.estimate import Estimate
-from ..calibrate.fit import DRAFT, INTERVALS, Effort, fit
+from ..calibrate.fit import CORRECTION, DRAFT, INTERVALS, Effort, fit
 from ..calibrate.known import Known
 from ..calibrate.loss import loss_for
 from ..calibrate.normal import cost_of
@@ -20,7 +20,6 @@ from ..calibrate.parts import Sensitivity
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
-from .grounding import thorough
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
@@ -92,7 +91,7 @@ class Fitter(Judge):
             draft: only to be compared; its intervals are not needed.
         """
         try:
-            return self.corrected(quick, base, DRAFT) if draft else thorough(self, quick, base)
+            return self.corrected(quick, base, DRAFT if draft else CORRECTION)
         except CosimError as error:  # a step finer than that of the quick fit may be unstable
             self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
             return quick
