@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.errors import listing
+
 from .declarations import SX, Attachment, Balance, Clock, ModelError, Symbols
 from .model import Model, total
 from .quantity import Quantity
@@ -50,7 +52,16 @@ class EffectModel:
         return self._root.time
 
     def signal(self, name: str) -> SX:
-        """A signal of the balance, see `effect.KINDS`."""
+        """A signal of the balance, see `effect.KINDS`.
+
+        Raises:
+            ModelError: it offers none of that name.
+        """
+        if name not in self._balance.signals:
+            raise ModelError(
+                f"the law of {self._prefix!r} reads the signal {name!r} of {self._balance.name!r}; "
+                f"{listing(self._balance.signals, name)}"
+            )
         return self._balance.signals[name]
 
     def signals(self, *names: str, **symbols: str) -> Symbols:

@@ -169,7 +169,10 @@ def test_energy_balance_closes(name: str) -> None:
         for seed in range(20):
             defect, largest = oracle.energy_defect(_random_point(oracle, slave, seed))
             # 1e-9 of the largest single term inside: sums of hundreds of terms that cancel
-            assert abs(defect) <= 1e-9 * max(largest, 1e-6), (seed, defect, largest)
+            assert abs(defect) <= 1e-9 * max(largest, 1e-6), (
+                f"seed {seed}: {defect:g} W of {largest:g} W are missing; what a law dissipates is "
+                "told by e.loss or m.loss, what it stores by energy"
+            )
 
 
 @pytest.mark.parametrize("name", WITH_EFFECT)

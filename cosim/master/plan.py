@@ -173,7 +173,6 @@ class Plan:
     """Operations over a layout.
 
     Attributes:
-        algorithm: name.
         layout: where the values are.
         initial: one sweep over the instances during initialization, repeated until nothing changes.
         step: one communication step.
@@ -184,9 +183,9 @@ class Plan:
         means: what EXTRAPOLATE, SET_DERIVATIVES and MOVE set.
         stepper: for algorithms whose steps are more than operations, what makes a stepper of an
             `interpreter.Interpreter`; None if the operations of `step` are all there is.
+        algorithm: name of the module that made it, for provenance.
     """
 
-    algorithm: str
     layout: Layout
     initial: Integers
     step: Integers
@@ -195,6 +194,7 @@ class Plan:
     solving: Integers = field(default_factory=lambda: operations(()))
     means: tuple[Mean, ...] = ()
     stepper: Callable[[Any], Stepper] | None = None
+    algorithm: str = ""
 
 
 def operations(items: Iterable[Sequence[int]]) -> Integers:

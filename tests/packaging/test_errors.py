@@ -82,6 +82,17 @@ def test_an_unknown_balance_is_told_which_there_are(tmp_path: Path) -> None:
         build("inertia/disc+coulomb@shaft", out=tmp_path)
 
 
+def test_a_signal_that_a_balance_has_not_is_told_which_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(effects()["coulomb"], "law", lambda e: e.signal("speed"))
+    with pytest.raises(
+        ModelError,
+        match=r"the law of 'coulomb' reads the signal 'speed' of 'flange'; .*there is velocity",
+    ):
+        build("inertia/disc+coulomb", out=tmp_path)
+
+
 def test_python_fmus_are_fmi_2(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"^python FMUs are FMI 2\.0 \(pythonfmu writes no other"):
         build("inertia/disc", out=tmp_path, fmi=3, kind="python")

@@ -10,6 +10,7 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError, UnknownNameError, listing
@@ -67,4 +68,4 @@ def compile_plan(
             )
     module = importlib.import_module(f"{__name__}.{algorithm}")
     plan: Plan = module.compile_plan(system, external, observed, **(options or {}))
-    return plan
+    return replace(plan, algorithm=algorithm)

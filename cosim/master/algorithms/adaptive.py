@@ -86,7 +86,6 @@ def compile_plan(
         *[(op, index) for op in (Op.SET, Op.STEP, Op.GET) for index in everyone],
     ]
     return Plan(
-        "adaptive",
         layout,
         initial_sweep(system, layout),
         operations(step),

@@ -65,7 +65,6 @@ def compile_plan(
         step.append((Op.GET, index))
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
-        "gauss_seidel",
         layout,
         initial_sweep(system, layout),
         operations(step),

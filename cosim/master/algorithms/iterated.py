@@ -73,7 +73,6 @@ def compile_plan(
     if not interpolation:
         step += [*[(Op.GET, index) for index in everyone], *fresh]
     return Plan(
-        "iterated",
         layout,
         initial_sweep(system, layout),
         operations(step),

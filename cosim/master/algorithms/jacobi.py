@@ -80,7 +80,6 @@ def compile_plan(
         step += [(Op.GET, index) for index in everyone]
     step += [(Op.HOLD,), *fresh, (Op.ENERGY, 1)] if extrapolated else [(Op.ENERGY,)]
     return Plan(
-        "jacobi",
         layout,
         initial_sweep(system, layout),
         operations(step),
