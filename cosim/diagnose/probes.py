@@ -215,10 +215,10 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
         for first in range(0, len(members), most):
             few = members[first : first + most]
             chosen = masks[first : first + most] or [None] * len(few)
-            whole = wholes.get(key) if len(members) <= MOST else None
+            whole = wholes.get(key) if len(members) <= most else None
             change = {key[0]: "".join(f"+{c.effect}@{c.port}" for c in few)}
             result.append(Batch(change, tuple(zip(few, chosen, strict=True)), whole))
-        if key in wholes and len(members) > MOST:
+        if key in wholes and len(members) > most:  # no batch has all of them
             result.append(Batch(wholes[key].change, ((wholes[key], None),)))
     return _sharing(result, known)
 

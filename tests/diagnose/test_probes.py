@@ -24,12 +24,10 @@ def places(*ports: str) -> list[Candidate]:
     return [Candidate("arm", "ur5_arm", "coulomb", port) for port in ports]
 
 
-def measured(*signals: str) -> Any:
+def measured(*signals: str, kind: str = "rotation") -> Any:
     """A problem of which only channels and balances matter; `tail` is a group of balances."""
     names = ["wheel", "body", "joint", *(f"wheel_{k}" for k in range(2 * MOST))]
-    extra = {
-        "balances": [{"name": name, "kind": "rotation"} for name in [*names, "joint_1", "joint_2"]]
-    }
+    extra = {"balances": [{"name": name, "kind": kind} for name in [*names, "joint_1", "joint_2"]]}
     arm = SimpleNamespace(description=SimpleNamespace(extra=extra))
     return SimpleNamespace(
         channels=[SimpleNamespace(signal=s) for s in signals],
@@ -59,6 +57,16 @@ def test_no_candidate_is_lost() -> None:
     assert max(len(b.members) for b in found) == MOST
     (alone,) = [b for b in found if any(c.port == "tail" for c, _ in b.members)]
     assert len(alone.members) == 1
+
+
+def test_where_places_are_split_the_whole_vector_is_by_itself() -> None:
+    """With the last wheel's FMU as its own, it would be that wheel's effect by another name."""
+    known = places("wheel", "wheel_1", "wheel_2", "wheel_3")
+    found = batches(known, measured("body.x", kind="coefficient"))
+    assert [[c.port for c in b.candidates] for b in found] == [
+        ["wheel_1", "wheel_2"], ["wheel_3"], ["wheel"],
+    ]  # fmt: skip
+    assert all(b.whole is None for b in found)
 
 
 @pytest.mark.parametrize(
