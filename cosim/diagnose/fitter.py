@@ -90,17 +90,14 @@ class Fitter(Judge):
             base: what its gain counts from.
             draft: only to be compared; its intervals are not needed.
         """
+        theta = quick.estimate.theta
         try:
-            return self.corrected(quick, base, DRAFT if draft else CORRECTION)
+            simulator = corrected(quick.simulator, theta, self.raw)
+            found = self.judged(fit(simulator, theta, effort=DRAFT if draft else CORRECTION))
         except CosimError as error:  # a step finer than that of the quick fit may be unstable
             self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
             return quick
-
-    def corrected(self, start: Fitted, base: Fitted, effort: Effort) -> Fitted:
-        """A model fitted again, with what the search's step adds taken off where that begins."""
-        theta = start.estimate.theta
-        simulator = corrected(start.simulator, theta, self.raw)
-        return self.again(self.judged(fit(simulator, theta, effort=effort)), start, base)
+        return self.again(found, quick, base)
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""

@@ -1,76 +1,52 @@
-"""Fits at the rig's own step, where what a coarser one adds to the model is not what was taken off.
+"""Fits at the rig's own step, for a model that leaves more than noise at a coarser one.
 
-What a coarse communication step adds is taken from the data at one point, where a fit begins
-(`deferred`). Where runs meet limits or teeth by ticks, it is another one where the fit ends: the
-data are right for the beginning only, and derivatives of the coarse model lead elsewhere. Steps at
-the rig's own step need no correction.
+What a coarse communication step adds to the model is taken from the data at one point (`deferred`).
+Where runs meet limits by ticks, that varies so much with the parameters that a fit which begins at
+this point ends there: the data are only right for it. Steps at the rig's own step need no
+correction, and lead to where the correction is taken next.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from ..calibrate.deferred import corrected
-from ..calibrate.descent import LOWER
-from ..calibrate.fit import CORRECTION, fit
+from ..calibrate.fit import Effort, fit
 from ..errors import CosimError
-from .fitter import Fitter
-from .models import Fitted, is_open
+from .models import Fitted
 
-DRAFTS = 2
-"""Drafts at most: where the second one still ends elsewhere, a third does, too."""
-TURNS = 2
-"""Fits at the rig's own step at most: where the first one leads on, jumps have hidden the rest."""
+if TYPE_CHECKING:
+    from .fitter import Fitter
+
+EVIDENT = 5.0
+"""Deviations by which the cost exceeds that of noise: half a sum of n squares varies by
+sqrt(n / 2)."""
+STEPS = Effort("near", "draft", iterations=4)
+"""Each costs as many simulations as there are parameters, at a step that is ten times as fine."""
 
 
-class GroundedFitter(Fitter):
-    """Fits that end at the minimum of the model at the rig's own step."""
+def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
+    """The model, with parameters from the rig's own step where they are better.
 
-    def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
-        """A quickly fitted model fitted again with derivatives of its own.
-
-        By drafts, until one ends where what the search's step adds is what was taken off, and
-        thoroughly from there; at the rig's own step if none does. Where that is the search's, runs
-        may turn unstable, or more than noise is left by far, thoroughly at once.
-        """
-        raw = self.raw
-        coarse = raw.ticks and raw.search.step != raw.step
-        if draft or not coarse or raw.unstable or is_open(quick.estimate):
-            return super().sharpened(quick, base, draft=draft)
-        near = quick
-        for _ in range(DRAFTS):
-            near = super().sharpened(near, base, draft=True)
-            if self.astray(near) < LOWER:
-                near = super().sharpened(near, base)
-                break
-        if self.astray(near) < LOWER:
-            return near
-        for _ in range(TURNS):
-            before, near = self._exactly(near), self._grounded(near, base)
-            if before - self._exactly(near) < LOWER:
-                break
-        return near
-
-    def astray(self, fitted: Fitted) -> float:
-        """How far the cost that a fit saw at its end is from that at the rig's own step [nats]."""
-        rows = dict(fitted.estimate.residuals)
-        seen = self.fitting.cost(self.fitting.vector([rows[name] for name in self.fitting.names]))
-        return abs(seen - self._exactly(fitted))
-
-    def _exactly(self, fitted: Fitted) -> float:
-        return self.fitting.cost(self.fit_data - fitted.fit)
-
-    def _grounded(self, near: Fitted, base: Fitted) -> Fitted:
-        """The model fitted at the rig's own step from close by."""
-        measured = {run.name: run.data for run in self.raw.runs}
-        problem = near.problem.with_data(measured).changed(step=self.raw.step)
-        name = near.effects[-1].label
-        try:
-            simulator = near.simulator.limited({}).of(problem)
-            fine = fit(simulator, near.estimate.theta, effort=CORRECTION)
-            simulator = corrected(near.simulator, fine.theta, self.raw)
-        except CosimError as error:
-            self.say(f"{name} could not be fitted at the rig's step: {error}")
-            return super().sharpened(near, base)
-        self.say(f"{name}: fitted at the rig's own step")
-        return self.again(self.judged(replace(fine, simulator=simulator)), near, base)
+    Args:
+        fitter: of the search.
+        winner: a thorough fit.
+        base: from which gains count.
+    """
+    raw = fitter.raw
+    coarse = raw.ticks and raw.search.step != raw.step
+    noise = 0.5 * winner.estimate.count
+    if not coarse or raw.unstable or winner.estimate.cost < noise + EVIDENT * noise**0.5:
+        return winner
+    measured = {run.name: run.data for run in raw.runs}
+    problem = winner.simulator.problem.with_data(measured).changed(step=raw.step)
+    try:
+        simulator = winner.simulator.limited({}).of(problem)
+        fine = fit(simulator, winner.estimate.theta, effort=STEPS)
+    except CosimError as error:
+        fitter.say(f"{winner.effects[-1].label} could not be fitted at the rig's step: {error}")
+        return winner
+    found = fitter.sharpened(fitter.again(fitter.judged(fine), winner, base), base)
+    if fitter.total(base, found) <= fitter.total(base, winner):
+        return winner
+    fitter.say(f"{winner.effects[-1].label}: a better minimum at the rig's own step")
+    return found

@@ -14,7 +14,7 @@ from ..calibrate.nuisance import late_estimated, released
 from ..calibrate.simulator import Simulator
 from ..calibrate.staged import jointly, staged
 from ..errors import CosimError, FmuCallError
-from .grounding import GroundedFitter
+from .fitter import Fitter
 from .models import Fitted
 from .secant import patience
 from .unstable import ended
@@ -27,7 +27,7 @@ WORTH = 0.05
 """Late values are kept if they remove this share of what a model leaves beyond noise."""
 
 
-class LateValueFitter(GroundedFitter):
+class LateValueFitter(Fitter):
     """Fits models with late values (start angles of casters)."""
 
     _settled: Estimate | None = None

@@ -21,6 +21,7 @@ from ..system.variants import apply
 from .candidates import Candidate, candidates
 from .established import needed, settle
 from .fitter import ITERATIONS, Say
+from .grounding import grounded
 from .late_values import LateValueFitter
 from .linear import SampleStack, holm
 from .models import GATE, Fitted, compare, is_open, more_general
@@ -273,6 +274,7 @@ class Search(LateValueFitter):
             if current.winner is None:
                 return current
             current.follow(self.sharpened(current.winner, base))
+            current.follow(grounded(self, current.winner, base))
             settle(self, base, current)
         return current
 

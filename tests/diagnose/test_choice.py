@@ -10,7 +10,6 @@ import pytest
 
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.established import examined
-from cosim.diagnose.fitter import Fitter
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
 from cosim.diagnose.secant import PATIENCE
@@ -213,17 +212,20 @@ def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
     assert said == ["without delay at motor.command: unstable", "without b: unstable"]
 
 
-def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is() -> None:
+def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
+    monkeypatch.setattr("cosim.diagnose.fitter.corrected", fail)
     said: list[str] = []
     effect = SimpleNamespace(label="delay at motor.command")
     quick: Any = SimpleNamespace(
         effects=(effect,), simulator=None, estimate=SimpleNamespace(theta=None)
     )
-    search: Any = SimpleNamespace(corrected=fail, say=said.append)
-    assert Fitter.sharpened(search, quick, quick) is quick
+    search: Any = SimpleNamespace(raw=None, say=said.append)
+    assert Search.sharpened(search, quick, quick) is quick
     assert said == ["delay at motor.command could not be fitted thoroughly: unstable"]
 
 
