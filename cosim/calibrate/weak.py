@@ -19,12 +19,6 @@ WEAK = 1e-3
 """Share of the best known direction's information up to which a direction is measured again."""
 LONG, SHORT = 0.1, 0.01
 """Spans of the step with which that is done, and the least that the bounds must leave."""
-PLAIN = 10.0
-"""Standard deviations claimed beyond which no step goes: that would cost fifty nats if they were
-true, and farther on a jump is met, or what the others undo is not linear any more."""
-SPOILED = 1.1
-"""Share of a change that others undo from which it is a jump: parts cannot exceed the whole, unless
-information has been taken off for jumps; a tenth for rounding."""
 CLEAR = 10.0
 """Times as much information as on a direction that others must have to be kept apart from it."""
 
@@ -64,11 +58,7 @@ def confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Ve
             way = sign * direction * p.scale
             with np.errstate(divide="ignore", invalid="ignore"):
                 room = np.where(way > 0, p.upper - run.theta, p.lower - run.theta) / way
-            length = min(
-                LONG,
-                PLAIN / np.sqrt(values[i]),
-                float(np.nanmin(room, where=way != 0.0, initial=np.inf)),
-            )
+            length = min(LONG, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
             if length < SHORT:
                 continue
             try:
@@ -79,10 +69,7 @@ def confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Ve
             pairs = zip(moved, base, strict=True)
             square = sum(float(np.nansum((a - b) ** 2)) for (_, a), (_, b) in pairs)
             undone = along(moved) - here
-            part = float(np.sum(undone[better] ** 2 / values[better]))
-            if part > SPOILED * square:
-                continue
-            square -= part
+            square -= float(np.sum(undone[better] ** 2 / values[better]))
             drawn = sum(
                 (length * way[k] / item.prior) ** 2
                 for k, item in enumerate(p.parameters) if item.prior
