@@ -100,7 +100,7 @@ class Machine:
     def _acting(self, column: str, times: Vector) -> Vector:
         """A command as it acts."""
         begin, delay = self.late
-        back = np.where(times >= begin, round(delay / self.reading.interval) if delay else 0, 0)
+        back = np.where(times >= begin, round(delay / self.reading.interval), 0)
         return np.asarray(self.commands[column][np.arange(times.size) - back])
 
     def lines(self, block: int = 2000) -> Iterator[list[bytes]]:

@@ -49,12 +49,13 @@ Vector = NDArray[np.float64]
 
 def model_of(problem: Problem, entry: Mapping[str, Any], known: Mapping[str, float]) -> Problem:
     """The problem with a model's variants; what is not free is held at its start value."""
-    start = {**known, **flatten(entry.get("start", {}))}
+    given = flatten(entry.get("start", {}))
+    start = {**known, **given}
     for instance, effects in entry.get("add", {}).items():
         for effect in [effects] if isinstance(effects, str) else effects:
             problem = problem.with_effects({instance: f"+{effect}"})
-    how = {n: v for n, v in flatten(entry.get("start", {})).items() if n not in problem.names}
-    problem = problem.changed(constants={**problem.constants, **how})
+    fixed = {name: value for name, value in given.items() if name not in problem.names}
+    problem = problem.changed(constants={**problem.constants, **fixed})
     free = set(entry.get("free", ()))
     held = {
         p.name: start.get(p.name, p.nominal)
