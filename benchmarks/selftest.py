@@ -42,7 +42,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import diagnose
-from cosim.diagnose.candidates import Candidate
+from cosim.diagnose.candidates import Candidate, candidates
 from cosim.diagnose.diagnosis import Diagnosis
 from cosim.diagnose.linear import MATERIAL, Absorber, SampleStack
 from cosim.files import atomic
@@ -160,12 +160,16 @@ def judged(
     left = [channel["after"].get("validation") for channel in table["channels"].values()]
     over = [c["noise_rms"] for c in table["channels"].values()]
     sizes = [a / b for a, b in zip(left, over, strict=True) if a is not None]
+    fits = {(c.instance, c.port) for c in candidates(result.problem) if c.effect in names}
+    first = result.located[0] if result.located else None
     return {
         "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
         "left": round(max(sizes), 3) if sizes else None,
         "right": bool(named) and bool(set(names) & {named[0], *same}),
         "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
         "half_intervals_off": away,
+        "place": first.label if first else "",
+        "placed": (first.instance, first.port) in fits if first and fits else None,
         "wall_s": table["wall_s"],
     }  # fmt: skip
 
@@ -272,6 +276,9 @@ def summary(rows: list[dict[str, Any]]) -> str:
     # a model that lacks the effect has no true values to hold
     sound = [r for r in rows if r["right"] or (r["truth"] == "none" and not r["named"])]
     inside = [v for r in sound for v in r["covered"].values()]
+    asked = [
+        r["placed"] for r in rows if r["verdict"] == "unexplained" and r.get("placed") is not None
+    ]
     lines += [
         "",
         f"Right at the first name: {right} of {total} that the data show, "
@@ -279,7 +286,8 @@ def summary(rows: list[dict[str, Any]]) -> str:
         f"False alarms: {alarms} of {len(clean)} "
         f"clean sets. 95 % intervals of identifiable parameters that hold the truth, where the "
         f"model is right: "
-        f"{sum(inside)} of {len(inside)}.",
+        f"{sum(inside)} of {len(inside)}. "
+        f"`unexplained` with a place where what is missing enters: {sum(asked)} of {len(asked)}.",
     ]
     return "\n".join(lines) + "\n"
 

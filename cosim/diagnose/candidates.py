@@ -111,13 +111,13 @@ def candidates(problem: Problem) -> list[Candidate]:
     if not isinstance(provider, Catalogue):
         return []
     found = []
-    twins = _twins(problem)
+    others = twins(problem)
     for instance, variant in problem.instances.items():
         kind = component(variant)
         if not kind:
             continue  # a file: nothing can be added to it
         for effect, port, text in provider.candidates(variant):
-            if (instance, port) not in twins:
+            if (instance, port) not in others:
                 special = tuple(provider.contained(effect) if isinstance(provider, Kinship) else ())
                 found.append(Candidate(instance, kind, effect, port, text, contains=special))
         for entry in provider.refinements(variant):
@@ -200,7 +200,7 @@ def element_of(port: str) -> tuple[str, int] | None:
     return (match[1], int(match[2])) if match else None
 
 
-def _twins(problem: Problem) -> set[tuple[str, str]]:
+def twins(problem: Problem) -> set[tuple[str, str]]:
     """Balances that stand for the same shaft as one on the other end of a power bond.
 
     (Not the twins of a `Signature`, which do the same to first order.)

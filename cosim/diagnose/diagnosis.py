@@ -31,9 +31,9 @@ from .foreign import Adapter, attached
 from .foreign_file import leave_system
 from .foreign_words import placed
 from .further import judged
-from .grey_box import Site, site, unnamed
+from .grey_box import Site, single, site, unnamed
 from .linear import SampleStack
-from .localise import localise
+from .localise import everywhere, localise
 from .models import Fitted, is_open
 from .power import power
 from .result import PURPOSES, Diagnosis
@@ -163,7 +163,8 @@ def _searched(
         _judged(result, search, _found(result, search, base, asked))
         assert result.after is not None
         if asked or (law and result.verdict == "unexplained"):
-            result.law = unnamed(search, result.after, result.located, asked)
+            before = result.single.begun if result.single is not None else None
+            result.law = unnamed(search, result.after, result.located, asked, before)
     except StoppedError as stopped:
         why = str(stopped)
     search.simulator.budget.lift()
@@ -227,6 +228,9 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
                 whole = found
         if whole is not None and len(whole.effects) <= len(current.effects) + 1:
             break  # else rounds may do with fewer laws
+        one = result.single
+        if one is not None and one.begun.enough and search.lacking(current):
+            break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
             current = reconsidered(search, shortened, winners)
@@ -271,11 +275,20 @@ def _stopped(result: Diagnosis, search: Search, why: str) -> None:
 
 
 def _together(result: Diagnosis, current: Fitted) -> Fitted:
-    """The best set of effects by evidence along the log's motion, or the given model."""
-    search = result.search
-    assert search is not None
+    """The best set of effects by evidence along the log's motion, or the given model.
+
+    Of those at one place alone, if one law of one signal there would do.
+    """
+    search, base = result.search, result.before
+    assert search is not None and base is not None
+    search.say("where does it enter? Asked at all places")
+    result.located = everywhere(search, base, search.say)
+    result.single = one = single(search, base, current, result.located)
+    if one is not None and one.begun.law is not None:
+        result.located.sort(key=lambda place: place is not one.place)
+    only = one.place if one is not None and one.begun.enough else None
     try:
-        return together(search, current, result.located)
+        return together(search, current, result.located, only)
     except UnbuiltError as error:
         result.warnings.append(f"sets of effects were not compared along the log: {error}")
         search.say(result.warnings[-1])

@@ -15,7 +15,7 @@ Source: Bayesian linear regression (MacKay, Neural Computation 4, 1992: evidence
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..calibrate.parts import Channel, MeasuredRun, Parameter
 from ..calibrate.problem import Problem
 from ..errors import CosimError, VariantError
-from .candidates import Candidate, Catalogue, balances, element_of
+from .candidates import Candidate, Catalogue, balances, element_of, twins
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import Fitted
@@ -33,11 +33,12 @@ from .search import Search
 from .secant import model_values
 
 Vector = NDArray[np.float64]
-PROBE = "unknown_input"
+PROBE, TIME = "unknown_input", "time"
 RUNS = 1
 """Runs that are looked at: those with the largest residual over noise."""
 PLACES = 4
-"""Places that are probed, the best ones of the catalogue's scores first."""
+"""Places that are probed over all that may drive a force there: those with the best candidates, or,
+where all places are asked over time first, the best of these."""
 AIM = 3.0
 """Largest change by the probe, in units of the largest residual: where the system is asked."""
 ELEMENTS = 6
@@ -97,10 +98,15 @@ class Place:
         return f"{self.instance}.{self.port}" + (f"[{self.element}]" if self.element else "")
 
     @property
+    def shaft(self) -> str:
+        """As candidates name it, whose shafts of a vector have names of their own."""
+        return f"{self.instance}.{self.port}" + (f"_{self.element}" if self.element else "")
+
+    @property
     def evidence(self) -> float:
         """Of the best kind of curve; curves against time of several runs count together."""
-        over_time = sum(c.evidence for c in self.curves if c.driver == "time")
-        return max([over_time, *(c.evidence for c in self.curves if c.driver != "time")])
+        over_time = sum(c.evidence for c in self.curves if c.driver == TIME)
+        return max([over_time, *(c.evidence for c in self.curves if c.driver != TIME)])
 
     def to_dict(self) -> dict[str, Any]:
         """As in the JSON."""
@@ -114,26 +120,48 @@ class Place:
 def localise(
     search: Search, base: Fitted, ranked: Sequence[Candidate], say: Callable[[str], None]
 ) -> list[Place]:
-    """Places by evidence, the best first.
+    """Places with promising candidates by evidence, the best first.
 
     Args:
         search: the data.
         base: calibrated model whose residual is asked about.
-        ranked: candidates of the catalogue, the best first: they tell which places are probed
-            first where there are many.
+        ranked: candidates of the catalogue, the best first: they tell which places are probed.
         say: told what is done.
     """
-    problem = base.problem
-    if not isinstance(problem.provider, Catalogue):
-        return []
+    known = _balances(base.problem)
+    places = dict.fromkeys(p for c in ranked if (p := (c.instance, c.port)) in known)
+    return _probed(search, base, places, say, PLACES)
+
+
+def everywhere(search: Search, base: Fitted, say: Callable[[str], None]) -> list[Place]:
+    """Places by evidence, the best first; all are asked, whatever the catalogue has there.
+
+    Where no law fits, the catalogue's scores say little of the place: what is missing may be the
+    only law there that moves the model much.
+    """
+    over_time = _probed(search, base, _balances(base.problem), say, None, drivers=(TIME,))
+    best = list(dict.fromkeys((p.instance, p.port) for p in over_time))[:PLACES]
+    found = _probed(search, base, best, say, None)
+    return found + [p for p in over_time if (p.instance, p.port) not in best]
+
+
+def _probed(
+    search: Search,
+    base: Fitted,
+    places: Iterable[tuple[str, str]],
+    say: Callable[[str], None],
+    most: int | None,
+    drivers: Collection[str] = (),
+) -> list[Place]:
+    """The first places that can be probed, by evidence."""
     runs = worst(search, base, RUNS)
     found: list[Place] = []
     probed = 0
-    for instance, port in _places(problem, ranked):
-        if probed == PLACES:
+    for instance, port in places:
+        if probed == most:
             break
         try:
-            found += _Bench(search, base, runs, instance, port).places()
+            found += _Bench(search, base, runs, instance, port).places(drivers)
             probed += 1
         except VariantError:
             continue  # a mass centre or the direction of gravity: nothing can enter there
@@ -151,13 +179,14 @@ def worst(judge: Judge, base: Fitted, most: int) -> list[MeasuredRun]:
     return [judge.fitting.runs[int(i)] for i in sorted(order)]
 
 
-def _places(problem: Problem, ranked: Sequence[Candidate]) -> list[tuple[str, str]]:
-    """Balances, those with promising candidates first."""
-    names = set(balances(problem))
+def _balances(problem: Problem) -> list[tuple[str, str]]:
+    """Where an input may enter: elements of shafts one by one, each shaft at one of its ends."""
+    if not isinstance(problem.provider, Catalogue):
+        return []
+    names = balances(problem)
     parts = [(name, element_of(port)) for name, port in names]
-    known = names - {(name, part[0]) for name, part in parts if part}  # elements are probed
-    order = [(c.instance, c.port) for c in ranked if (c.instance, c.port) in known]
-    return list(dict.fromkeys(order))
+    not_asked = {(name, part[0]) for name, part in parts if part} | twins(problem)
+    return [place for place in names if place not in not_asked]
 
 
 class _Bench:
@@ -234,8 +263,12 @@ class _Bench:
         change = self.stacks[names].vector([r[:, :-1] for r in rows]) - self.base[names]
         return change, np.concatenate([r[:, -1] for r in rows])
 
-    def places(self) -> list[Place]:
-        """With a curve per driver, and one against time per run."""
+    def places(self, only: Collection[str] = ()) -> list[Place]:
+        """With a curve per driver, and one against time per run.
+
+        Args:
+            only: drivers that are asked, all if not given.
+        """
         found = []
         for element in self.elements or [""]:
             place = Place(self.instance, self.port, element, self.unit)
@@ -243,9 +276,9 @@ class _Bench:
             size = self._size(share)
             if size is None:
                 continue
-            for driver in self.drivers:
+            for driver in only or self.drivers:
                 every: list[tuple[str, ...]] = [tuple(self.names)]
-                if driver == "time":
+                if driver == TIME:
                     every = [(n,) for n in self.names]
                 for names in every:
                     curve = self._curve(driver, names, share, size)
@@ -295,7 +328,7 @@ class _Bench:
             columns.append(self.absorber[names].rest(change) / size)
         return regressed(
             np.column_stack(columns), self.residual[names], driver,
-            names[0] if driver == "time" else "", np.linspace(low, high, self.knots),
+            names[0] if driver == TIME else "", np.linspace(low, high, self.knots),
         )  # fmt: skip
 
 

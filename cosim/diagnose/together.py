@@ -80,13 +80,16 @@ def ahead(search: Search) -> bool:
     return len(search.known) * len(search.fitting.runs) <= AHEAD
 
 
-def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitted:
+def together(
+    search: Search, current: Fitted, located: Sequence[Place], only: Place | None = None
+) -> Fitted:
     """The best set of effects that is found so; the given model, if none is better.
 
     Args:
         search: the data, and fits so far; gets those that are made here.
         current: the best model of the rounds.
         located: where a free force explains most, first.
+        only: the place whose laws are asked, all if not given.
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
@@ -103,6 +106,7 @@ def together(search: Search, current: Fitted, located: Sequence[Place]) -> Fitte
             search.say(f"along the log by efforts at {names}: mean square {followed.left:.3g}")
             responses = Responses(followed, search.fitting)
             known = search.offered(candidates(declared.problem))
+            known = [c for c in known if only is None or c.place == only.shaft]
             directions = responses.of(known)
         except UnbuiltError:
             raise

@@ -3,5 +3,6 @@
 from .bench import Site, site
 from .chain import unnamed
 from .result import LawFromData
+from .single import One, single
 
-__all__ = ["LawFromData", "Site", "site", "unnamed"]
+__all__ = ["LawFromData", "One", "Site", "single", "site", "unnamed"]

@@ -138,7 +138,8 @@ class LawBench:
 
     Attributes:
         signals: on which a law there may depend.
-        ranges: what the identification runs visit of each.
+        ranges: what all runs visit of each; where those that are fitted do not go, a law goes on
+            as smoothly as it came.
 
     Raises:
         VariantError: no law can enter there.
@@ -208,15 +209,18 @@ class LawBench:
         found = {}
         for signal in self.signals:
             weight = {f"{self.site.prefix}wy_{signal}": 1.0}
-            (values,) = self.recorded(None, self.base.estimate.theta, None, ("y",), weight)
+            names = tuple(dict.fromkeys((*self.names, *self.search.checking.names)))
+            (values,) = self.recorded(None, self.base.estimate.theta, None, ("y",), weight, names)
             found[signal] = float(np.min(values)), float(np.max(values))
         return found
 
     def recorded(
         self, shape: Shape | None, theta: Vector, coefficients: Vector | None,
         outputs: Sequence[str] = ("x", "y"), constants: Mapping[str, float] | None = None,
+        names: Sequence[str] = (),
     ) -> list[Vector]:  # fmt: skip
-        """Outputs of the law along the identification runs, one run after the other."""
+        """Outputs of the law along runs, all identification runs if not given, one by one."""
+        names = names or self.names
         law = [] if coefficients is None else self.coefficients()
         problem = self.shaped(shape, law)
         spies = [Channel(name, "", 1.0, self.site.prefix + name) for name in outputs]
@@ -224,15 +228,15 @@ class LawBench:
             replace(
                 problem.run(n), data=np.zeros((problem.run(n).times.size, len(spies))), noise=None
             )
-            for n in self.names
+            for n in names
         ]
         problem = problem.changed(
             constants={**problem.constants, **(constants or {})}, channels=spies, runs=runs,
-            relative=(), parameters=[p for p in problem.parameters if p.run in ("", *self.names)],
+            relative=(), parameters=[p for p in problem.parameters if p.run in ("", *names)],
         )  # fmt: skip
-        kept = [p.run in ("", *self.names) for p in self.problem.parameters]
+        kept = [p.run in ("", *names) for p in self.problem.parameters]
         theta = theta[kept] if coefficients is None else np.append(theta[kept], coefficients)
-        rows = self.search.simulator.of(problem).residuals(theta, self.names)
+        rows = self.search.simulator.of(problem).residuals(theta, names)
         together = -np.concatenate([rest for _, rest in rows])
         return list(together.T)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,11 @@ CROSSED = 0.05
 
 
 def unnamed(
-    search: Search, base: Fitted, located: Sequence[Place], asked: Site | None = None
+    search: Search,
+    base: Fitted,
+    located: Sequence[Place],
+    asked: Site | None = None,
+    begun: Begun | None = None,
 ) -> LawFromData | None:
     """A law from the data at the place that was asked for, else where something enters clearly.
 
@@ -43,6 +47,7 @@ def unnamed(
         base: fitted model that lacks it.
         located: places where an unknown input would explain the residual, the best first.
         asked: the place; errors are raised then, else they are the law's reason.
+        begun: what was found out there before.
     """
     if asked is not None:
         found = law_from_data(search, base, asked)
@@ -54,29 +59,57 @@ def unnamed(
     search.say(f"a law from the data at {first.label}")
     place = Site(first.instance, first.port, first.element, first.unit)
     try:
-        found = law_from_data(search, base, place)
+        found = law_from_data(search, base, place, begun)
     except CosimError as error:  # an extra: the verdict stands without it
         return LawFromData(place, False, f"No law at {place.label}: {error}.", search, base)
-    if len(located) > 1 and first.evidence - located[1].evidence < GATE:
-        found.reason += f" It may as well act at {located[1].label}."
+    alike = begun.alike if begun is not None and begun.maker.bench.site == place else ()
+    if not alike and len(located) > 1 and abs(first.evidence - located[1].evidence) < GATE:
+        alike = (located[1].label,)
+    if alike:
+        found.reason += f" It may as well act at {' or '.join(alike)}."
     return found
 
 
-def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
+@dataclass(frozen=True)
+class Begun:
+    """Laws of one signal at a place, to first order.
+
+    Attributes:
+        maker: of laws there.
+        trials: all that were tried there, the best first.
+        law: the best one fitted, None if it was not.
+        enough: whether that leaves noise in all runs.
+        alike: places at which a law of one signal would gain as much.
+    """
+
+    maker: Maker
+    trials: list[Trial]
+    law: Law | None = None
+    enough: bool = False
+    alike: tuple[str, ...] = ()
+
+
+def law_from_data(
+    search: Search, base: Fitted, site: Site, begun: Begun | None = None
+) -> LawFromData:
     """The law that the data want at a place, with all that is said about it.
 
     Args:
         search: the data.
         base: fitted model that lacks it.
         site: where.
+        begun: what was found out before, if that was there and with the same model.
 
     Raises:
         UnknownNameError: the place has no such element.
         VariantError: no law can enter there.
         CosimError: the system with a law there cannot be simulated.
     """
-    maker, say = Maker(LawBench(search, base, site)), search.say
-    trials = sorted(singles(maker), key=lambda t: -t.expected)
+    say = search.say
+    if begun is None or begun.maker.bench.site != site or begun.maker.bench.base is not base:
+        maker = Maker(LawBench(search, base, site))
+        begun = Begun(maker, sorted(singles(maker), key=lambda t: -t.expected))
+    maker, trials = begun.maker, begun.trials
     result = LawFromData(site, False, "", search, base, maker)
     if not trials:
         result.reason = f"No signal of {site.label} moves, so a law there would be a constant."
@@ -91,7 +124,10 @@ def law_from_data(search: Search, base: Fitted, site: Site) -> LawFromData:
             "runs that it was not made from."
         )
         return result
-    law = refined(maker, best_of(maker, trials, is_open(base.estimate), say), say)
+    if begun.law is not None and begun.enough:
+        law = begun.law
+    else:
+        law = refined(maker, best_of(maker, trials, is_open(base.estimate), say), say)
     others = pairs(maker, law) if search.lacking(law.fitted) else []
     result.needed = math.log((len(trials) + len(others)) / LEVEL)
     others = [item for item in others if item[0] > result.needed]
@@ -259,12 +295,12 @@ def singles(maker: Maker) -> list[Trial]:
     """Laws of one signal of the place, to first order."""
     bench, found = maker.bench, []
     for signal in varying(bench):
-        if signal in ANGLES:
+        width = math.inf if signal in ANGLES else dense(bench, signal)
+        shapes = [Shape("x", x=bench.axis_x(signal, dense=width))]
+        if signal in ANGLES:  # a spring goes on where a ripple repeats
             far = maker.search.lacking(bench.base)
             orders = sorted({1, best_order(maker, None) if far else 1})
-            shapes = [Shape("y", y=bench.axis_y(signal, order)) for order in orders]
-        else:
-            shapes = [Shape("x", x=bench.axis_x(signal, dense=dense(bench, signal)))]
+            shapes += [Shape("y", y=bench.axis_y(signal, order)) for order in orders]
         for shape in shapes:
             found += maker.tried(shape)
     return found

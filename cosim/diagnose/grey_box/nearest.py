@@ -98,7 +98,7 @@ def nearest(maker: Maker, law: Law) -> list[Named]:
     search, site = maker.search, maker.bench.site
     port = f"{site.port}_{site.element}" if site.element else site.port
     here = [
-        c for c in candidates(maker.bench.base.problem)
+        c for c in search.offered(candidates(maker.bench.base.problem))
         if (c.instance, c.port) == (site.instance, port) and c.refinement is None
     ]  # fmt: skip
     drafts: list[tuple[Fitted, Problem, dict[str, float]]] = []

@@ -2,7 +2,7 @@
 
 Terms are written in the functions of the smooth law (each is a direction of its coefficients), so
 that their likelihood comes from the same Gram matrices and the same FMU carries them. They are
-added one by one, the one first by which runs that are left out gain most.
+added one by one after the first two, those first by which runs that are left out gain most.
 
 Source: forward selection (Miller, Subset Selection in Regression, 2002).
 """
@@ -10,6 +10,7 @@ Source: forward selection (Miller, Subset Selection in Regression, 2002).
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +88,10 @@ def formula(maker: Maker, law: Law, around: Trial) -> Trial | None:
         law: the smooth one.
         around: the same shape to first order around it.
     """
-    x, y = (values[:: max(values.size // POINTS, 1)] for values in maker.visited(law))
+    seen = [values[:: max(values.size // POINTS, 1)] for values in maker.visited(law)]
+    # a term holds where no fitted run goes, too
+    ends = zip(seen, _spread(law.shape, seen), strict=True)
+    x, y = (np.concatenate([values, more]) for values, more in ends)
     design = law.shape.design(x, y)
     images: dict[str, Vector] = {}
     for word, term in library(law.shape).items():
@@ -97,20 +101,32 @@ def formula(maker: Maker, law: Law, around: Trial) -> Trial | None:
         if size > 0.0 and np.sqrt(np.mean((design @ image - values) ** 2)) < EXACT * size:
             images[word] = image
     best: Trial | None = None
-    words: list[str] = []
+    words: tuple[str, ...] = ()
     while len(words) < min(MOST, len(images)):
-        trials = [_trial(maker, around, images, [*words, w]) for w in images if w not in words]
-        first = max(trials, key=lambda t: t.expected)
+        more: list[tuple[str, ...]] = [(w,) for w in images if w not in words]
+        if not words:  # a declared parameter may undo much of one term, and only two make sense
+            more += list(combinations(images, 2))
+        trials = [_trial(maker, around, images, (*words, *w)) for w in more]
+        first = max(trials, key=lambda t: t.expected - GATE * len(t.words))
         if best is not None and first.expected < best.expected + GATE:
             break
-        best, words = first, list(first.words)
+        best, words = first, first.words
     if best is None or best.expected < around.expected - GATE:
         return None
     return best
 
 
-def _trial(maker: Maker, around: Trial, images: dict[str, Vector], words: list[str]) -> Trial:
+def _spread(shape: Shape, seen: list[Vector]) -> list[Vector]:
+    """As many points all over the ranges of a law's signals, in no order."""
+    random, found = np.random.default_rng(0), []
+    for axis, values in zip((shape.x, shape.y), seen, strict=True):
+        first, last = (axis.first, axis.last) if axis else (0.0, 0.0)
+        found.append(random.uniform(first, last, values.size))
+    return found
+
+
+def _trial(maker: Maker, around: Trial, images: dict[str, Vector], words: tuple[str, ...]) -> Trial:
     turn = np.column_stack([images[word] for word in words])
     grams = tuple(gram.form(turn) for gram in around.grams)
     found = regress(grams, [np.zeros((len(words), len(words)))], maker.declared)
-    return Trial(around.shape, grams, found, around.shape.expansion @ turn, tuple(words))
+    return Trial(around.shape, grams, found, around.shape.expansion @ turn, words)

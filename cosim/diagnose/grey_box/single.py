@@ -1,0 +1,99 @@
+"""Is it one law of one signal at one place? Asked before sets of named laws are compared.
+
+At the places where a free curve explains most, a smooth law of each signal is asked to first order:
+what it would gain on each run if made from the others. A curve over time explains as much at all
+places of one shaft; a law holds from run to run only at its place and over its signal. The best one
+is fitted. If it leaves noise, what is missing acts there and on that signal, whatever it is called:
+named laws at other places could only describe it worse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...errors import CosimError
+from ..localise import PLACES, TIME, Place
+from ..models import GATE, LEVEL, Fitted
+from ..search import Search
+from ..whiteness import whiteness_tests
+from .bench import LawBench, Site
+from .chain import Begun, improved, refined, singles
+from .terms import formula
+from .trial import Law, Maker, Trial
+
+SAME = 0.01
+"""Share of what a law is expected to gain by which one elsewhere may gain less and do as well:
+first orders of one model at two ends of a shaft differ by less."""
+
+
+@dataclass(frozen=True)
+class One:
+    """The best law of one signal.
+
+    Attributes:
+        place: where.
+        begun: laws there.
+    """
+
+    place: Place
+    begun: Begun
+
+
+def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Place]) -> One | None:
+    """The law of one signal that runs left out want most; None if no place can be asked.
+
+    Args:
+        search: the data.
+        base: the declared model.
+        current: the best model with named laws.
+        located: where free curves enter the declared one.
+    """
+    asked: list[tuple[float, Place, Maker, list[Trial]]] = []
+    for place in located[:PLACES]:
+        try:
+            maker = Maker(LawBench(search, base, site_of(place)))
+            trials = sorted(singles(maker), key=lambda t: -t.expected)
+        except CosimError as error:
+            search.say(f"no law at {place.label}: {error}")
+            continue
+        best = max((t.expected for t in trials if _signal(t) != TIME), default=-math.inf)
+        asked.append((best, place, maker, trials))
+    if not asked:
+        return None
+    count = sum(len(trials) for *_, trials in asked)
+    best, place, maker, trials = max(asked, key=lambda item: item[0])
+    if best <= math.log(count / LEVEL):
+        return One(asked[0][1], Begun(*asked[0][2:]))
+    first = next(t for t in trials if _signal(t) != TIME)
+    near = best - max(SAME * best, GATE)
+    alike = tuple(p.label for gain, p, *_ in asked if gain > near and p is not place)
+    search.say(f"a law of {first.shape.label} at {place.label}?")
+    try:
+        law = improved(maker, first, search.say)
+        if search.lacking(law.fitted) and search.gains(current, law.fitted)[0] > GATE:
+            law = refined(maker, law, search.say)
+        enough = _leaves_noise(search, law)
+        if not enough and not search.lacking(law.fitted):  # unused runs may go farther
+            short = formula(maker, law, *maker.tried(law.shape, law))
+            enough = short is not None and _leaves_noise(search, maker.fitted(short, law))
+    except CosimError as error:
+        search.say(f"{place.label}: {error}")
+        return One(place, Begun(maker, trials, alike=alike))
+    return One(place, Begun(maker, trials, law, enough, alike))
+
+
+def site_of(place: Place) -> Site:
+    """A place as that of a law."""
+    return Site(place.instance, place.port, place.element, place.unit)
+
+
+def _signal(trial: Trial) -> str:
+    return trial.shape.axes[0].signal
+
+
+def _leaves_noise(search: Search, law: Law) -> bool:
+    """Whether it leaves nothing but noise, also in runs that were not used."""
+    unused = whiteness_tests(search.check_data - law.fitted.check, search.checking)
+    return not search.lacking(law.fitted) and not any(s.structured for s in unused)
