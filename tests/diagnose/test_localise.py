@@ -11,7 +11,7 @@ from benchmarks.bench import Bench
 from benchmarks.motor_plant import draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.localise import localise, regressed
+from cosim.diagnose.localise import PLACES, everywhere, localise, regressed
 from cosim.diagnose.search import Search
 from tests.problems import simulator
 
@@ -61,4 +61,12 @@ def test_the_missing_force_is_found_where_it_acts(tmp_path: Path) -> None:
     # 4.6 nats: a hundred times as likely
     assert best.evidence > other.evidence + 4.6
     assert best.curves[0].explained > 0.5
+    # a catalogue that has nothing there does not hide the place
+    search.known = [chosen["load", "flange"]]
+    ranked = localise(search, search.calibrated(), search.known, print)
+    assert [(p.instance, p.port) for p in ranked] == [("load", "flange")]
+    found = everywhere(search, search.calibrated(), print)
+    assert len(found) > PLACES
+    # an error of the torque constant does nearly the same, to first order
+    assert ("motor", "winding") in [(p.instance, p.port) for p in found[:2]]
     search.close()

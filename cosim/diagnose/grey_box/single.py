@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ...errors import CosimError
 from ..localise import PLACES, TIME, Place
@@ -23,6 +24,8 @@ from .chain import Begun, improved, refined, singles
 from .terms import formula
 from .trial import Law, Maker, Trial
 
+HALF = 0.5
+"""Share of the worst run from which a free curve explains most of it."""
 SAME = 0.01
 """Share of what a law is expected to gain by which one elsewhere may gain less and do as well:
 first orders of one model at two ends of a shaft differ by less."""
@@ -50,7 +53,7 @@ def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Plac
         current: the best model with named laws.
         located: where free curves enter the declared one.
     """
-    asked: list[tuple[float, Place, Maker, list[Trial]]] = []
+    asked: list[_There] = []
     for place in located[:PLACES]:
         try:
             maker = Maker(LawBench(search, base, site_of(place)))
@@ -58,30 +61,62 @@ def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Plac
         except CosimError as error:
             search.say(f"no law at {place.label}: {error}")
             continue
-        best = max((t.expected for t in trials if _signal(t) != TIME), default=-math.inf)
-        asked.append((best, place, maker, trials))
-    if not asked:
-        return None
-    count = sum(len(trials) for *_, trials in asked)
-    best, place, maker, trials = max(asked, key=lambda item: item[0])
-    if best <= math.log(count / LEVEL):
-        return One(asked[0][1], Begun(*asked[0][2:]))
-    first = next(t for t in trials if _signal(t) != TIME)
-    near = best - max(SAME * best, GATE)
-    alike = tuple(p.label for gain, p, *_ in asked if gain > near and p is not place)
+        asked.append(_There(place, maker, trials))
+    chosen = _chosen(asked)
+    if chosen is None:
+        return One(asked[0].place, Begun(asked[0].maker, asked[0].trials)) if asked else None
+    (place, maker, trials), first = chosen
     search.say(f"a law of {first.shape.label} at {place.label}?")
+    near = max(first.expected - max(SAME * first.expected, GATE), 0.0)
+    alike = tuple(
+        there.place.label
+        for there in asked
+        if there.place is not place and any(t.expected > near for t in there.trials)
+    )
     try:
         law = improved(maker, first, search.say)
         if search.lacking(law.fitted) and search.gains(current, law.fitted)[0] > GATE:
             law = refined(maker, law, search.say)
         enough = _leaves_noise(search, law)
+        if not enough:
+            law = maker.exact(law)
+            enough = _leaves_noise(search, law)
         if not enough and not search.lacking(law.fitted):  # unused runs may go farther
             short = formula(maker, law, *maker.tried(law.shape, law))
-            enough = short is not None and _leaves_noise(search, maker.fitted(short, law))
+            enough = short is not None and _leaves_noise(
+                search, maker.exact(maker.fitted(short, law))
+            )
     except CosimError as error:
         search.say(f"{place.label}: {error}")
         return One(place, Begun(maker, trials, alike=alike))
     return One(place, Begun(maker, trials, law, enough, alike))
+
+
+class _There(NamedTuple):
+    """A place, laws there, and all of one signal, the best first."""
+
+    place: Place
+    maker: Maker
+    trials: list[Trial]
+
+
+def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
+    """The law that is fitted.
+
+    That which runs left out want most. So far off that first orders tell nothing of other runs, it
+    is that over whose signal a free curve explains most of the worst one.
+    """
+    laws = [(there, t) for there in asked for t in there.trials if _signal(t) != TIME]
+    needed = math.log(max(sum(len(there.trials) for there in asked), 1) / LEVEL)
+    best = max(laws, key=lambda item: item[1].expected, default=None)
+    if best is None or best[1].expected > needed:
+        return best
+    curves = [(c, there) for there in asked for c in there.place.curves if c.explained > HALF]
+    for curve, there in sorted(curves, key=lambda item: -item[0].evidence):
+        for trial in there.trials:
+            if _signal(trial) == curve.driver != TIME:
+                return there, trial
+    return None
 
 
 def site_of(place: Place) -> Site:

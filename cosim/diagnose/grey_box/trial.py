@@ -277,6 +277,12 @@ class Maker:
         rest = vectors[:, others] * deviation[others]
         return Law(trial, self._judged(result), directions, rest)
 
+    def exact(self, law: Law) -> Law:
+        """The law fitted again where the errors of the communication step are those at its end."""
+        estimate = law.fitted.estimate
+        right = corrected(estimate.simulator, estimate.theta, self.search.raw)
+        return replace(law, fitted=self._judged(fit(right, estimate.theta, effort=QUICK)))
+
     def visited(self, law: Law) -> list[Vector]:
         """x and y of a law along the identification runs."""
         theta = law.fitted.estimate.theta[: self.count]
