@@ -34,12 +34,13 @@ from .further import judged
 from .grey_box import Site, single, site, unnamed
 from .linear import SampleStack
 from .localise import everywhere, localise
-from .models import Fitted, is_open
+from .models import GATE, Fitted, is_open
 from .power import power
 from .result import PURPOSES, Diagnosis
 from .rivals import elsewhere, reconsidered, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
+from .shortlist import PART
 from .table import candidates_of, table_of
 from .together import ahead, together
 from .unstable import ends
@@ -233,7 +234,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
             break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
-            current = reconsidered(search, shortened, winners)
+            current = _exchanged(search, reconsidered(search, shortened, winners))
             break
         current = shortened
     else:
@@ -245,6 +246,30 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     return current
+
+
+def _exchanged(search: Search, fitted: Fitted) -> Fitted:
+    """A model that leaves noise, or one with as many laws that leaves less of slow parts.
+
+    A law that does nearly the same as the right one leaves next to noise, but not white noise; it
+    goes when the right one comes beside it.
+    """
+    slow = [t.channel for p in PURPOSES for t in _tests(search, fitted, p) if t.slow_parts]
+    if not slow or search.raw.unstable or not fitted.effects:
+        return fitted
+    search.say(f"slow parts are left in {', '.join(dict.fromkeys(slow))}: does another law do?")
+    seen = [s for stage in search.rounds for s in stage.signatures]
+    least = PART * max(s.score.gain for s in seen)
+    near = {s.candidate.label for s in seen if s.score.gain >= least}
+    found = search.round(fitted, near).winner
+    search.rounds.pop()
+    if found is None:
+        return fitted
+    found = examined(search, found, candidates_of(search.rounds))
+    if len(found.effects) > len(fitted.effects) or search.gains(fitted, found)[0] <= GATE:
+        return fitted
+    search.say(f"instead: {', '.join(sorted(found.labels))}")
+    return found
 
 
 def _slight(search: Search, stage: Round, say: Callable[[str], None]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -200,16 +200,22 @@ class Search(LateValueFitter):
         few = int(np.searchsorted(shares, TELLING)) + 1
         return SampleStack(self.raw, [run for _, run in near[:few]]) if near else self.fitting
 
-    def scored(self, base: Fitted) -> Round:
-        """Score all candidates against a model's residual.
+    def scored(self, base: Fitted, among: Collection[str] | None = None) -> Round:
+        """Score candidates against a model's residual.
 
         Where the model evidently lacks something, one run tells which candidates are worth the
         simulation of all runs.
+
+        Args:
+            base: the model.
+            among: their labels, all if not given.
         """
         if base.effects and self.whole:  # what was added may have balances of its own
             self.known = self.offered(candidates(base.problem))
         present = {item.label for item in base.effects}
-        chosen = [c for c in self.known if c.label not in present]
+        chosen = [
+            c for c in self.known if c.label not in present and (among is None or c.label in among)
+        ]
         stack = self.telling(base)
         bench = self.bench(base, stack)
         signatures = bench.followed(bench.begun(chosen, thorough=stack is not self.fitting))
@@ -234,29 +240,34 @@ class Search(LateValueFitter):
         signatures.sort(key=lambda s: -s.score.gain)
         return Round(base, signatures, named, aside, probes=probes)
 
-    def round(self, base: Fitted) -> Round:
+    def round(self, base: Fitted, among: Collection[str] | None = None) -> Round:
         """Score, refit the best, choose.
+
+        Args:
+            base: the model.
+            among: labels of the candidates, all if not given.
 
         Where that finds nothing for a model whose parameters were driven to their bounds, once more
         around their nominal values: what was calibrated then hides what is missing.
         """
-        current = self._round(base, base)
+        current = self._round(base, base, among)
         if current.winner is None and self.far(base):
             self.say("parameters stand at their bounds: once more around their nominal values")
-            current = self._round(base, self.unfitted(base))
+            current = self._round(base, self.unfitted(base), among)
         self.rounds.append(current)
-        if self.whole and current.winner is not None:
+        if self.whole and current.winner is not None and among is None:
             self.prepare(current.winner.problem)
         return current
 
-    def _round(self, base: Fitted, start: Fitted) -> Round:
+    def _round(self, base: Fitted, start: Fitted, among: Collection[str] | None) -> Round:
         """A round whose candidates are scored, and fits begun, around another model's parameters.
 
         Args:
             base: from which gains count.
             start: the same model with parameters to begin with.
+            among: see `round`.
         """
-        current = self.scored(start)
+        current = self.scored(start, among)
         current.base = base
         first = promising(self, current)
         base = self.attempted(start, current, first)
