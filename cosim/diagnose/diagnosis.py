@@ -234,7 +234,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
             break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
-            current = _exchanged(search, reconsidered(search, shortened, winners))
+            current = exchanged(search, reconsidered(search, shortened, winners))
             break
         current = shortened
     else:
@@ -248,7 +248,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     return current
 
 
-def _exchanged(search: Search, fitted: Fitted) -> Fitted:
+def exchanged(search: Search, fitted: Fitted) -> Fitted:
     """A model that leaves noise, or one with as many laws that leaves less of slow parts.
 
     A law that does nearly the same as the right one leaves next to noise, but not white noise; it
