@@ -26,6 +26,9 @@ from .trial import Law, Maker, Trial
 
 HALF = 0.5
 """Share of the worst run from which a free curve explains most of it."""
+PART = 0.1
+"""Share of all there is to gain in runs left out from which first orders tell the law; below, its
+place may be one that makes up for what acts elsewhere."""
 SAME = 0.01
 """Share of what a law is expected to gain by which one elsewhere may gain less and do as well:
 first orders of one model at two ends of a shaft differ by less."""
@@ -103,13 +106,13 @@ class _There(NamedTuple):
 def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
     """The law that is fitted.
 
-    That which runs left out want most. So far off that first orders tell nothing of other runs, it
-    is that over whose signal a free curve explains most of the worst one.
+    That which runs left out want most. Where first orders tell little of other runs, it is that
+    over whose signal a free curve explains most of the worst one.
     """
     laws = [(there, t) for there in asked for t in there.trials if _signal(t) != TIME]
     needed = math.log(max(sum(len(there.trials) for there in asked), 1) / LEVEL)
     best = max(laws, key=lambda item: item[1].expected, default=None)
-    if best is None or best[1].expected > needed:
+    if best is None or best[1].expected > max(needed, PART * _all(best[1])):
         return best
     curves = [(c, there) for there in asked for c in there.place.curves if c.explained > HALF]
     for curve, there in sorted(curves, key=lambda item: -item[0].evidence):
@@ -117,6 +120,11 @@ def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
             if _signal(trial) == curve.driver != TIME:
                 return there, trial
     return None
+
+
+def _all(trial: Trial) -> float:
+    """What a law would gain that leaves nothing, residuals counted as in its first orders."""
+    return 0.5 * sum(float(gram.matrix[-1, -1]) for gram in trial.grams)
 
 
 def site_of(place: Place) -> Site:
