@@ -306,6 +306,8 @@ def _together(result: Diagnosis, current: Fitted) -> Fitted:
     """
     search, base = result.search, result.before
     assert search is not None and base is not None
+    if search.raw.late:  # start values that decide when casters turn over hide first orders
+        return current
     search.say("where does it enter? Asked at all places")
     result.located = everywhere(search, base, search.say)
     result.single = one = single(search, base, current, result.located)

@@ -131,7 +131,8 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
     more["hints"] = [{"effects": [law], "explained": 0.61, "left": left, "first_order": False,
                       "why": ["its strength has the wrong sign"]}]  # fmt: skip
     more["law_from_data"] = {
-        "place": "load.flange", "unit": "N.m",
+        "place": "load.flange", "unit": "N.m", "made": True, "formula": "-0.4 sign(velocity)",
+        "depends_on": "velocity",
         "curve": {"driver": "velocity", "at": [-1.0, 0.0, 1.0], "value": [0.4, 0.0, -0.4],
                   "deviation": [0.1, 0.1, 0.1]},
         "channels": {"speed": {"noise_rms": 0.155, "before": 0.5, "after": 0.16}},
@@ -144,6 +145,8 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
         "speed at 2.50×",
         "A law from the data",
         "0.16 (1.03×)",
+        "-0.4 sign(velocity) at load.flange holds on unused runs",
+        "what there depends on velocity?",
     ):
         assert part in text
 

@@ -323,7 +323,13 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         join("Calibration and every effect of the catalogue were tried; none explains what is left "
              "of ", words([tag("b", name) for name in facts.left]), " on unused runs."),
     ]  # fmt: skip
-    driver = ""
+    driver, law = "", facts.table.get("law_from_data") or {}
+    if law.get("made"):
+        meaning.append(
+            join("A law made from the data says more: ", tag("code", law["formula"]), " at ",
+                 tag("code", law["place"]), " holds on unused runs; ",
+                 tag("a", "its curve, and what it leaves", href="#law"), ".")
+        )  # fmt: skip
     if where is not None:
         number, best = best_curve(where)
         driver = best["driver"].replace("_", " ")
@@ -342,10 +348,12 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         )  # fmt: skip
     meaning.append(join(facts.table.get("inside", "")))
     steps = _compare(facts)
-    if where is not None:
+    if law.get("made"):
+        at, driver = str(law["place"]), str(law["depends_on"])
+    if at:
         steps.append(
             join(tag("b", "Look"), " ", facts.in_words(at), ": what there depends on ",
-                 tag("b", driver), "?")
+                 tag("b", driver.replace("_", " ")), "?")
         )  # fmt: skip
     steps += [
         join(tag("b", "Repeat"), " the run that shows it most, once slower and once with another "
