@@ -259,7 +259,7 @@ class Search(LateValueFitter):
             self.prepare(current.winner.problem)
         return current
 
-    def _round(self, base: Fitted, start: Fitted, among: Collection[str] | None) -> Round:
+    def _round(self, base: Fitted, start: Fitted, among: Collection[str] | None = None) -> Round:
         """A round whose candidates are scored, and fits begun, around another model's parameters.
 
         Args:

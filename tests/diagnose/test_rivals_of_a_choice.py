@@ -239,7 +239,7 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
 
     current = SimpleNamespace(signatures=signatures, winner=None, open=True)
     search: Any = SimpleNamespace(
-        scored=lambda start: current, attempted=attempted, say=lambda text: None,
+        scored=lambda start, among: current, attempted=attempted, say=lambda text: None,
         fitting=SimpleNamespace(largest=float),
     )  # fmt: skip
     monkeypatch.setattr("cosim.diagnose.search.promising", lambda *_: signatures[:2])
