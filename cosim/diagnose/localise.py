@@ -15,7 +15,7 @@ Source: Bayesian linear regression (MacKay, Neural Computation 4, 1992: evidence
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -37,8 +37,7 @@ PROBE, TIME = "unknown_input", "time"
 RUNS = 1
 """Runs that are looked at: those with the largest residual over noise."""
 PLACES = 4
-"""Places that are probed over all that may drive a force there: those with the best candidates, or,
-where all places are asked over time first, the best of these."""
+"""Places that are probed, those with the best candidates first."""
 AIM = 3.0
 """Largest change by the probe, in units of the largest residual: where the system is asked."""
 ELEMENTS = 6
@@ -139,10 +138,7 @@ def everywhere(search: Search, base: Fitted, say: Callable[[str], None]) -> list
     Where no law fits, the catalogue's scores say little of the place: what is missing may be the
     only law there that moves the model much.
     """
-    over_time = _probed(search, base, _balances(base.problem), say, None, drivers=(TIME,))
-    best = list(dict.fromkeys((p.instance, p.port) for p in over_time))[:PLACES]
-    found = _probed(search, base, best, say, None)
-    return found + [p for p in over_time if (p.instance, p.port) not in best]
+    return _probed(search, base, _balances(base.problem), say, None)
 
 
 def _probed(
@@ -151,7 +147,6 @@ def _probed(
     places: Iterable[tuple[str, str]],
     say: Callable[[str], None],
     most: int | None,
-    drivers: Collection[str] = (),
 ) -> list[Place]:
     """The first places that can be probed, by evidence."""
     runs = worst(search, base, RUNS)
@@ -161,7 +156,7 @@ def _probed(
         if probed == most:
             break
         try:
-            found += _Bench(search, base, runs, instance, port).places(drivers)
+            found += _Bench(search, base, runs, instance, port).places()
             probed += 1
         except VariantError:
             continue  # a mass centre or the direction of gravity: nothing can enter there
@@ -263,12 +258,8 @@ class _Bench:
         change = self.stacks[names].vector([r[:, :-1] for r in rows]) - self.base[names]
         return change, np.concatenate([r[:, -1] for r in rows])
 
-    def places(self, only: Collection[str] = ()) -> list[Place]:
-        """With a curve per driver, and one against time per run.
-
-        Args:
-            only: drivers that are asked, all if not given.
-        """
+    def places(self) -> list[Place]:
+        """With a curve per driver, and one against time per run."""
         found = []
         for element in self.elements or [""]:
             place = Place(self.instance, self.port, element, self.unit)
@@ -276,7 +267,7 @@ class _Bench:
             size = self._size(share)
             if size is None:
                 continue
-            for driver in only or self.drivers:
+            for driver in self.drivers:
                 every: list[tuple[str, ...]] = [tuple(self.names)]
                 if driver == TIME:
                     every = [(n,) for n in self.names]

@@ -24,8 +24,9 @@ from .chain import Begun, improved, refined, singles
 from .terms import formula
 from .trial import Law, Maker, Trial
 
-HALF = 0.5
-"""Share of the worst run from which a free curve explains most of it."""
+HALF, NEAR = 0.5, 0.9
+"""Share of the worst run from which a free curve explains most of it, and the share of what the
+best one explains from which another one does as well: nine knots follow a law no better."""
 PART = 0.1
 """Share of all there is to gain in runs left out from which first orders tell the law; below, its
 place may be one that makes up for what acts elsewhere."""
@@ -104,20 +105,28 @@ class _There(NamedTuple):
 
 
 def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
-    """The law that is fitted.
+    """The law that is fitted: that which runs left out want most.
 
-    That which runs left out want most. Where first orders tell little of other runs, it is that
-    over whose signal a free curve explains most of the worst one.
+    Where a free curve over a signal explains most of the worst run, of those over whose signals one
+    explains nearly as much, by evidence if first orders tell little of other runs.
     """
     laws = [(there, t) for there in asked for t in there.trials if _signal(t) != TIME]
+    curves = [
+        (c, there) for there in asked for c in there.place.curves
+        if c.driver != TIME and c.explained > HALF
+    ]  # fmt: skip
+    curves.sort(key=lambda item: -item[0].evidence)
+    if curves:
+        least = NEAR * curves[0][0].explained
+        near = {(id(there), c.driver) for c, there in curves if c.explained > least}
+        laws = [(there, t) for there, t in laws if (id(there), _signal(t)) in near]
     needed = math.log(max(sum(len(there.trials) for there in asked), 1) / LEVEL)
     best = max(laws, key=lambda item: item[1].expected, default=None)
     if best is None or best[1].expected > max(needed, PART * _all(best[1])):
         return best
-    curves = [(c, there) for there in asked for c in there.place.curves if c.explained > HALF]
-    for curve, there in sorted(curves, key=lambda item: -item[0].evidence):
-        for trial in there.trials:
-            if _signal(trial) == curve.driver != TIME:
+    for curve, first in curves:
+        for there, trial in laws:
+            if there is first and _signal(trial) == curve.driver:
                 return there, trial
     return None
 
