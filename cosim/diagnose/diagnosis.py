@@ -164,8 +164,10 @@ def _searched(
         _judged(result, search, _found(result, search, base, asked))
         assert result.after is not None
         if asked or (law and result.verdict == "unexplained"):
-            before = result.single.begun if result.single is not None else None
-            result.law = unnamed(search, result.after, result.located, asked, before)
+            one = result.single
+            result.law = unnamed(
+                search, result.after, result.located, asked, one.begun if one is not None else None
+            )
     except StoppedError as stopped:
         why = str(stopped)
     search.simulator.budget.lift()
@@ -234,7 +236,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
             break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
-            current = exchanged(search, reconsidered(search, shortened, winners))
+            current = without_slow_parts(search, reconsidered(search, shortened, winners))
             break
         current = shortened
     else:
@@ -248,7 +250,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     return current
 
 
-def exchanged(search: Search, fitted: Fitted) -> Fitted:
+def without_slow_parts(search: Search, fitted: Fitted) -> Fitted:
     """A model that leaves noise, or one with as many laws that leaves less of slow parts.
 
     A law that does nearly the same as the right one leaves next to noise, but not white noise; it
@@ -313,7 +315,7 @@ def _together(result: Diagnosis, current: Fitted) -> Fitted:
     result.single = one = single(search, base, current, result.located)
     if one is not None and one.begun.law is not None:
         result.located.sort(key=lambda place: place is not one.place)
-    only = one.place if one is not None and one.begun.enough else None
+    only = one.begun.maker.bench.site.shaft if one is not None and one.begun.enough else ""
     try:
         return together(search, current, result.located, only)
     except UnbuiltError as error:

@@ -97,11 +97,6 @@ class Place:
         return f"{self.instance}.{self.port}" + (f"[{self.element}]" if self.element else "")
 
     @property
-    def shaft(self) -> str:
-        """As candidates name it, whose shafts of a vector have names of their own."""
-        return f"{self.instance}.{self.port}" + (f"_{self.element}" if self.element else "")
-
-    @property
     def evidence(self) -> float:
         """Of the best kind of curve; curves against time of several runs count together."""
         over_time = sum(c.evidence for c in self.curves if c.driver == TIME)

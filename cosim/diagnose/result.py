@@ -19,7 +19,7 @@ from .facts import Table
 from .foreign import Adapter
 from .foreign_words import said
 from .further import Further
-from .grey_box import LawFromData, One
+from .grey_box import LawFromData, Single
 from .localise import Place
 from .models import Fitted
 from .search import Search
@@ -64,7 +64,7 @@ class Diagnosis:
     before: Fitted | None = None
     after: Fitted | None = None
     located: list[Place] = field(default_factory=list)
-    single: One | None = None
+    single: Single | None = None
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
     structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)

@@ -243,12 +243,12 @@ class Search(LateValueFitter):
     def round(self, base: Fitted, among: Collection[str] | None = None) -> Round:
         """Score, refit the best, choose.
 
+        Where that finds nothing for a model whose parameters were driven to their bounds, once more
+        around their nominal values: what was calibrated then hides what is missing.
+
         Args:
             base: the model.
             among: labels of the candidates, all if not given.
-
-        Where that finds nothing for a model whose parameters were driven to their bounds, once more
-        around their nominal values: what was calibrated then hides what is missing.
         """
         current = self._round(base, base, among)
         if current.winner is None and self.far(base):

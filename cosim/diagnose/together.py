@@ -80,16 +80,14 @@ def ahead(search: Search) -> bool:
     return len(search.known) * len(search.fitting.runs) <= AHEAD
 
 
-def together(
-    search: Search, current: Fitted, located: Sequence[Place], only: Place | None = None
-) -> Fitted:
+def together(search: Search, current: Fitted, located: Sequence[Place], only: str = "") -> Fitted:
     """The best set of effects that is found so; the given model, if none is better.
 
     Args:
         search: the data, and fits so far; gets those that are made here.
         current: the best model of the rounds.
         located: where a free force explains most, first.
-        only: the place whose laws are asked, all if not given.
+        only: place whose laws are asked, as candidates name it; all if not given.
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
@@ -106,7 +104,7 @@ def together(
             search.say(f"along the log by efforts at {names}: mean square {followed.left:.3g}")
             responses = Responses(followed, search.fitting)
             known = search.offered(candidates(declared.problem))
-            known = [c for c in known if only is None or c.place == only.shaft]
+            known = [c for c in known if not only or c.place == only]
             directions = responses.of(known)
         except UnbuiltError:
             raise

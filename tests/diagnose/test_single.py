@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cosim.calibrate.mapping import read_problem
-from cosim.diagnose.grey_box import One, single
+from cosim.diagnose.grey_box import Single, single
 from cosim.diagnose.localise import everywhere
 from cosim.diagnose.search import Search
 from tests.diagnose import disc
@@ -17,7 +17,7 @@ from tests.problems import simulator
 RUNS = ("sweep", "steps", "check")
 
 
-def asked(folder: Path, law: disc.Law) -> One:
+def asked(folder: Path, law: disc.Law) -> Single:
     """The best law of one signal for a disc, of whose catalogue nothing is asked."""
     problem = read_problem(disc.write(folder, law, seconds=2.0, names=RUNS))
     search = Search(simulator(problem), only=[])

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.diagnosis import exchanged
+from cosim.diagnose.diagnosis import without_slow_parts
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
 from cosim.diagnose.whiteness import whiteness_tests
@@ -40,7 +40,7 @@ def test_the_law_that_leaves_noise_stays(tmp_path: Path, law: str) -> None:
     assert fitted.labels == {law} and not search.lacking(fitted)
     tests = whiteness_tests(search.fit_data - fitted.fit, search.fitting)
     assert any(t.slow_parts for t in tests) == (law == DRIFT)
-    found = exchanged(search, fitted)
+    found = without_slow_parts(search, fitted)
     assert found.labels == {DRAG}
     assert (found is fitted) == (law == DRAG)
     assert search.rounds == [seen]

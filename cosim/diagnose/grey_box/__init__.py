@@ -3,6 +3,6 @@
 from .bench import Site, site
 from .chain import unnamed
 from .result import LawFromData
-from .single import One, single
+from .single import Single, single
 
-__all__ = ["LawFromData", "One", "Site", "single", "site", "unnamed"]
+__all__ = ["LawFromData", "Single", "Site", "single", "site", "unnamed"]

@@ -56,6 +56,11 @@ class Site:
         return f"{self.instance}.{self.port}" + (f"[{self.element}]" if self.element else "")
 
     @property
+    def shaft(self) -> str:
+        """As candidates name it, whose shafts of a vector have names of their own."""
+        return f"{self.instance}.{self.port}" + (f"_{self.element}" if self.element else "")
+
+    @property
     def prefix(self) -> str:
         """Of the law's variables."""
         return f"{self.instance}.{self.port}.{EFFECT}."

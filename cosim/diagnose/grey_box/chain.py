@@ -57,7 +57,7 @@ def unnamed(
         return None
     first = located[0]
     search.say(f"a law from the data at {first.label}")
-    place = Site(first.instance, first.port, first.element, first.unit)
+    place = site_of(first)
     try:
         found = law_from_data(search, base, place, begun)
     except CosimError as error:  # an extra: the verdict stands without it
@@ -68,6 +68,11 @@ def unnamed(
     if alike:
         found.reason += f" It may as well act at {' or '.join(alike)}."
     return found
+
+
+def site_of(place: Place) -> Site:
+    """A place as that of a law."""
+    return Site(place.instance, place.port, place.element, place.unit)
 
 
 @dataclass(frozen=True)

@@ -96,10 +96,9 @@ def nearest(maker: Maker, law: Law) -> list[Named]:
     a model without any, which may be far off, first orders do not tell.
     """
     search, site = maker.search, maker.bench.site
-    port = f"{site.port}_{site.element}" if site.element else site.port
     here = [
         c for c in search.offered(candidates(maker.bench.base.problem))
-        if (c.instance, c.port) == (site.instance, port) and c.refinement is None
+        if c.place == site.shaft and c.refinement is None
     ]  # fmt: skip
     drafts: list[tuple[Fitted, Problem, dict[str, float]]] = []
     for item in here:

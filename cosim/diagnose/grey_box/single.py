@@ -18,25 +18,26 @@ from ...errors import CosimError
 from ..localise import PLACES, TIME, Place
 from ..models import GATE, LEVEL, Fitted
 from ..search import Search
+from ..verdict import HALF
 from ..whiteness import whiteness_tests
-from .bench import LawBench, Site
-from .chain import Begun, improved, refined, singles
+from .bench import LawBench
+from .chain import Begun, improved, refined, singles, site_of
 from .terms import formula
 from .trial import Law, Maker, Trial
 
-HALF, NEAR = 0.5, 0.9
-"""Share of the worst run from which a free curve explains most of it, and the share of what the
-best one explains from which another one does as well: nine knots follow a law no better."""
+NEAR = 0.9
+"""Share of what the best free curve explains from which another one may be that of the law: nine
+knots follow a law no better."""
 PART = 0.1
 """Share of all there is to gain in runs left out from which first orders tell the law; below, its
 place may be one that makes up for what acts elsewhere."""
 SAME = 0.01
-"""Share of what a law is expected to gain by which one elsewhere may gain less and do as well:
-first orders of one model at two ends of a shaft differ by less."""
+"""Share by which a law elsewhere may be expected to gain less, or a free curve to explain less, and
+do as well: first orders of one model at two ends of a shaft differ by less."""
 
 
 @dataclass(frozen=True)
-class One:
+class Single:
     """The best law of one signal.
 
     Attributes:
@@ -48,7 +49,9 @@ class One:
     begun: Begun
 
 
-def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Place]) -> One | None:
+def single(
+    search: Search, base: Fitted, current: Fitted, located: Sequence[Place]
+) -> Single | None:
     """The law of one signal that runs left out want most; None if no place can be asked.
 
     Args:
@@ -57,7 +60,7 @@ def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Plac
         current: the best model with named laws.
         located: where free curves enter the declared one.
     """
-    asked: list[_There] = []
+    asked: list[_LawsAt] = []
     for place in located[:PLACES]:
         try:
             maker = Maker(LawBench(search, base, site_of(place)))
@@ -65,18 +68,12 @@ def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Plac
         except CosimError as error:
             search.say(f"no law at {place.label}: {error}")
             continue
-        asked.append(_There(place, maker, trials))
+        asked.append(_LawsAt(place, maker, trials))
     chosen = _chosen(asked)
     if chosen is None:
-        return One(asked[0].place, Begun(asked[0].maker, asked[0].trials)) if asked else None
-    (place, maker, trials), first = chosen
+        return Single(asked[0].place, Begun(asked[0].maker, asked[0].trials)) if asked else None
+    (place, maker, trials), first, alike = chosen
     search.say(f"a law of {first.shape.label} at {place.label}?")
-    near = max(first.expected - max(SAME * first.expected, GATE), 0.0)
-    alike = tuple(
-        there.place.label
-        for there in asked
-        if there.place is not place and any(t.expected > near for t in there.trials)
-    )
     try:
         law = improved(maker, first, search.say)
         if search.lacking(law.fitted) and search.gains(current, law.fitted)[0] > GATE:
@@ -92,11 +89,11 @@ def single(search: Search, base: Fitted, current: Fitted, located: Sequence[Plac
             )
     except CosimError as error:
         search.say(f"{place.label}: {error}")
-        return One(place, Begun(maker, trials, alike=alike))
-    return One(place, Begun(maker, trials, law, enough, alike))
+        return Single(place, Begun(maker, trials, alike=alike))
+    return Single(place, Begun(maker, trials, law, enough, alike))
 
 
-class _There(NamedTuple):
+class _LawsAt(NamedTuple):
     """A place, laws there, and all of one signal, the best first."""
 
     place: Place
@@ -104,8 +101,8 @@ class _There(NamedTuple):
     trials: list[Trial]
 
 
-def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
-    """The law that is fitted: that which runs left out want most.
+def _chosen(asked: Sequence[_LawsAt]) -> tuple[_LawsAt, Trial, tuple[str, ...]] | None:
+    """The law that is fitted, that which runs left out want most; and where one would do as well.
 
     Where a free curve over a signal explains most of the worst run, of those over whose signals one
     explains nearly as much, by evidence if first orders tell little of other runs.
@@ -118,27 +115,29 @@ def _chosen(asked: Sequence[_There]) -> tuple[_There, Trial] | None:
     curves.sort(key=lambda item: -item[0].evidence)
     if curves:
         least = NEAR * curves[0][0].explained
-        near = {(id(there), c.driver) for c, there in curves if c.explained > least}
-        laws = [(there, t) for there, t in laws if (id(there), _signal(t)) in near]
+        drivers = {(id(there), c.driver) for c, there in curves if c.explained > least}
+        laws = [(there, t) for there, t in laws if (id(there), _signal(t)) in drivers]
     needed = math.log(max(sum(len(there.trials) for there in asked), 1) / LEVEL)
     best = max(laws, key=lambda item: item[1].expected, default=None)
-    if best is None or best[1].expected > max(needed, PART * _all(best[1])):
-        return best
+    if best is not None and best[1].expected > max(needed, PART * _all(best[1])):
+        least = best[1].expected - max(SAME * best[1].expected, GATE)
+        return *best, _others(best[0], [there for there, t in laws if t.expected > least])
     for curve, first in curves:
         for there, trial in laws:
             if there is first and _signal(trial) == curve.driver:
-                return there, trial
+                least = (1.0 - SAME) * curve.explained
+                near = [other for c, other in curves if c.explained > least]
+                return there, trial, _others(there, near)
     return None
+
+
+def _others(first: _LawsAt, alike: Sequence[_LawsAt]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(at.place.label for at in alike if at is not first))
 
 
 def _all(trial: Trial) -> float:
     """What a law would gain that leaves nothing, residuals counted as in its first orders."""
     return 0.5 * sum(float(gram.matrix[-1, -1]) for gram in trial.grams)
-
-
-def site_of(place: Place) -> Site:
-    """A place as that of a law."""
-    return Site(place.instance, place.port, place.element, place.unit)
 
 
 def _signal(trial: Trial) -> str:
