@@ -70,6 +70,8 @@ class Law:
         twins: labels of laws that do the same to the first order.
         p_value: of its score on identification runs, corrected for the number of candidates.
         missed: what the model is better by than the one without this law; None if not known.
+        tick: of the rig, if the strength is a time: a shorter one says when within a tick
+            something is read, and not that anything is missing; else 0.
     """
 
     effect: str
@@ -84,6 +86,7 @@ class Law:
     twins: tuple[str, ...] = ()
     p_value: float | None = None
     missed: Gain | None = None
+    tick: float = 0.0
 
     @property
     def place(self) -> str:

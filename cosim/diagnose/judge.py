@@ -104,12 +104,13 @@ class Judge:
         rest = fitted.labels - {candidate.label}
         # a model that cannot be simulated without it misses it as much as all effects together
         less = self.memo.get(frozenset() if rest in self.memo.failed else rest)
+        tick = self.raw.step if self.raw.ticks and strength.unit == "s" else 0.0
         return Law(
             candidate.effect, candidate.instance, candidate.port,
             strength.name.removeprefix(prefix), values, candidate.text,
             strength.absent, len(names), candidate.contains, twins,
             p_value,
-            None if less is None else self.better(less, fitted),
+            None if less is None else self.better(less, fitted), tick,
         )  # fmt: skip
 
     def count_in_full(self, full: bool = True) -> Problem:

@@ -132,6 +132,8 @@ def doubts(table: Table, model: Model) -> list[str]:
         if not law.there:
             edge = max(law.absent, law.size.minimum)
             found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
+        if abs(law.size.value) < law.tick:
+            found.append(f"{law.label} is shorter than a tick of the rig, {law.tick:g} s")
         if model.rough or not table.unused_count:
             continue
         if law.missed is None:

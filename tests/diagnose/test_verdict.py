@@ -25,7 +25,7 @@ def law(
     effect: str = "coulomb", place: str = "load.flange", *, value: float = 0.4, half: float = 0.05,
     gain: float = 500.0, z: float = 20.0, own: int = 1, change: float = 3.0,
     fitted: float = 1000.0, extra: tuple[Value, ...] = (), twins: tuple[str, ...] = (),
-    contains: tuple[str, ...] = (),
+    contains: tuple[str, ...] = (), tick: float = 0.0,
 ) -> Law:  # fmt: skip
     """A law whose absence costs unused runs `gain` nats."""
     component, port = place.split(".")
@@ -34,7 +34,7 @@ def law(
     size = Value(name, "N.m", value, low, high, 0.0, 10.0, True)
     missed = Gain(fitted, gain, z, z, change)
     return Law(effect, component, port, name, (size, *extra), own=own, contains=contains,
-               twins=twins, missed=missed)  # fmt: skip
+               twins=twins, missed=missed, tick=tick)  # fmt: skip
 
 
 def left(rms: float, channel: str = "speed", purpose: str = "validation") -> Left:
@@ -454,3 +454,10 @@ def test_fewer_laws_are_asked_where_the_data_do_not_tell_them_from_the_best() ->
     assert unasked(table(FAR, three, two, alike=((1, 2),)), 1) == []  # asked before
     assert proposal(table(FAR, three, two, alike=((1, 2),))) == 2
     assert unasked(table(FAR, open_, three, alike=((1, 2),)), 1) == []  # more laws
+
+
+@pytest.mark.parametrize(("value", "kind"), [(3e-4, "nothing_missing"), (6e-4, "effect_found")])
+def test_a_time_within_a_tick_of_the_rig_is_no_cause(value: float, kind: str) -> None:
+    late = law("delay", "log.speed", value=value, half=1e-4, gain=40.0, z=5.0, tick=5e-4)
+    found = decide(table(model(), model(late)))
+    assert found.kind == kind
