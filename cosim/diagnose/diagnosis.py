@@ -47,6 +47,9 @@ from .unstable import ends
 from .verdict import above, decide, proposal, unasked
 from .whiteness import CALIBRATED, WhitenessTest, whiteness_tests
 
+ALL = 0.9
+"""Share of the worst run that a free curve at one place must explain for one law there to be asked
+before further rounds: nine knots follow a law no better."""
 TURNS = 4
 """Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
 free force would still explain, and may give way to another one once."""
@@ -164,10 +167,7 @@ def _searched(
         _judged(result, search, _found(result, search, base, asked))
         assert result.after is not None
         if asked or (law and result.verdict == "unexplained"):
-            one = result.single
-            result.law = unnamed(
-                search, result.after, result.located, asked, one.begun if one is not None else None
-            )
+            result.law = unnamed(search, result.after, result.located, asked, result.single)
     except StoppedError as stopped:
         why = str(stopped)
     search.simulator.budget.lift()
@@ -225,14 +225,19 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
-        if stage.open and not proposed and ahead(search):
+        if stage.open and not proposed and not search.raw.late:
+            _placed(result)
+            if result.located and result.located[0].curves[0].explained > ALL:
+                _single(result)
+        one = result.single
+        if stage.open and not proposed and (ahead(search) or (one is not None and one.enough)):
             proposed, found = True, _together(result, current)
             if found is not current and not search.lacking(found):
                 whole = found
         if whole is not None and len(whole.effects) <= len(current.effects) + 1:
             break  # else rounds may do with fewer laws
         one = result.single
-        if one is not None and one.begun.enough and search.lacking(current):
+        if one is not None and one.enough and search.lacking(current):
             break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
         if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
@@ -301,21 +306,39 @@ def _stopped(result: Diagnosis, search: Search, why: str) -> None:
     result.answer, result.after = decide(result.table), result.before
 
 
+def _placed(result: Diagnosis) -> None:
+    """Where what the declared model lacks may enter, asked at all places, once."""
+    search, base = result.search, result.before
+    assert search is not None and base is not None
+    if not result.everywhere:
+        search.say("where does it enter? Asked at all places")
+        result.located, result.everywhere = everywhere(search, base, search.say), True
+
+
+def _single(result: Diagnosis) -> None:
+    """The best law of signals of one place, asked once."""
+    search, base = result.search, result.before
+    assert search is not None and base is not None
+    if result.single is None:
+        result.single = one = single(search, base, result.located)
+        if one is not None and one.law is not None:
+            result.located.sort(key=lambda place: place.label != one.label)
+
+
 def _together(result: Diagnosis, current: Fitted) -> Fitted:
     """The best set of effects by evidence along the log's motion, or the given model.
 
-    Of those at one place alone, if one law of one signal there would do.
+    Of those at one place alone, and where one law does as well, if one law there would do.
     """
-    search, base = result.search, result.before
-    assert search is not None and base is not None
+    search = result.search
+    assert search is not None
     if search.raw.late:  # start values that decide when casters turn over hide first orders
         return current
-    search.say("where does it enter? Asked at all places")
-    result.located = everywhere(search, base, search.say)
-    result.single = one = single(search, base, current, result.located)
-    if one is not None and one.begun.law is not None:
-        result.located.sort(key=lambda place: place is not one.place)
-    only = one.begun.maker.bench.site.shaft if one is not None and one.begun.enough else ""
+    _placed(result)
+    _single(result)
+    one = result.single
+    enough = one is not None and one.enough
+    only = [site.shaft for site in (one.site, *one.alike)] if one is not None and enough else []
     try:
         return together(search, current, result.located, only)
     except UnbuiltError as error:

@@ -77,6 +77,10 @@ class Responses:
     Args:
         followed: the model on that motion.
         stack: of its runs.
+
+    Attributes:
+        declared: derivatives by the declared parameters, scaled.
+        wanted: what missing laws do, without what calibration can absorb.
     """
 
     def __init__(self, followed: Followed, stack: SampleStack) -> None:
@@ -84,7 +88,8 @@ class Responses:
         self.simulator = followed.simulator
         slopes = jacobian(self.simulator, followed.theta, stack.names, central=False, relative=STEP)
         problem = self.simulator.problem
-        self.absorber = Absorber(stack.matrix(slopes, problem.scale), problem)
+        self.declared = stack.matrix(slopes, problem.scale)
+        self.absorber = Absorber(self.declared, problem)
         self.wanted = self.absorber.rest(followed.wanted)
 
     def of(self, known: Sequence[Candidate]) -> list[Direction]:

@@ -84,6 +84,7 @@ def follow(
     stack: SampleStack,
     first: tuple[str, str],
     among: Sequence[tuple[str, str]],
+    element: str = "",
 ) -> Followed:
     """Move a model along some runs by efforts at as few balances as that takes.
 
@@ -93,13 +94,17 @@ def follow(
         stack: of the runs.
         first: instance and port of a balance where an effort enters in any case.
         among: others where efforts may enter.
+        element: of a vector balance, the only one of the first balance where an effort enters.
 
     Raises:
         CosimError: it cannot be simulated.
     """
     rows = dict(simulator.residuals(theta, stack.names))
     name = max(stack.names, key=lambda n: float(np.nanmean(rows[n] ** 2)))
-    every = _Bench(simulator, theta, _inputs(simulator.problem, [first, *among]))
+    inputs = _inputs(simulator.problem, [first, *among])
+    if element:
+        inputs = [i for i in inputs if i[:2] != first or i.name.endswith(f"[{element}]")]
+    every = _Bench(simulator, theta, inputs)
     kept = every.chosen(every.simulator.problem.run(name))
     every.simulator.close()
     bench = _Bench(simulator, theta, kept)

@@ -19,7 +19,7 @@ from .facts import Table
 from .foreign import Adapter
 from .foreign_words import said
 from .further import Further
-from .grey_box import LawFromData, Single
+from .grey_box import Begun, LawFromData
 from .localise import Place
 from .models import Fitted
 from .search import Search
@@ -40,7 +40,8 @@ class Diagnosis:
         search: all rounds.
         before, after: calibrated models without effects, and with those that are named.
         located: where an unknown input would have to enter the declared system, the best first.
-        single: the law of one signal that was asked before sets of named laws.
+        everywhere: whether all places were asked.
+        single: the law at one place that was asked before sets of named laws.
         residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
@@ -64,7 +65,8 @@ class Diagnosis:
     before: Fitted | None = None
     after: Fitted | None = None
     located: list[Place] = field(default_factory=list)
-    single: Single | None = None
+    everywhere: bool = False
+    single: Begun | None = None
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
     structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)

@@ -80,14 +80,16 @@ def ahead(search: Search) -> bool:
     return len(search.known) * len(search.fitting.runs) <= AHEAD
 
 
-def together(search: Search, current: Fitted, located: Sequence[Place], only: str = "") -> Fitted:
+def together(
+    search: Search, current: Fitted, located: Sequence[Place], only: Sequence[str] = ()
+) -> Fitted:
     """The best set of effects that is found so; the given model, if none is better.
 
     Args:
         search: the data, and fits so far; gets those that are made here.
         current: the best model of the rounds.
         located: where a free force explains most, first.
-        only: place whose laws are asked, as candidates name it; all if not given.
+        only: places whose laws are asked, as candidates name them; all if not given.
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
@@ -104,7 +106,7 @@ def together(search: Search, current: Fitted, located: Sequence[Place], only: st
             search.say(f"along the log by efforts at {names}: mean square {followed.left:.3g}")
             responses = Responses(followed, search.fitting)
             known = search.offered(candidates(declared.problem))
-            known = [c for c in known if not only or c.place == only]
+            known = [c for c in known if not only or c.place in only]
             directions = responses.of(known)
         except UnbuiltError:
             raise

@@ -6,9 +6,9 @@ s_i are the scalar signals of the balance (speed, angle, load, ...). N_1 ... N_1
 B-splines on knots that are equally spaced in asinh(x / x_scale) from `x_first` to `x_last`: dense
 around 0 where the scale is small, equally spaced in x where it is large. N_13 = tanh(x / x_0) is
 the jump at 0 that no smooth curve has (dry friction). P_1 ... P_8 are cubic B-splines on equally
-spaced knots from `y_first` to `y_last`, on a circle of that circumference where `turn` is 1. Beyond
-the first and last knot, u keeps its value there. With the same c_km for all m, u depends on x
-alone.
+spaced knots from `y_first` to `y_last`, on a circle of that circumference where `turn` is 1, of |y|
+where `fold` is 1. Beyond the first and last knot, u keeps its value there. With the same c_km for
+all m, u depends on x alone.
 
 Not modelled: memory (hysteresis), more than two signals.
 
@@ -17,13 +17,11 @@ Source: de Boor, A Practical Guide to Splines, 2001, ch. 9.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import casadi as ca
 
 from ..effect import KINDS, Effect
 from ..effect_model import EffectModel
-from ..laws.drivers import MOVING, drivers
+from ..laws.drivers import MOVING, drivers, shared
 from ..model import SX
 from ..quantity import Quantity
 
@@ -46,6 +44,7 @@ X_0 = Quantity("x_0", "1", "x over which the jump is smoothed", start=1e-2, mini
 Y_FIRST = Quantity("y_first", "1", "y at its first knot", start=0.0)
 Y_LAST = Quantity("y_last", "1", "y at its last knot", start=1.0)
 TURN = Quantity("turn", "1", "1 where the law repeats with y, else 0", minimum=0.0, maximum=1.0)
+FOLD = Quantity("fold", "1", "1 where y counts without its sign, else 0", minimum=0.0, maximum=1.0)
 SHARE = Quantity("share", "1", "part of it that each element of the balance gets", start=1.0)
 X = Quantity("x", "1", "first signal that the law depends on")
 Y = Quantity("y", "1", "second signal that the law depends on")
@@ -63,9 +62,10 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add the law's value."""
-    names = ["time", *drivers(e)]
-    signals = [e.t, *(e.signal(name) for name in names[1:])]
-    p = e.parameters(G, C, X_FIRST, X_LAST, X_SCALE, X_0, Y_FIRST, Y_LAST, TURN)
+    share = shared(e, SHARE)
+    known = {"time": e.t, **drivers(e, share)}
+    names, signals = list(known), list(known.values())
+    p = e.parameters(G, C, X_FIRST, X_LAST, X_SCALE, X_0, Y_FIRST, Y_LAST, TURN, FOLD)
     x, y = (
         sum(
             (e.parameter(_weight(axis, name, axis + name == default)) * signal
@@ -74,6 +74,7 @@ def law(e: EffectModel) -> None:
         )
         for axis, default in (("x", "x" + names[-1 if len(names) == 1 else 1]), ("y", ""))
     )  # fmt: skip
+    y = p.fold * ca.fabs(y) + (1 - p.fold) * y
     first, last, place = (ca.asinh(value / p.x_scale) for value in (p.x_first, p.x_last, x))
     intervals = ALONG_X - 3
     place = intervals * (place - first) / (last - first)
@@ -96,9 +97,7 @@ def law(e: EffectModel) -> None:
     e.output(X, x)
     e.output(Y, y)
     e.output(U, u)
-    size = 6 if e.kind == "body" else e.size
-    if size > 1:
-        u = u * e.parameter(replace(SHARE, size=size))
+    u = u * share
     e.add(u)
     flow = KINDS[e.kind].flow
     if flow:

@@ -13,13 +13,11 @@ Source: interpolation by hat functions (linear finite elements).
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import casadi as ca
 
 from ..effect import KINDS, Effect
 from ..effect_model import EffectModel
-from ..laws.drivers import MOVING, drivers
+from ..laws.drivers import MOVING, drivers, shared
 from ..quantity import Quantity
 
 KNOTS = 9
@@ -44,9 +42,10 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the curve's value."""
     p = e.parameters(G, C, S_FIRST, S_LAST)
+    share = shared(e, SHARE)
     s = e.parameter(_weight("time", 1.0)) * e.t
-    for name in drivers(e):
-        s += e.parameter(_weight(name, 0.0)) * e.signal(name)
+    for name, signal in drivers(e, share).items():
+        s += e.parameter(_weight(name, 0.0)) * signal
     place = (KNOTS - 1) * (s - p.s_first) / (p.s_last - p.s_first)
     place = ca.fmin(ca.fmax(place, 0.0), KNOTS - 1.0)
     u = ca.SX(0)
@@ -55,9 +54,7 @@ def law(e: EffectModel) -> None:
     u *= p.g
     e.output(S, s)
     e.output(U, u)
-    size = 6 if e.kind == "body" else e.size
-    if size > 1:
-        u = u * e.parameter(replace(SHARE, size=size))
+    u = u * share
     e.add(u)
     flow = KINDS[e.kind].flow
     if flow:

@@ -97,8 +97,8 @@ def test_the_nearest_name_of_a_law_that_has_one() -> None:
     first = law["nearest"][0]
     assert first["effect"] == "coulomb"
     assert first["parameters"]["tau_c"] == pytest.approx(0.25, rel=0.05)  # a band of a hundredth
-    # the true law does as well, but for the gate
-    assert first["unused_runs_prefer_the_law_by_nats"] < GATE
+    # the true law does as well; both were fitted to other runs, which leaves either some nats ahead
+    assert abs(first["unused_runs_prefer_the_law_by_nats"]) < 0.01 * law["gate"]["gain_nats"]
     assert first["rms_difference"] < 0.1 * 0.25
     # the others do not, and it is said where
     assert all(named["unused_runs_prefer_the_law_by_nats"] > GATE for named in law["nearest"][1:])

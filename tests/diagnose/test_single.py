@@ -1,4 +1,4 @@
-"""One law of one signal at one place, asked before sets of named laws are compared."""
+"""One law at one place, asked before sets of named laws are compared."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cosim.calibrate.mapping import read_problem
-from cosim.diagnose.grey_box import Single, single
+from cosim.diagnose.grey_box import Begun, single
 from cosim.diagnose.localise import everywhere
 from cosim.diagnose.search import Search
 from tests.diagnose import disc
@@ -17,43 +17,56 @@ from tests.problems import simulator
 RUNS = ("sweep", "steps", "check")
 
 
-def asked(folder: Path, law: disc.Law) -> Single:
-    """The best law of one signal for a disc, of whose catalogue nothing is asked."""
+def asked(folder: Path, law: disc.Law) -> Begun:
+    """The best law for a disc, of whose catalogue nothing is asked."""
     problem = read_problem(disc.write(folder, law, seconds=2.0, names=RUNS))
     search = Search(simulator(problem), only=[])
     base = search.calibrated()
     located = everywhere(search, base, print)
     assert (located[0].label, len({p.label for p in located})) == ("load.flange", len(located))
-    one = single(search, base, base, located)
+    one = single(search, base, located)
     search.close()
     assert one is not None
     return one
 
 
 @pytest.mark.parametrize(
-    ("law", "signal"),
+    ("law", "words", "value"),
     [
-        (lambda w, theta, t: 0.03 * (theta - 0.3), "angle"),
-        (lambda w, theta, t: 0.1 * math.sin(theta + 0.5), "angle"),
-        (lambda w, theta, t: 2e-3 * w * abs(w), "velocity"),
+        (lambda w, theta, t: 0.03 * theta, "angle", -0.03),
+        (lambda w, theta, t: 0.1 * math.sin(theta), "sin(angle)", -0.1),
+        (lambda w, theta, t: 2e-3 * w * abs(w), "velocity |velocity|", -2e-3),
     ],
     ids=["spring", "unbalance", "drag"],
 )
-def test_one_law_is_found_at_its_place_over_its_signal(
-    tmp_path: Path, law: disc.Law, signal: str
+def test_a_law_of_terms_is_found_at_its_place(
+    tmp_path: Path, law: disc.Law, words: str, value: float
 ) -> None:
     one = asked(tmp_path / "disc", law)
-    assert one.begun.law is not None and one.begun.enough
-    assert (one.place.label, one.begun.law.shape.label) == ("load.flange", signal)
+    assert one.law is not None and one.enough and one.label == "load.flange"
+    found = dict(zip(one.law.trial.words, one.law.free, strict=True))
+    assert found[words] == pytest.approx(value, rel=0.05)  # three of its standard deviations
+
+
+def test_friction_that_falls_with_speed_is_a_curve(tmp_path: Path) -> None:
+    one = asked(
+        tmp_path / "disc",
+        lambda w, theta, t: 0.1 * math.tanh(w / 0.02) * math.exp(-((w / 0.5) ** 2)),
+    )
+    assert one.law is not None and not one.maker.search.lacking(one.law.fitted)
+    assert (one.label, one.law.shape.label) == ("load.flange", "velocity")
+
+
+def test_a_law_of_two_signals_is_found(tmp_path: Path) -> None:
+    one = asked(tmp_path / "disc", lambda w, theta, t: 0.01 * abs(theta) * w)
+    assert one.law is not None and one.enough
+    assert {axis.signal for axis in one.law.shape.axes} == {"angle", "velocity"}
 
 
 @pytest.mark.parametrize(
     "law",
-    [
-        lambda w, theta, t: 0.0,
-        lambda w, theta, t: 0.1 * math.sin(theta + 0.5) * math.tanh(w / 0.5),
-    ],
-    ids=["none", "two signals"],
+    [lambda w, theta, t: 0.0, lambda w, theta, t: 0.1 * math.sin(9.0 * t)],
+    ids=["none", "time"],
 )
-def test_no_law_of_one_signal_does_where_there_is_none(tmp_path: Path, law: disc.Law) -> None:
-    assert not asked(tmp_path / "disc", law).begun.enough
+def test_no_law_does_where_there_is_none(tmp_path: Path, law: disc.Law) -> None:
+    assert not asked(tmp_path / "disc", law).enough

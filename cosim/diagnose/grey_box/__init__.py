@@ -3,6 +3,6 @@
 from .bench import Site, site
 from .chain import unnamed
 from .result import LawFromData
-from .single import Single, single
+from .single import Begun, single
 
-__all__ = ["LawFromData", "Single", "Site", "single", "site", "unnamed"]
+__all__ = ["Begun", "LawFromData", "Site", "single", "site", "unnamed"]

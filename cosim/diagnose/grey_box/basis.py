@@ -33,6 +33,7 @@ class Axis:
         scale: around which knots are dense at 0; as `STRAIGHT` times the range if they are not.
         jump: over which the jump at 0 is smoothed.
         turn: whether the law repeats with the distance of first and last.
+        fold: whether the signal counts without its sign (second ones only).
     """
 
     signal: str
@@ -41,6 +42,12 @@ class Axis:
     scale: float = 1e3
     jump: float = 1e-2
     turn: bool = False
+    fold: bool = False
+
+    @property
+    def label(self) -> str:
+        """As shown."""
+        return f"|{self.signal}|" if self.fold else self.signal
 
     @property
     def range(self) -> float:
@@ -58,6 +65,7 @@ class Axis:
 
     def along_y(self, values: Vector) -> Vector:
         """P_m (columns) at values of y."""
+        values = np.abs(values) if self.fold else values
         place = (values - self.first) / self.range
         if self.turn:
             away = (ALONG_Y * place)[:, None] - np.arange(ALONG_Y)
@@ -99,7 +107,7 @@ class Shape:
     @property
     def label(self) -> str:
         """As shown."""
-        names = [axis.signal for axis in self.axes]
+        names = [axis.label for axis in self.axes]
         return (" x " if self.form == "x * y" else " + ").join(names)
 
     def narrowed(self, form: str) -> Shape:

@@ -31,6 +31,11 @@ TRIALS = 6
 ANGLES = ("angle",)
 """Signals whose laws repeat with every turn."""
 TURN = 2.0 * np.pi
+FARTHEST = 1e4
+"""Bound on a direction in its prior standard deviations: none."""
+DENSE, CROSSED = 0.1, 0.05
+"""Share of the largest size of a signal around which knots are dense at 0 where it crosses that,
+and the share of it that it must reach on both sides for that: friction rises and falls near 0."""
 JUMP = 1e-3
 """Share of the largest x over which the jump at 0 is smoothed."""
 
@@ -140,6 +145,7 @@ class LawBench:
         search: the data.
         base: fitted model without the law.
         place: where.
+        names: runs that tell what is visited, all if not given.
 
     Attributes:
         signals: on which a law there may depend.
@@ -150,11 +156,13 @@ class LawBench:
         VariantError: no law can enter there.
     """
 
-    def __init__(self, search: Search, base: Fitted, place: Site) -> None:
+    def __init__(
+        self, search: Search, base: Fitted, place: Site, names: Sequence[str] = ()
+    ) -> None:
         self.search, self.base, self.site = search, base, place
         with_law = base.problem.with_effects(place.change)
-        names = set(base.problem.names)
-        kept = [p for p in with_law.parameters if p.name in names]
+        own_names = set(base.problem.names)
+        kept = [p for p in with_law.parameters if p.name in own_names]
         variables = with_law.system().members[place.instance].description.variables
         inner = place.prefix.removeprefix(f"{place.instance}.")
         own = [n.removeprefix(inner) for n in variables if n.startswith(inner)]
@@ -169,9 +177,9 @@ class LawBench:
                 )
             self.fixed |= {f"{place.prefix}share[{n}]": float(n == place.element) for n in shares}
         self.problem = with_law.changed(parameters=kept)
-        self.names = search.fitting.names
+        self.names, checked = search.fitting.names, search.checking.names
         self.limits = patience(base.simulator)
-        self.ranges = self._visited()
+        self.ranges = self._visited(names or tuple(dict.fromkeys((*self.names, *checked))))
 
     # -- problems ----------------------------------------------------------------------------------
 
@@ -187,7 +195,8 @@ class LawBench:
                       prefix + "x_0": x.jump}  # fmt: skip
         if (y := shape.y) is not None:
             found |= {prefix + "wy_" + y.signal: 1.0, prefix + "y_first": y.first,
-                      prefix + "y_last": y.last, prefix + "turn": float(y.turn)}  # fmt: skip
+                      prefix + "y_last": y.last, prefix + "turn": float(y.turn),
+                      prefix + "fold": float(y.fold)}  # fmt: skip
         return found
 
     def shaped(self, shape: Shape | None, parameters: Sequence[Parameter] = ()) -> Problem:
@@ -208,13 +217,24 @@ class LawBench:
             for i in range(COUNT)
         ]  # fmt: skip
 
+    def directed(self, targets: Vector, spans: Vector) -> list[Parameter]:
+        """Parameters of a law, each setting the coefficients as a column says."""
+        prefix = self.site.prefix
+        return [
+            Parameter(
+                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
+                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
+                "effect", prior=1.0, span=float(min(spans[i], 1.0)),
+            )
+            for i, column in enumerate(targets.T)
+        ]  # fmt: skip
+
     # -- what the runs visit -----------------------------------------------------------------------
 
-    def _visited(self) -> dict[str, tuple[float, float]]:
+    def _visited(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
         found = {}
         for signal in self.signals:
             weight = {f"{self.site.prefix}wy_{signal}": 1.0}
-            names = tuple(dict.fromkeys((*self.names, *self.search.checking.names)))
             (values,) = self.recorded(None, self.base.estimate.theta, None, ("y",), weight, names)
             found[signal] = float(np.min(values)), float(np.max(values))
         return found
@@ -332,19 +352,38 @@ class LawBench:
             raise VariantError(f"{self.site.label}: a law there changes nothing that is measured")
         return size
 
-    def axis_x(self, signal: str, *, dense: float = np.inf) -> Axis:
+    @property
+    def varying(self) -> list[str]:
+        """Signals that move in the identification runs."""
+        return [
+            signal for signal in self.signals
+            if np.ptp(self.ranges[signal]) > 1e-9 * max(*map(abs, self.ranges[signal]), 1e-9)
+        ]  # fmt: skip
+
+    def crosses(self, signal: str) -> bool:
+        """Whether a signal has its 0 well within what runs visit."""
+        low, high = self.ranges[signal]
+        return min(-low, high) > CROSSED * max(-low, high)
+
+    def axis_x(self, signal: str, dense: float = DENSE) -> Axis:
         """A signal as first one.
 
         Args:
             signal: its name.
-            dense: share of its largest size around which knots are dense at 0.
+            dense: share of its largest size around which knots are dense at 0 if it crosses that.
         """
         low, high = self.ranges[signal]
         most = max(abs(low), abs(high))
-        return Axis(signal, low, high, min(dense, 1e3) * most, JUMP * most)
+        wide = dense if self.crosses(signal) and signal not in ANGLES else 1e3
+        return Axis(signal, low, high, wide * most, JUMP * most)
 
     def axis_y(self, signal: str, order: int = 1) -> Axis:
-        """A signal as second one; an angle with so many cycles per turn."""
-        if signal in ANGLES:
+        """A signal as second one; an angle with so many cycles per turn, 0 for as it is."""
+        if signal in ANGLES and order:
             return Axis(signal, 0.0, TURN / order, turn=True)
         return Axis(signal, *self.ranges[signal])
+
+    def folded(self, signal: str) -> Axis:
+        """A signal as second one that counts without its sign."""
+        low, high = self.ranges[signal]
+        return Axis(signal, 0.0, max(-low, high), fold=True)

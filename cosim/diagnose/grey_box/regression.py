@@ -178,7 +178,8 @@ def _evidence(
     known = np.eye(free) - (1.0 - FREE) * plain @ plain.T
     none = np.zeros(free) if jumps is None else ABSENT * jumps
     priors = [known] if jumps is None or not jumps.any() else [known, known + np.diag(none)]
-    for first, *smooth in product(priors, *([SMOOTH] * len(penalties))):
+    rough = [SMOOTH if penalty.any() else SMOOTH[:1] for penalty in penalties]
+    for first, *smooth in product(priors, *rough):
         shape = first + sum(r * p for r, p in zip(smooth, penalties, strict=True))
         # in coordinates in which both matrices are diagonal, t costs nothing
         values, vectors = eigh(matrix, shape)

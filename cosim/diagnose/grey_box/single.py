@@ -1,150 +1,222 @@
-"""Is it one law of one signal at one place? Asked before sets of named laws are compared.
+"""Is it one law at one place? Asked before sets of named laws are compared, and where one is made.
 
-At the places where a free curve explains most, a smooth law of each signal is asked to first order:
-what it would gain on each run if made from the others. A curve over time explains as much at all
-places of one shaft; a law holds from run to run only at its place and over its signal. The best one
-is fitted. If it leaves noise, what is missing acts there and on that signal, whatever it is called:
-named laws at other places could only describe it worse.
+At each place what an effort there leaves tells whether what is missing acts there, and first orders
+along that motion which law it is (`along`). The best law of each place is fitted: of a few terms of
+one signal, of smooth curves, of terms of two signals, until one leaves nothing but noise, in unused
+runs, too. What is missing is that law then, whatever it is called: named laws at other places could
+only describe it worse.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 from ...errors import CosimError
-from ..localise import PLACES, TIME, Place
+from ..localise import Place
 from ..models import GATE, LEVEL, Fitted
 from ..search import Search
-from ..verdict import HALF
 from ..whiteness import whiteness_tests
-from .bench import LawBench
-from .chain import Begun, improved, refined, singles, site_of
+from .along import Along
+from .bench import LawBench, Site
 from .terms import formula
 from .trial import Law, Maker, Trial
 
-NEAR = 0.9
-"""Share of what the best free curve explains from which another one may be that of the law: nine
-knots follow a law no better."""
-PART = 0.1
-"""Share of all there is to gain in runs left out from which first orders tell the law; below, its
-place may be one that makes up for what acts elsewhere."""
+PLACES = 4
+"""Places that are asked: free curves that explain most are often at the other end of a shaft, or at
+a sensor in the loop around it."""
+LESS = 2.0
+"""Mean square that an effort at a place may leave over what one elsewhere leaves."""
+FITTED = 2
+"""Laws of a kind that are fitted at a place, of different signals: an effort has too few knots for
+friction that changes its sign, and first orders may take one signal for another."""
 SAME = 0.01
-"""Share by which a law elsewhere may be expected to gain less, or a free curve to explain less, and
-do as well: first orders of one model at two ends of a shaft differ by less."""
+"""Share by which a free curve elsewhere may explain less and do as well: at two ends of a shaft
+they differ by less."""
+PASSES, FALL = 8, 0.1
+"""Times at most that first orders are taken again where a fit has ended, and the share of what the
+model then leaves beyond noise that each must remove to be followed by another one."""
 
 
 @dataclass(frozen=True)
-class Single:
-    """The best law of one signal.
+class Begun:
+    """Laws at a place.
 
     Attributes:
-        place: where.
-        begun: laws there.
+        maker: of laws there.
+        trials: all that were asked there, the best first.
+        law: the best one fitted, None if runs want none.
+        enough: whether that leaves noise in all runs.
+        alike: places at which a law does so, too.
     """
 
-    place: Place
-    begun: Begun
+    maker: Maker
+    trials: list[Trial] = field(default_factory=list)
+    law: Law | None = None
+    enough: bool = False
+    alike: tuple[Site, ...] = ()
+
+    @property
+    def site(self) -> Site:
+        """The place."""
+        return self.maker.bench.site
+
+    @property
+    def label(self) -> str:
+        """Of the place."""
+        return self.site.label
 
 
-def single(
-    search: Search, base: Fitted, current: Fitted, located: Sequence[Place]
-) -> Single | None:
-    """The law of one signal that runs left out want most; None if no place can be asked.
+def site_of(place: Place) -> Site:
+    """A place as that of a law."""
+    return Site(place.instance, place.port, place.element, place.unit)
+
+
+def single(search: Search, base: Fitted, located: Sequence[Place]) -> Begun | None:
+    """The best law at one of the places where free curves explain most; None if none can be asked.
 
     Args:
         search: the data.
         base: the declared model.
-        current: the best model with named laws.
-        located: where free curves enter the declared one.
+        located: the places, the best first.
     """
-    asked: list[_LawsAt] = []
-    for place in located[:PLACES]:
-        try:
-            maker = Maker(LawBench(search, base, site_of(place)))
-            trials = sorted(singles(maker), key=lambda t: -t.expected)
-        except CosimError as error:
-            search.say(f"no law at {place.label}: {error}")
+    some = located[:PLACES]
+    return best_law(search, base, [(site_of(p), p.curves[0].explained) for p in some])
+
+
+def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) -> Begun | None:
+    """The best law at one of some places; None if none can be asked.
+
+    Args:
+        search: the data.
+        base: the model that lacks it.
+        sites: the places, and the share that a free curve explains there; where one leaves noise,
+            others that explain less are not asked.
+
+    Raises:
+        CosimError: it is one place, and no law can enter there.
+    """
+    asked: list[Along] = []
+    begun: list[Begun] = []
+    shares: list[float] = []
+
+    def needless(explained: float) -> bool:
+        found = any(b.enough for b in begun)
+        return found and explained < (1.0 - SAME) * sites[0][1]
+
+    for site, explained in sites:
+        if needless(explained):
             continue
-        asked.append(_LawsAt(place, maker, trials))
-    chosen = _chosen(asked)
-    if chosen is None:
-        return Single(asked[0].place, Begun(asked[0].maker, asked[0].trials)) if asked else None
-    (place, maker, trials), first, alike = chosen
-    search.say(f"a law of {first.shape.label} at {place.label}?")
+        try:
+            along = Along(Maker(LawBench(search, base, site)))
+            one = _with(search, Begun(along.maker), along.terms())
+        except CosimError as error:
+            if len(sites) == 1:
+                raise
+            search.say(f"no law at {site.label}: {error}")
+            continue
+        asked.append(along)
+        shares.append(explained)
+        begun.append(one)
+        begun[-1] = _settled(search, begun, len(begun) - 1)
+    least = min((a.left for a in asked if a.left is not None), default=math.inf)
+    kept = [k for k, a in enumerate(asked) if a.left is None or a.left <= LESS * least]
+    kinds: list[Callable[[Along], list[Trial]]] = [Along.curves, Along.pairs]
+    for kind in kinds:
+        if any(b.enough for b in begun):
+            break
+        for number in kept:
+            if needless(shares[number]):
+                continue
+            try:
+                begun[number] = _with(search, begun[number], kind(asked[number]))
+            except CosimError as error:
+                search.say(f"{begun[number].label}: {error}")
+            begun[number] = _settled(search, begun, number)
+    known = sorted([b for b in begun if b.enough] or begun, key=_cost)
+    if not known:
+        return None
+    return replace(known[0], alike=tuple(b.site for b in known[1:] if b.enough))
+
+
+def _with(search: Search, before: Begun, trials: list[Trial]) -> Begun:
+    """Further laws at a place, the best of them fitted if runs that were left out want them."""
+    known = sorted([*before.trials, *trials], key=lambda t: -t.expected)
+    best, maker = replace(before, trials=known), before.maker
+    firsts: dict[str, Trial] = {}
+    for trial in trials:
+        if trial.expected > math.log(len(known) / LEVEL):
+            firsts.setdefault(trial.shape.label, trial)
+    for trial in list(firsts.values())[:FITTED]:
+        law = maker.sharper(maker.fitted(trial))
+        search.say(f"{before.label}: {law.formula}, {left(search, law)}")
+        other = replace(best, law=law)
+        if _cost(other) < _cost(best):
+            best = other
+        if not search.lacking(law.fitted):
+            break
+    return best
+
+
+def _settled(search: Search, begun: Sequence[Begun], number: int) -> Begun:
+    """A place, and whether its law leaves noise; fitted to the end if it may, or is the best."""
+    one = begun[number]
+    law, maker = one.law, one.maker
+    if law is None:
+        return one
+    first = one is min(begun, key=_cost)
     try:
-        law = improved(maker, first, search.say)
-        if search.lacking(law.fitted) and search.gains(current, law.fitted)[0] > GATE:
-            law = refined(maker, law, search.say)
-        enough = _leaves_noise(search, law)
-        if not enough:
+        if (first or not search.lacking(law.fitted)) and not leaves_noise(search, law):
             law = maker.exact(law)
-            enough = _leaves_noise(search, law)
-        if not enough and not search.lacking(law.fitted):  # unused runs may go farther
-            short = formula(maker, law, *maker.tried(law.shape, law))
-            enough = short is not None and _leaves_noise(
-                search, maker.exact(maker.fitted(short, law))
-            )
+        if first and not leaves_noise(search, law):
+            law = improved(maker, law, search.say)
+        return replace(one, law=law, enough=_enough(search, maker, law))
     except CosimError as error:
-        search.say(f"{place.label}: {error}")
-        return Single(place, Begun(maker, trials, alike=alike))
-    return Single(place, Begun(maker, trials, law, enough, alike))
+        search.say(f"{one.label}: {error}")
+        return one
 
 
-class _LawsAt(NamedTuple):
-    """A place, laws there, and all of one signal, the best first."""
-
-    place: Place
-    maker: Maker
-    trials: list[Trial]
-
-
-def _chosen(asked: Sequence[_LawsAt]) -> tuple[_LawsAt, Trial, tuple[str, ...]] | None:
-    """The law that is fitted, that which runs left out want most; and where one would do as well.
-
-    Where a free curve over a signal explains most of the worst run, of those over whose signals one
-    explains nearly as much, by evidence if first orders tell little of other runs.
-    """
-    laws = [(there, t) for there in asked for t in there.trials if _signal(t) != TIME]
-    curves = [
-        (c, there) for there in asked for c in there.place.curves
-        if c.driver != TIME and c.explained > HALF
-    ]  # fmt: skip
-    curves.sort(key=lambda item: -item[0].evidence)
-    if curves:
-        least = NEAR * curves[0][0].explained
-        drivers = {(id(there), c.driver) for c, there in curves if c.explained > least}
-        laws = [(there, t) for there, t in laws if (id(there), _signal(t)) in drivers]
-    needed = math.log(max(sum(len(there.trials) for there in asked), 1) / LEVEL)
-    best = max(laws, key=lambda item: item[1].expected, default=None)
-    if best is not None and best[1].expected > max(needed, PART * _all(best[1])):
-        least = best[1].expected - max(SAME * best[1].expected, GATE)
-        return *best, _others(best[0], [there for there, t in laws if t.expected > least])
-    for curve, first in curves:
-        for there, trial in laws:
-            if there is first and _signal(trial) == curve.driver:
-                least = (1.0 - SAME) * curve.explained
-                near = [other for c, other in curves if c.explained > least]
-                return there, trial, _others(there, near)
-    return None
+def _enough(search: Search, maker: Maker, law: Law) -> bool:
+    """Whether a law leaves noise, or where unused runs go farther, its formula does."""
+    if leaves_noise(search, law):
+        return True
+    if search.lacking(law.fitted) or law.trial.words:
+        return False
+    short = formula(maker, law, maker.around(law))
+    return short is not None and leaves_noise(search, maker.exact(maker.fitted(short, law)))
 
 
-def _others(first: _LawsAt, alike: Sequence[_LawsAt]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(at.place.label for at in alike if at is not first))
+def improved(maker: Maker, law: Law, say: Callable[[str], None]) -> Law:
+    """A law fitted again from where first orders lead around it, until little is gained."""
+    for _ in range(PASSES):
+        before = law.fitted.estimate.robust
+        new = maker.sharper(maker.fitted(maker.around(law), law))
+        if new.fitted.estimate.robust < before:
+            law = new
+        noise = 0.5 * law.fitted.estimate.count
+        if before - law.fitted.estimate.robust < max(FALL * (before - noise), GATE):
+            break
+        say(f"once more from there: {left(maker.search, law)}")
+    return law
 
 
-def _all(trial: Trial) -> float:
-    """What a law would gain that leaves nothing, residuals counted as in its first orders."""
-    return 0.5 * sum(float(gram.matrix[-1, -1]) for gram in trial.grams)
-
-
-def _signal(trial: Trial) -> str:
-    return trial.shape.axes[0].signal
-
-
-def _leaves_noise(search: Search, law: Law) -> bool:
+def leaves_noise(search: Search, law: Law) -> bool:
     """Whether it leaves nothing but noise, also in runs that were not used."""
     unused = whiteness_tests(search.check_data - law.fitted.check, search.checking)
     return not search.lacking(law.fitted) and not any(s.structured for s in unused)
+
+
+def left(search: Search, law: Law) -> str:
+    """What a law leaves, as said."""
+    fitted = law.fitted
+    used, unused = (
+        math.sqrt(float((data - model) @ (data - model)) / max(data.size, 1))
+        for data, model in ((search.fit_data, fitted.fit), (search.check_data, fitted.check))
+    )
+    return f"{used:.2f} times the noise left, {unused:.2f} in unused runs"
+
+
+def _cost(begun: Begun) -> float:
+    fitted = begun.maker.bench.base if begun.law is None else begun.law.fitted
+    return fitted.estimate.robust + fitted.free

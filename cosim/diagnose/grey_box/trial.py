@@ -13,7 +13,7 @@ from ...calibrate.deferred import corrected
 from ...calibrate.estimate import Estimate
 from ...calibrate.fit import CORRECTION, Effort, fit
 from ...calibrate.normal import BOUNDS
-from ...calibrate.parts import Parameter, Sensitivity
+from ...calibrate.parts import Sensitivity
 from ...calibrate.simulator import Simulator
 from ...errors import CosimError
 from ...system.variants import component
@@ -36,8 +36,6 @@ POINTS = 4000
 """Points along the runs from which a law is redrawn on other knots."""
 WIDE = 100.0
 """Span of a direction in its standard deviations: differences take a hundredth of it."""
-FARTHEST = 1e4
-"""Bound on a direction in its prior standard deviations: none."""
 NARROWER = (0.1, 1e-2, 1e-3)
 """Widths of the jump that are tried, over the usual one."""
 QUICK = Effort("near", "draft", iterations=4)
@@ -257,7 +255,7 @@ class Maker:
                 chosen = np.column_stack([chosen, missed / np.linalg.norm(missed)])
         directions, widths = vectors @ chosen, 1.0 / np.sqrt(1.0 + values @ chosen**2)
         targets = trial.expansion @ directions
-        problem = bench.shaped(trial.shape, self._parameters(targets, WIDE * widths))
+        problem = bench.shaped(trial.shape, bench.directed(targets, WIDE * widths))
         simulator = self.search.simulator.of(problem).limited(bench.limits)
         theta = (self.start if around is None else around.fitted).estimate.theta[: self.count]
         change = regression.declared * base.problem.scale
@@ -276,6 +274,22 @@ class Maker:
             result = fit(right, result.theta, effort=CORRECTION)
         rest = vectors[:, others] * deviation[others]
         return Law(trial, self._judged(result), directions, rest)
+
+    def around(self, law: Law, words: Sequence[str] = ()) -> Trial:
+        """The same law to first order around where its fit has ended.
+
+        Args:
+            law: it.
+            words: terms of a formula that are kept, all if none is given.
+        """
+        if not law.trial.words:
+            return self.tried(law.shape, law)[0]
+        kept = [k for k, w in enumerate(law.trial.words) if not words or w in words]
+        columns = law.trial.expansion[:, kept]
+        (again,) = self.tried(law.shape, law, np.linalg.pinv(law.shape.expansion) @ columns)
+        known = regress(again.grams, [np.zeros((len(kept),) * 2)], self.declared)
+        kept_words = tuple(law.trial.words[k] for k in kept)
+        return replace(again, regression=known, words=kept_words)
 
     def exact(self, law: Law) -> Law:
         """The law fitted again where the errors of the communication step are those at its end."""
@@ -297,22 +311,10 @@ class Maker:
         normal = design.T @ design + ridge * np.eye(design.shape[1])
         near = np.linalg.solve(normal, design.T @ law.values(*points)[0])
         trial = replace(law.trial, shape=shape, expansion=shape.expansion, words=())
-        problem = self.bench.shaped(shape, self._parameters(shape.expansion, np.ones(near.size)))
+        problem = self.bench.shaped(shape, self.bench.directed(shape.expansion, np.ones(near.size)))
         theta = np.concatenate([law.fitted.estimate.theta[: self.count], near])
         found = self._judged(fit(self.search.simulator.of(problem), theta, effort=QUICK))
         return Law(trial, found, np.eye(near.size), np.zeros((near.size, 0)))
-
-    def _parameters(self, targets: Vector, spans: Vector) -> list[Parameter]:
-        """Parameters of a law, each setting the coefficients as a column says."""
-        prefix = self.bench.site.prefix
-        return [
-            Parameter(
-                f"{prefix}a[{i + 1}]", "", 0.0, -FARTHEST, FARTHEST,
-                tuple((f"{prefix}c[{k + 1}]", float(v)) for k, v in enumerate(column)),
-                "effect", prior=1.0, span=float(min(spans[i], 1.0)),
-            )
-            for i, column in enumerate(targets.T)
-        ]  # fmt: skip
 
     def _judged(self, estimate: Estimate) -> Fitted:
         base, search = self.bench.base, self.search
