@@ -93,7 +93,7 @@ def together(
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
-    among = sorted(balances(declared.problem))
+    among = [] if only else sorted(balances(declared.problem))
     places = [(p.instance, p.port) for p in located if p.evidence > 0.0]
     if not places or search.raw.late:
         return current
