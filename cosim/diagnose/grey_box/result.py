@@ -90,7 +90,7 @@ class LawFromData:
             "formula": law.formula,
             "signals": [
                 {"name": axis.signal, "axis": name, "low": axis.first, "high": axis.last,
-                 "repeats": axis.turn}
+                 "repeats": axis.turn, "without_sign": axis.fold}
                 for name, axis in (("x", law.shape.x), ("y", law.shape.y)) if axis is not None
             ],
             "coefficients": self._coefficients(law),
