@@ -44,7 +44,7 @@ from .shortlist import PART
 from .table import candidates_of, table_of
 from .together import ahead, together
 from .unstable import ends
-from .verdict import above, decide, proposal, unasked
+from .verdict import HALF, above, decide, proposal, unasked
 from .whiteness import CALIBRATED, WhitenessTest, whiteness_tests
 
 ALL = 0.9
@@ -167,6 +167,9 @@ def _searched(
         _judged(result, search, _found(result, search, base, asked))
         assert result.after is not None
         if asked or (law and result.verdict == "unexplained"):
+            if asked is None and not search.raw.late:
+                _placed(result)
+                _single(result)
             result.law = unnamed(search, result.after, result.located, asked, result.single)
     except StoppedError as stopped:
         why = str(stopped)
@@ -321,7 +324,9 @@ def _single(result: Diagnosis) -> None:
     assert search is not None and base is not None
     if result.single is None:
         result.single = one = single(search, base, result.located)
-        if one is not None and one.law is not None:
+        beyond = base.estimate.robust - 0.5 * base.estimate.count
+        gained = search.gain(base, one.law.fitted) if one is not None and one.law else 0.0
+        if one is not None and gained > HALF * beyond:
             result.located.sort(key=lambda place: place.label != one.label)
 
 

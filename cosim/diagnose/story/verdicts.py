@@ -314,16 +314,17 @@ def best_curve(place: Mapping[str, Any]) -> tuple[int, Mapping[str, Any]]:
 def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     where = likely_place(facts)
     at = f"{where['component']}.{where['port']}" if where else ""
+    driver, law = "", facts.table.get("law_from_data") or {}
+    likely = str(law["place"]) if law.get("made") else at
     headline = join(
         "The machine does something that neither the model nor the catalogue knows: the model "
         "misses ", tag("b", facts.worst), " by ", _misses(facts, "after"), " its sensor's noise",
-        join("; what is missing enters most likely ", facts.in_words(at)) if at else "", ".",
+        join("; what is missing enters most likely ", facts.in_words(likely)) if likely else "", ".",
     )  # fmt: skip
     meaning = [
         join("Calibration and every effect of the catalogue were tried; none explains what is left "
              "of ", words([tag("b", name) for name in facts.left]), " on unused runs."),
     ]  # fmt: skip
-    driver, law = "", facts.table.get("law_from_data") or {}
     if law.get("made"):
         meaning.append(
             join("A law made from the data says more: ", tag("code", law["formula"]), " at ",
@@ -340,7 +341,7 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
                  " of what exceeds the noise in the run that shows it most. ",
                  tag("a", "Its curve", href="#where"), " is what the missing law looks like.")
         )  # fmt: skip
-    elif facts.at("localisation"):
+    elif facts.at("localisation") and not law.get("made"):
         meaning.append(
             join("No unknown input at a single place that was probed explains half of it (",
                  tag("a", "places", href="#where"), "): the cause may lie elsewhere, or in several "
