@@ -319,7 +319,8 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     headline = join(
         "The machine does something that neither the model nor the catalogue knows: the model "
         "misses ", tag("b", facts.worst), " by ", _misses(facts, "after"), " its sensor's noise",
-        join("; what is missing enters most likely ", facts.in_words(likely)) if likely else "", ".",
+        join("; what is missing enters most likely ", facts.in_words(likely)) if likely else "",
+        ".",
     )  # fmt: skip
     meaning = [
         join("Calibration and every effect of the catalogue were tried; none explains what is left "
