@@ -38,9 +38,9 @@ def test_the_functions_are_those_of_the_effect(second: Axis) -> None:
         assert own["flange.fitted_law.u"] == pytest.approx(expected[0], abs=1e-12)
 
 
-@pytest.mark.parametrize("form", ["x", "y", "x + y", "x * y"])
+@pytest.mark.parametrize("form", ["x", "y", "x * y"])
 def test_a_narrow_form_is_a_case_of_the_surface(form: str) -> None:
-    shape = Shape("x * y", SPEED, ANGLE).narrowed(form)
+    shape = Shape(form, SPEED if "x" in form else None, ANGLE if "y" in form else None)
     random = np.random.default_rng(2)
     x, y = random.uniform(-6.0, 5.0, 30), random.uniform(-9.0, 9.0, 30)
     free = random.standard_normal(shape.expansion.shape[1])

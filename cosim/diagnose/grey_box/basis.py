@@ -19,8 +19,8 @@ ALONG_X, ALONG_Y = 12, 8
 """As in the effect."""
 STRAIGHT = 1e3
 """Scale over the range from which knots are equally spaced: asinh(1e-3) is 1e-3 to seven digits."""
-FORMS = ("x", "y", "x + y", "x * y")
-"""Depends on x, on y, on a sum of both kinds, on both in any way."""
+FORMS = ("x", "y", "x * y")
+"""Depends on x, on y, on both in any way."""
 
 
 @dataclass(frozen=True)
@@ -107,12 +107,7 @@ class Shape:
     @property
     def label(self) -> str:
         """As shown."""
-        names = [axis.label for axis in self.axes]
-        return (" x " if self.form == "x * y" else " + ").join(names)
-
-    def narrowed(self, form: str) -> Shape:
-        """The same in a form that is a special case of its own."""
-        return Shape(form, self.x if "x" in form else None, self.y if "y" in form else None)
+        return " x ".join(axis.label for axis in self.axes)
 
     @cached_property
     def expansion(self) -> Vector:
@@ -125,8 +120,6 @@ class Shape:
             return only_x
         if self.form == "y":
             return only_y
-        if self.form == "x + y":
-            return np.column_stack([only_x, only_y])
         return np.eye((ALONG_X + 1) * ALONG_Y)
 
     @property
@@ -149,10 +142,6 @@ class Shape:
             return [x]
         if self.form == "y":
             return [y]
-        if self.form == "x + y":
-            none = np.zeros((ALONG_X + 1, ALONG_Y))
-            return [np.block([[x, none], [none.T, 0.0 * y]]),
-                    np.block([[0.0 * x, none], [none.T, y]])]  # fmt: skip
         return [kron(x, np.eye(ALONG_Y)), kron(np.eye(ALONG_X + 1), y)]
 
     def design(self, x: Vector, y: Vector) -> Vector:
@@ -163,6 +152,4 @@ class Shape:
             return along_x
         if self.form == "y":
             return along_y
-        if self.form == "x + y":
-            return np.column_stack([along_x, along_y])
         return np.asarray((along_x[:, :, None] * along_y[:, None, :]).reshape(x.size, -1))

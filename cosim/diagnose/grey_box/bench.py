@@ -280,7 +280,6 @@ class LawBench:
     def grams(
         self, shape: Shape, directions: Vector, theta: Vector, coefficients: Vector,
         residual: Mapping[str, Vector], slopes: Sequence[Sensitivity], held: Sequence[str] = (),
-        names: Sequence[str] = (),
     ) -> list[Gram]:  # fmt: skip
         """Inner products of responses, derivatives and residuals, by run.
 
@@ -292,7 +291,6 @@ class LawBench:
             residual: there, over sigma, by run.
             slopes: derivatives by the declared parameters there.
             held: declared parameters that a fit left at a bound: they absorb nothing.
-            names: runs, all identification runs if not given.
 
         Raises:
             CosimError: the law cannot be simulated at any size.
@@ -300,14 +298,14 @@ class LawBench:
         simulator = self.search.simulator.of(self.shaped(shape, self.coefficients()))
         simulator = simulator.limited(self.limits)
         whole = np.concatenate([theta, coefficients])
-        start = self.model(simulator, whole, names)
+        start = self.model(simulator, whole)
         largest = max(float(np.nanmax(np.abs(residual[name]))) for name in start)
         size = self._size(simulator, whole, start, AIM * max(largest, 1.0))
         columns: dict[str, list[Vector]] = {name: [] for name in start}
         for direction in directions.T:
             moved = whole.copy()
             moved[theta.size :] += size * direction
-            for name, values in self.model(simulator, moved, names).items():
+            for name, values in self.model(simulator, moved).items():
                 columns[name].append(((values - start[name]) / size).astype(np.float32))
         problem = self.base.problem
         scale = problem.scale * ~np.isin(problem.names, list(held))

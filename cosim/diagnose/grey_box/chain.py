@@ -95,7 +95,7 @@ def law_from_data(
     if law.trial.words:
         few = maker.around(law)
     if law.shape.form in ("x", "y"):
-        around = maker.tried(law.shape, law)[0]
+        around = maker.tried(law.shape, law)
         few = few or formula(maker, law, around)
         result.law = result.smooth = maker.fitted(around, law, final=True)
         say(f"{result.law.formula}: {left(search, result.law)}")

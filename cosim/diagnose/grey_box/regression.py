@@ -106,7 +106,6 @@ class Regression:
         evidence: log evidence against no law [nats].
         expected: log likelihood that runs gain which were left out one by one [nats]; `evidence`
             where there is one run only.
-        predicted: log likelihood of these runs, the residual being that of no law.
     """
 
     prior: Prior
@@ -116,7 +115,6 @@ class Regression:
     declared: Vector
     evidence: float
     expected: float
-    predicted: float
 
 
 def regress(
@@ -139,17 +137,16 @@ def regress(
     evidence, prior = _evidence(matrix, vector, penalties, declared, jumps)
     factor = cho_factor(matrix + prior.law)
     value = cho_solve(factor, vector)
-    alone = -0.5 * float(total[-1, -1])
-    expected, predicted = evidence, evidence + alone
+    expected = evidence
     if len(grams) > 1:
         with_law, without = (
             sum(_gain(held, total - held.matrix, prior, count) for held in grams)
             for count in (free, 0)
         )
-        expected, predicted = with_law - without, with_law + alone
+        expected = with_law - without
     return Regression(
         prior, matrix, value, cho_solve(factor, np.eye(free)), back @ np.append(-value, 1.0),
-        evidence, float(expected), float(predicted),
+        evidence, float(expected),
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from ...errors import CosimError
 from ...system.variants import component
 from ..candidates import Candidate
 from ..models import GATE, Fitted, compare, is_open
-from .basis import Axis, Shape
+from .basis import Shape
 from .bench import EFFECT, LawBench
 from .regression import Gram, Regression, regress
 
@@ -32,8 +32,6 @@ SHARES = (1.0, 0.5, 0.2, 0.05)
 """Of the law that first orders ask for, where a fit begins: whichever is best."""
 SMALL = 1e-6
 """Share of a law that need not be kept."""
-POINTS = 4000
-"""Points along the runs from which a law is redrawn on other knots."""
 WIDE = 100.0
 """Span of a direction in its standard deviations: differences take a hundredth of it."""
 NARROWER = (0.1, 1e-2, 1e-3)
@@ -106,7 +104,7 @@ class Law:
     def formula(self) -> str:
         """As a line of text: named terms with their numbers, or what kind of curve it is."""
         if not self.trial.words:
-            kind = {"x + y": "sum of two curves", "x * y": "surface"}.get(self.shape.form, "curve")
+            kind = "surface" if self.shape.form == "x * y" else "curve"
             return f"smooth {kind} over {self.shape.label}"
         parts = [f"{value:+.4g} {word}" for value, word in zip(self.free, self.trial.words,
                                                                strict=True)]  # fmt: skip
@@ -156,18 +154,11 @@ class Maker:
 
     Args:
         bench: the model with a law there.
-
-    Attributes:
-        start: the model without a law around which laws are tried; where that is far off with
-            parameters at their bounds, at nominal values: what was calibrated made the best of a
-            wrong law.
     """
 
     def __init__(self, bench: LawBench) -> None:
         self.bench = bench
         self.search = bench.search
-        far = self.search.far(bench.base)
-        self.start = self.search.unfitted(bench.base) if far else bench.base
         base = bench.base.problem
         self.count = len(base.parameters)
         self.declared = np.array(
@@ -191,38 +182,24 @@ class Maker:
         held = tuple(n for n in fitted.estimate.at_bound if n in self.bench.base.problem.names)
         return fitted.estimate.theta[: self.count], residual, slopes, held
 
-    def tried(
-        self, shape: Shape, around: Law | None = None, directions: Vector | None = None,
-        forms: Sequence[str] = (), *, beyond: bool = False, names: Sequence[str] = (),
-    ) -> list[Trial]:  # fmt: skip
-        """Laws of a shape to first order, around a model without one or with one.
+    def tried(self, shape: Shape, around: Law, directions: Vector | None = None) -> Trial:
+        """A law of a shape to first order around a fitted one.
 
         Args:
-            shape: the widest one.
-            around: a law of part of the shape.
-            directions: of its free coefficients, all if not given.
-            forms: narrower ones that the same responses tell, too.
-            names: runs, all identification runs if not given.
-            beyond: what is to be added to the law around which it is taken, and not in its place.
+            shape: of the law.
+            around: the fitted one, of the same shape.
+            directions: of the free coefficients, all if not given.
         """
-        bench = self.bench
-        fitted = self.start if around is None else around.fitted
-        theta, residual, slopes, held = self.point(fitted)
-        now = np.zeros(shape.expansion.shape[0]) if around is None else around.coefficients
+        theta, residual, slopes, held = self.point(around.fitted)
+        now = around.coefficients
         directions = np.eye(shape.expansion.shape[1]) if directions is None else directions
         asked = shape.expansion @ directions
-        grams = bench.grams(shape, asked, theta, now, residual, slopes, held, names)
-        grams = tempered(grams)
-        inner = np.linalg.pinv(asked)
-        found = []
-        for one in (shape, *(shape.narrowed(form) for form in forms)):
-            turn, penalties, jumps = one.expansion, one.penalties(), one.jumps
-            if one is shape:
-                turn, penalties = asked, [directions.T @ p @ directions for p in penalties]
-                jumps = np.any(directions[jumps] != 0.0, axis=0)
-            mine = tuple(g.form(inner @ turn, None if beyond else inner @ now) for g in grams)
-            found.append(Trial(one, mine, regress(mine, penalties, self.declared, jumps), turn))
-        return found
+        grams = tempered(self.bench.grams(shape, asked, theta, now, residual, slopes, held))
+        penalties = [directions.T @ p @ directions for p in shape.penalties()]
+        jumps = np.any(directions[shape.jumps] != 0.0, axis=0)
+        before = np.linalg.pinv(asked) @ now
+        mine = tuple(gram.form(np.eye(asked.shape[1]), before) for gram in grams)
+        return Trial(shape, mine, regress(mine, penalties, self.declared, jumps), asked)
 
     def fitted(self, trial: Trial, around: Law | None = None, *, final: bool = False) -> Law:
         """A law fitted through the FMU together with all declared parameters.
@@ -257,7 +234,7 @@ class Maker:
         targets = trial.expansion @ directions
         problem = bench.shaped(trial.shape, bench.directed(targets, WIDE * widths))
         simulator = self.search.simulator.of(problem).limited(bench.limits)
-        theta = (self.start if around is None else around.fitted).estimate.theta[: self.count]
+        theta = (base if around is None else around.fitted).estimate.theta[: self.count]
         change = regression.declared * base.problem.scale
         if around is None:
             starts = [(theta + share * change, share * (start @ chosen)) for share in SHARES]
@@ -267,7 +244,7 @@ class Maker:
             (np.clip(np.concatenate(pair), problem.lower, problem.upper) for pair in starts),
             key=lambda one: self.cost(simulator, one),
         )
-        far = around is None and is_open(self.start.estimate)
+        far = around is None and is_open(base.estimate)
         result = fit(simulator, best, effort=FAR if far else QUICK)
         if final:
             right = corrected(simulator, result.theta, self.search.raw)
@@ -283,10 +260,10 @@ class Maker:
             words: terms of a formula that are kept, all if none is given.
         """
         if not law.trial.words:
-            return self.tried(law.shape, law)[0]
+            return self.tried(law.shape, law)
         kept = [k for k, w in enumerate(law.trial.words) if not words or w in words]
         columns = law.trial.expansion[:, kept]
-        (again,) = self.tried(law.shape, law, np.linalg.pinv(law.shape.expansion) @ columns)
+        again = self.tried(law.shape, law, np.linalg.pinv(law.shape.expansion) @ columns)
         known = regress(again.grams, [np.zeros((len(kept),) * 2)], self.declared)
         kept_words = tuple(law.trial.words[k] for k in kept)
         return replace(again, regression=known, words=kept_words)
@@ -301,20 +278,6 @@ class Maker:
         """x and y of a law along the identification runs."""
         theta = law.fitted.estimate.theta[: self.count]
         return self.bench.recorded(law.shape, theta, law.coefficients)
-
-    def redrawn(self, law: Law, x: Axis) -> Law:
-        """The same law on other knots, as near as these come, fitted from there."""
-        shape = replace(law.shape, x=x)
-        points = [values[:: max(values.size // POINTS, 1)] for values in self.visited(law)]
-        design = shape.design(*points)
-        ridge = 1e-6 * np.trace(design.T @ design) / design.shape[1]
-        normal = design.T @ design + ridge * np.eye(design.shape[1])
-        near = np.linalg.solve(normal, design.T @ law.values(*points)[0])
-        trial = replace(law.trial, shape=shape, expansion=shape.expansion, words=())
-        problem = self.bench.shaped(shape, self.bench.directed(shape.expansion, np.ones(near.size)))
-        theta = np.concatenate([law.fitted.estimate.theta[: self.count], near])
-        found = self._judged(fit(self.search.simulator.of(problem), theta, effort=QUICK))
-        return Law(trial, found, np.eye(near.size), np.zeros((near.size, 0)))
 
     def _judged(self, estimate: Estimate) -> Fitted:
         base, search = self.bench.base, self.search
