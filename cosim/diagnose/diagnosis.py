@@ -228,10 +228,10 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
-        if stage.open and not proposed and not search.raw.late:
+        one_place = bool(result.located) and result.located[0].curves[0].explained > ALL
+        if stage.open and not proposed and one_place and not search.raw.late:
             _placed(result)
-            if result.located and result.located[0].curves[0].explained > ALL:
-                _single(result)
+            _single(result)
         one = result.single
         if stage.open and not proposed and (ahead(search) or (one is not None and one.enough)):
             proposed, found = True, _together(result, current)

@@ -34,7 +34,7 @@ from ..secant import model_values
 from .basis import Shape
 from .bench import ANGLES, DENSE, LawBench
 from .regression import Gram, regress
-from .terms import HARMONICS, images, promised, selected
+from .terms import HARMONICS, POINTS, images, promised, selected, spread
 from .trial import Maker, Trial
 
 Vector = NDArray[np.float64]
@@ -44,7 +44,7 @@ to 0, where drag needs knots far from it."""
 ORDERS = 16
 """Cycles per turn that are tried for laws of an angle at most."""
 FIRST = 1e-3
-"""Strength of a law that is tried first, in the unit of its place."""
+"""Strength of a law that is tried first, in the unit of its place; any that shows is the next."""
 
 
 class Along:
@@ -155,12 +155,8 @@ class Along:
 
     def _asked(self, shape: Shape, count: int | None = None) -> dict[str, Vector]:
         """Terms of a shape that show something, the first ones if a number is given."""
-        random, points = np.random.default_rng(0), []
-        for axis in (shape.x, shape.y):
-            low, high = (axis.first, axis.last) if axis else (0.0, 0.0)
-            points.append(random.uniform(low, high, 4000))
         found: dict[str, Vector] = {}
-        for word, image in images(shape, *points).items():
+        for word, image in images(shape, *spread(shape, POINTS)).items():
             if len(found) == count:
                 break
             column = shape.expansion @ image

@@ -83,13 +83,11 @@ def law_from_data(
         return result
     result.needed = math.log(len(trials) / LEVEL)
     if law is None:
-        result.reason = (
-            f"No law of a signal of {site.label} tells more about runs that it was not made from."
+        reason = (
+            f"o law of a signal of {site.label} tells more about runs that it was not made from."
         )
-        if not search.lacking(base):
-            result.reason = (
-                f"The model reaches the noise, and {result.reason[0].lower()}" + (result.reason[1:])
-            )
+        noise = not search.lacking(base)
+        result.reason = ("The model reaches the noise, and n" if noise else "N") + reason
         return result
     law, few = improved(maker, shorter(maker, law), say), None
     if law.trial.words:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ...errors import CosimError
-from ..localise import Place
+from ..localise import PLACES, Place
 from ..models import GATE, LEVEL, Fitted
 from ..search import Search
 from ..whiteness import whiteness_tests
@@ -23,11 +23,9 @@ from .bench import LawBench, Site
 from .terms import formula
 from .trial import Law, Maker, Trial
 
-PLACES = 4
-"""Places that are asked: free curves that explain most are often at the other end of a shaft, or at
-a sensor in the loop around it."""
 LESS = 2.0
-"""Mean square that an effort at a place may leave over what one elsewhere leaves."""
+"""Mean square that an effort at a place may leave over what one elsewhere leaves: at places of one
+cause it is the same but for what its knots cannot follow, which is less than all it leaves."""
 FITTED = 2
 """Laws of a kind that are fitted at a place, of different signals: an effort has too few knots for
 friction that changes its sign, and first orders may take one signal for another."""

@@ -31,9 +31,8 @@ HARMONICS = 3
 """Multiples of an angle's cycles that are terms: as many as its splines follow."""
 ASKED = 12
 """Sets of as many terms of which it is asked what runs gain that are left out, those that explain
-most of all runs."""
-ALIKE = 1e-6
-"""Share by which terms must differ to be two."""
+most of all runs: that order differs from this one by terms that do nearly the same, of which a
+signal has no more."""
 POINTS = 4000
 """Points along the runs at which terms are compared with their images."""
 
@@ -106,7 +105,7 @@ def formula(maker: Maker, law: Law, around: Trial) -> Trial | None:
     """
     seen = [values[:: max(values.size // POINTS, 1)] for values in maker.visited(law)]
     # a term holds where no fitted run goes, too
-    ends = zip(seen, _spread(law.shape, seen), strict=True)
+    ends = zip(seen, spread(law.shape, seen[0].size), strict=True)
     x, y = (np.concatenate([values, more]) for values, more in ends)
     near = images(law.shape, x, y)
     if not near:
@@ -160,19 +159,20 @@ def promised(
     alone = alone / np.outer(size, size)
 
     def explained(place: Sequence[int]) -> float:
-        matrix = alone[np.ix_(place, place)] + ALIKE * np.eye(len(place))
+        rounded = np.finfo(np.float32).eps * np.eye(len(place))  # columns have single precision
+        matrix = alone[np.ix_(place, place)] + rounded
         share = alone[place, -1]
         return 0.5 * float(size[-1] ** 2 * (share @ np.linalg.solve(matrix, share)))
 
     return explained
 
 
-def _spread(shape: Shape, seen: list[Vector]) -> list[Vector]:
-    """As many points all over the ranges of a law's signals, in no order."""
+def spread(shape: Shape, count: int) -> list[Vector]:
+    """Points x and y all over the ranges of a law's signals, in no order."""
     random, found = np.random.default_rng(0), []
-    for axis, values in zip((shape.x, shape.y), seen, strict=True):
+    for axis in (shape.x, shape.y):
         first, last = (axis.first, axis.last) if axis else (0.0, 0.0)
-        found.append(random.uniform(first, last, values.size))
+        found.append(random.uniform(first, last, count))
     return found
 
 
