@@ -114,7 +114,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     Args:
         benches: individuals.
         seconds: duration of each run.
-        starts: pose of each run at time 0, (runs, 3).
+        starts: pose of each run at time 0, and where within a count its encoders are, (runs, 5).
     """
     count, runs = len(benches), len(RUNS)
 
@@ -171,7 +171,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         values, shift, index = table
         return np.asarray(values[np.minimum(step + shift, steps), index])
 
-    pose = np.repeat(starts, count, axis=0).T.copy()
+    pose = np.repeat(starts[:, :3], count, axis=0).T.copy()
     x, y, yaw = pose
     v_x, v_y, rate = np.zeros(runs * count), np.zeros(runs * count), np.zeros(runs * count)
     angle_l, angle_r = np.zeros(runs * count), np.zeros(runs * count)
@@ -238,18 +238,19 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         found[f"m{k + 1}_x"] = scale * (seen[:, 0] + m_x * cos - m_y * sin)
         found[f"m{k + 1}_y"] = scale * (seen[:, 1] + m_x * sin + m_y * cos)
     # what is logged is the command, of which late encoders know an earlier part
-    for name, values in (("sprocket_speed_l", left), ("sprocket_speed_r", right)):
+    for k, (name, values) in enumerate((("sprocket_speed_l", left), ("sprocket_speed_r", right))):
         angle = np.vstack([np.zeros(runs), np.cumsum(values[:-1], axis=0) * STEP])[::every]
-        counts = np.floor(angle / COUNT)
+        counts = np.floor(angle / COUNT + starts[:, 3 + k])
         found[name] = np.repeat(np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE,
                                 count, axis=1)  # fmt: skip
     return found
 
 
 def _starts(seed: int) -> Vector:
-    """Start poses of the runs."""
+    """Start poses of the runs, and where within a count their encoders are."""
     random = np.random.default_rng([seed, 2])
-    return np.asarray(random.uniform([-0.1, -0.1, -np.pi], [0.1, 0.1, np.pi], (len(RUNS), 3)))
+    poses = random.uniform([-0.1, -0.1, -np.pi], [0.1, 0.1, np.pi], (len(RUNS), 3))
+    return np.hstack([poses, random.uniform(0.0, 1.0, (len(RUNS), 2))])
 
 
 def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:
@@ -287,7 +288,7 @@ def write_sets(
                 clean = values[name][:, k * len(benches) + column]
                 sigma = CAMERA if name.startswith("m") else SPEED_NOISE
                 table[name] = clean + sigma * random.standard_normal(clean.size)
-            near = starts[k] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
+            near = starts[k, :3] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
             purpose = "identification" if run.startswith(FITTED) else "validation"
             pose = [round(float(v), 4) for v in near]
             logged.append(Logged(run, purpose, table, {"initial_pose": pose}))

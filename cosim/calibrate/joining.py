@@ -22,6 +22,7 @@ from ..system.toml import SystemFile
 from .checks.finding import Finding, Source, check_allowed
 from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
+from .counts import steady
 from .mapped_logs import MappedLogs
 from .model import Model
 from .named import named, readings
@@ -459,7 +460,10 @@ class Joined(MappedLogs):
         times, values = self._course(log, column, lead)
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
-            values = np.rint(values / quantum) * quantum
+            values = np.rint(values / quantum)
+            if entry.get("interpolation") == "window":
+                values = steady(values, times)
+            values = values * quantum
         gain, offset, unit = self.conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))

@@ -34,18 +34,18 @@ from .further import judged
 from .grey_box import Site, single, site, unnamed
 from .linear import SampleStack
 from .localise import everywhere, localise
-from .models import GATE, Fitted, is_open
+from .models import Fitted, is_open
 from .power import power
 from .result import PURPOSES, Diagnosis
 from .rivals import elsewhere, reconsidered, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
-from .shortlist import PART
+from .second_look import around_nominal, tests_of, without_slow_parts
 from .table import candidates_of, table_of
 from .together import ahead, together
 from .unstable import ends
 from .verdict import HALF, above, decide, proposal, unasked
-from .whiteness import CALIBRATED, WhitenessTest, whiteness_tests
+from .whiteness import CALIBRATED, whiteness_tests
 
 ALL = 0.9
 """Share of the worst run that a free curve at one place must explain for one law there to be asked
@@ -170,7 +170,8 @@ def _searched(
             if asked is None and not search.raw.late:
                 _placed(result)
                 _single(result)
-            result.law = unnamed(search, result.after, result.located, asked, result.single)
+            lacking = search.cut(result.after) if result.ended else result.after
+            result.law = unnamed(search, lacking, result.located, asked, result.single)
     except StoppedError as stopped:
         why = str(stopped)
     search.simulator.budget.lift()
@@ -198,10 +199,15 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     current = base
     winners: list[Round] = []
     proposed, whole = asked is not None, None
+    anew: Round | None = None
     for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         try:
-            stage = search.round(current)
+            if anew is not None and anew not in search.rounds:
+                stage, winners = anew, []
+                search.rounds.append(anew)
+            else:
+                stage = search.round(current)
         except UnbuiltError as error:
             if not winners:
                 raise
@@ -211,7 +217,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         if number == 0:
             result.power = power(stage, search.fitting)
             if stage.winner is not None or any(
-                s.structured for p in PURPOSES for s in _tests(search, base, p)
+                s.structured for p in PURPOSES for s in tests_of(search, base, p)
             ):
                 say("where does it enter?")
                 ranked = [s.candidate for s in stage.signatures]
@@ -221,10 +227,12 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         if stage.winner is None:
             current = stage.base
             found = reconsidered(search, current, winners)
-            if found is current:
-                break
-            current = found
-            continue
+            if found is not current:
+                current = found
+                continue
+            if anew is None and (anew := around_nominal(search, current)) is not None:
+                continue
+            break
         say(f"added: {stage.winner.effects[-1].label}")
         winners.append(stage)
         current = stage.winner
@@ -243,43 +251,21 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         if one is not None and one.enough and search.lacking(current):
             break  # named laws elsewhere could only describe it worse
         shortened = _shortened(result, winners, current)
-        if not any(s.structured for p in PURPOSES for s in _tests(search, shortened, p)):
+        if not any(s.structured for p in PURPOSES for s in tests_of(search, shortened, p)):
             current = without_slow_parts(search, reconsidered(search, shortened, winners))
+            if anew is None and (anew := around_nominal(search, current)) is not None:
+                continue
             break
         current = shortened
     else:
         current = reconsidered(search, current, winners)
     if whole is not None and (search.lacking(current) or search.gains(current, whole)[0] > 0.0):
         current = whole
-    if not proposed and any(s.structured for p in PURPOSES for s in _tests(search, current, p)):
+    if not proposed and any(s.structured for p in PURPOSES for s in tests_of(search, current, p)):
         current = _together(result, current)
     if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
         current = search.sharpened(current, winners[-1].base)
     return current
-
-
-def without_slow_parts(search: Search, fitted: Fitted) -> Fitted:
-    """A model that leaves noise, or one with as many laws that leaves less of slow parts.
-
-    A law that does nearly the same as the right one leaves next to noise, but not white noise; it
-    goes when the right one comes beside it.
-    """
-    slow = [t.channel for p in PURPOSES for t in _tests(search, fitted, p) if t.slow_parts]
-    if not slow or search.raw.unstable or not fitted.effects:
-        return fitted
-    search.say(f"slow parts are left in {', '.join(dict.fromkeys(slow))}: does another law do?")
-    seen = [s for stage in search.rounds for s in stage.signatures]
-    least = PART * max(s.score.gain for s in seen)
-    near = {s.candidate.label for s in seen if s.score.gain >= least}
-    found = search.round(fitted, near).winner
-    search.rounds.pop()
-    if found is None:
-        return fitted
-    found = examined(search, found, candidates_of(search.rounds))
-    if len(found.effects) > len(fitted.effects) or search.gains(fitted, found)[0] <= GATE:
-        return fitted
-    search.say(f"instead: {', '.join(sorted(found.labels))}")
-    return found
 
 
 def _slight(search: Search, stage: Round, say: Callable[[str], None]) -> bool:
@@ -423,12 +409,6 @@ def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitt
     for stage in winners:
         stage.open = False  # their rivals have had their turn
     return search.shortened(current, sizes)
-
-
-def _tests(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest]:
-    if purpose == PURPOSES[0]:
-        return whiteness_tests(search.fit_data - fitted.fit, search.fitting)
-    return whiteness_tests(search.check_data - fitted.check, search.checking)
 
 
 def _tested(result: Diagnosis) -> None:

@@ -70,8 +70,8 @@ class Law:
         twins: labels of laws that do the same to the first order.
         p_value: of its score on identification runs, corrected for the number of candidates.
         missed: what the model is better by than the one without this law; None if not known.
-        tick: of the rig, if the strength is a time: a shorter one says when within a tick
-            something is read, and not that anything is missing; else 0.
+        tick: the least strength that shifts something by a tick of the rig, 0 if it shifts nothing
+            in time: a smaller one says when within a tick something is read.
     """
 
     effect: str

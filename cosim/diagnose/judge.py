@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
-from .candidates import Candidate
+from .candidates import SKEW, Candidate
 from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
@@ -104,13 +104,13 @@ class Judge:
         rest = fitted.labels - {candidate.label}
         # a model that cannot be simulated without it misses it as much as all effects together
         less = self.memo.get(frozenset() if rest in self.memo.failed else rest)
-        tick = self.raw.step if self.raw.ticks and strength.unit == "s" else 0.0
         return Law(
             candidate.effect, candidate.instance, candidate.port,
             strength.name.removeprefix(prefix), values, candidate.text,
             strength.absent, len(names), candidate.contains, twins,
             p_value,
-            None if less is None else self.better(less, fitted), tick,
+            None if less is None else self.better(less, fitted),
+            tick_of(self.raw, candidate.effect, strength.unit),
         )  # fmt: skip
 
     def count_in_full(self, full: bool = True) -> Problem:
@@ -172,13 +172,13 @@ class Judge:
     def material(self, base: Fitted, other: Fitted) -> bool:
         """Whether the step between two models is large enough to be worth a cause.
 
-        On a rig that acts in ticks, a time shorter than a tick says when within the tick something
-        is read, and not that anything is missing.
+        Shifts by less than a tick of the rig are none (`tick_of`).
         """
         last = other.signature.strength if other.signature is not None else None
-        tick = self.raw.step if self.raw.ticks else 0.0
-        if last is not None and last.unit == "s" and abs(other.estimate.values[last.name]) < tick:
-            return False
+        if last is not None:
+            least = tick_of(self.raw, other.effects[-1].effect, last.unit)
+            if abs(other.estimate.values[last.name]) < least:
+                return False
         return any(
             stack.largest(second - first) > MATERIAL
             for first, second, stack in (
@@ -226,3 +226,20 @@ class Judge:
         """The first of some models, best first, that unused runs want; None if there is none."""
         best = next((f for f in fitted if self.accepted(base, f)), None)
         return None if best is None else self.simplest(base, best, fitted)
+
+
+def tick_of(raw: Problem, effect: str, unit: str) -> float:
+    """The least strength with which a law shifts something by a tick of the rig; 0 for others.
+
+    A time shorter than a tick says when within the tick something is read, and not that anything
+    is missing; and so does a clock that loses no tick within the longest run.
+
+    Args:
+        raw: the problem.
+        effect, unit: of the law's strength.
+    """
+    if not raw.ticks:
+        return 0.0
+    if effect == SKEW:
+        return raw.step / max(float(run.times[-1] - run.times[0]) for run in raw.runs)
+    return raw.step if unit == "s" else 0.0

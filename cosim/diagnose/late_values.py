@@ -84,6 +84,14 @@ class LateValueFitter(Fitter):
             return self.judged(fit(simulator, theta, effort=DRAFT))
         return self.judged(fit(held, values, known=known))
 
+    def cut(self, fitted: Fitted) -> Fitted:
+        """A model judged by runs that end where they do now."""
+        sizes = {run.name: run.times.size for run in self.raw.runs}
+        simulator = fitted.simulator.of(ended(fitted.problem, sizes))
+        found = self.judged(fit(simulator, fitted.estimate.theta, effort=POLISH))
+        found.effects, found.signature = fitted.effects, fitted.signature
+        return found
+
     def shortened(self, fitted: Fitted, sizes: Mapping[str, int]) -> Fitted:
         """Judge by runs that end after so many samples from now on.
 
@@ -98,11 +106,9 @@ class LateValueFitter(Fitter):
         self._measured(ended(self.raw, sizes))
         self.memo.cut(before, (self.fitting, self.checking))
         self._own = None
-        simulator = fitted.simulator.of(ended(fitted.problem, sizes))
-        theta = fitted.estimate.theta
-        found = self.judged(fit(simulator, theta, effort=POLISH))
+        found = self.cut(fitted)
         if self.lacking(found):
-            found = self.judged(fit(simulator, theta, effort=CORRECTION))
+            found = self.judged(fit(found.simulator, fitted.estimate.theta, effort=CORRECTION))
         found.effects, found.signature = fitted.effects, fitted.signature
         found.gate, found.p_value = fitted.gate, fitted.p_value
         self.note(found)

@@ -133,7 +133,7 @@ def doubts(table: Table, model: Model) -> list[str]:
             edge = max(law.absent, law.size.minimum)
             found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
         if abs(law.size.value) < law.tick:
-            found.append(f"{law.label} is shorter than a tick of the rig, {law.tick:g} s")
+            found.append(f"{law.label} shifts nothing by a tick of the rig")
         if model.rough or not table.unused_count:
             continue
         if law.missed is None:

@@ -70,18 +70,28 @@ def test_the_gate_opens_for_the_better_model_only() -> None:
     assert back.gain == pytest.approx(-there.gain)
 
 
-@pytest.mark.parametrize(("time", "named"), [(3e-4, False), (6e-4, True)])
-def test_a_time_below_the_tick_of_the_rig_has_no_name(time: float, named: bool) -> None:
+@pytest.mark.parametrize(
+    ("effect", "unit", "strength", "named"),
+    [
+        ("delay", "s", 3e-4, False), ("delay", "s", 6e-4, True),
+        ("clock_skew", "1", 3e-5, False), ("clock_skew", "1", 6e-5, True),  # in 10 s
+    ],
+)  # fmt: skip
+def test_a_shift_below_the_tick_of_the_rig_has_no_name(
+    effect: str, unit: str, strength: float, named: bool
+) -> None:
     place = layout()
+    run = SimpleNamespace(times=np.array([0.0, 10.0]))
     rig: Any = SimpleNamespace(
-        raw=SimpleNamespace(ticks=True, step=5e-4), fitting=place, checking=place
+        raw=SimpleNamespace(ticks=True, step=5e-4, runs=[run]), fitting=place, checking=place
     )
     model = np.zeros(place.size)
     base: Any = SimpleNamespace(fit=model, check=model)
-    strength = SimpleNamespace(name="delay.t_d", unit="s")
+    quantity = SimpleNamespace(name="law.strength", unit=unit)
     other: Any = SimpleNamespace(
-        fit=model + 1.0, check=model + 1.0, signature=SimpleNamespace(strength=strength),
-        estimate=SimpleNamespace(values={"delay.t_d": time}),
+        fit=model + 1.0, check=model + 1.0, signature=SimpleNamespace(strength=quantity),
+        estimate=SimpleNamespace(values={"law.strength": strength}),
+        effects=[SimpleNamespace(effect=effect)],
     )  # fmt: skip
     assert Search.material(rig, base, other) is named
 

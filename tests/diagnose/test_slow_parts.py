@@ -8,9 +8,9 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.diagnosis import without_slow_parts
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
+from cosim.diagnose.second_look import without_slow_parts
 from cosim.diagnose.whiteness import whiteness_tests
 from tests.diagnose import disc
 from tests.problems import simulator

@@ -1,0 +1,101 @@
+"""Speeds from differences of whole counts: the smoothest motion that has these counts.
+
+A counter that shows n_k at sample k was between two of its marks, so of the angle in counts
+
+    |theta_k - n_k| <= 1/2    but for a constant, which no speed knows.
+
+Differences of n_k jump by whole counts where the speed is steady; a model that is driven by them is
+shaken, and friction that is small at rest is not what it is then. So, of all motions that have
+these counts, the one is taken whose speed bends least,
+
+    minimize sum (third differences of theta)^2,
+
+by a barrier method whose banded systems cost next to nothing. Where the speed does jump, bounds
+keep the jump.
+
+Not modelled: marks that are not equally far from each other.
+
+Source: Boyd, Vandenberghe, Convex Optimization (2004), 11.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+Vector = NDArray[np.float64]
+ORDER = 3
+"""Of the differences: speeds that change evenly cost nothing."""
+WEIGHTS = 10.0 ** np.arange(-1, 7)
+"""Of smoothness over the barrier, one after another. With the last, the bounds' part of the sum is
+1e-6 squared counts for each: far below what a count tells of an angle (1/12)."""
+STEPS, NEAR = 50, 1e-6
+"""Newton steps for a weight at most, and half of the decrease that they still promise which ends
+them: of sums near 1 for each sample."""
+INSIDE = 0.99
+"""Share of the way to a bound that a step may go."""
+UNEVEN = 0.1
+"""Share of an interval by which others may differ: time stamps jitter, a lost sample doubles it."""
+
+
+def steady(differences: Vector, times: Vector) -> Vector:
+    """Speeds of the smoothest motion, from the whole counts within each interval.
+
+    Where intervals are not equal (lost samples), it begins anew.
+
+    Args:
+        differences: counts within the interval that ends at each of the times.
+        times: of the samples [s].
+    """
+    intervals = np.diff(times)
+    usual = np.abs(intervals - np.median(intervals)) < UNEVEN * np.median(intervals)
+    found = differences.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], usual, [False]])))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        counted = np.concatenate([[0.0], np.cumsum(differences[first + 1 : last + 1])])
+        found[first + 1 : last + 1] = np.diff(smoothest(counted))
+    return found
+
+
+def smoothest(counts: Vector) -> Vector:
+    """Angles of the smoothest motion with some counts, in counts.
+
+    Args:
+        counts: whole ones, at equal intervals.
+    """
+    if counts.size <= ORDER:
+        return counts.copy()
+    rows = np.diff(np.eye(2 * ORDER + 1), ORDER, axis=0)
+    bands = _bands(counts.size, rows[0, : ORDER + 1])
+    bent = np.diff(counts, ORDER)
+    found = np.zeros(counts.size)  # angles over the middles of their counts
+    for weight in WEIGHTS:
+        for _ in range(STEPS):
+            above, below = 1.0 / (0.5 - found), 1.0 / (0.5 + found)
+            slope = weight * _transposed(bent + np.diff(found, ORDER)) + above - below
+            matrix = weight * bands
+            matrix[-1] += above**2 + below**2
+            step = -solveh_banded(matrix, slope)
+            if -0.5 * float(slope @ step) < NEAR * counts.size:
+                break
+            room = np.where(step > 0.0, 0.5 - found, 0.5 + found)
+            reach = float(np.max(np.abs(step) / room, initial=0.0))
+            found = found + min(1.0, INSIDE / max(reach, 1e-300)) * step
+    return counts + found
+
+
+def _bands(count: int, row: Vector) -> Vector:
+    """D'D in upper banded form, D: differences of so many values."""
+    bands = np.zeros((ORDER + 1, count))
+    for far in range(ORDER + 1):
+        for i in range(ORDER + 1 - far):
+            # each row of differences adds its products to the diagonal
+            bands[ORDER - far, i + far : count - ORDER + i + far] += row[i] * row[i + far]
+    return bands
+
+
+def _transposed(differences: Vector) -> Vector:
+    """D' times a vector."""
+    padded = np.concatenate([np.zeros(ORDER), differences, np.zeros(ORDER)])
+    return (-1.0) ** ORDER * np.diff(padded, ORDER)
