@@ -20,6 +20,7 @@ SAMPLE = 0.02
 COUNT = 2 * np.pi / 25600
 MASS, YAW_INERTIA, GRAVITY, LINEAR_BELOW = 15.0, 0.43, 9.81, 1e-3
 MARKERS = np.array([[0.0, 0.0], [0.19, 0.13], [0.19, -0.13], [-0.19, 0.13], [-0.19, -0.13]])
+HEIGHT = 0.12  # of the mass centre [m]
 CAMERA, SPEED_NOISE = 1e-4, 1.5e-3
 RAMP = 0.6  # from rest to speed and back [s]
 SHEET = Path(__file__).parents[1] / "scenarios/crawler_bench/data/crawler.toml"
@@ -195,11 +196,11 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         w = s + rate * at_x
         speed = np.sqrt(u * u + w * w)
         n = load
-        if np.any(height):
-            f_a, s_a = a_x * cos + a_y * sin, -a_x * sin + a_y * cos
-            moved = -height * f_a / GRAVITY, -height * s_a / GRAVITY
-            n = loads(mass * GRAVITY, x_g + moved[0], y_g + moved[1], at_x, half)
-            n = np.maximum(n, 0.0)
+        if np.any(slope) or np.any(height):  # what acts on the mass centre shifts the load
+            f_x = HEIGHT * push_x[0] / mass - height * a_x
+            f_y = HEIGHT * push_y[0] / mass - height * a_y
+            down = (f_x * cos + f_y * sin) / GRAVITY, (-f_x * sin + f_y * cos) / GRAVITY
+            n = np.maximum(loads(mass * GRAVITY, x_g + down[0], y_g + down[1], at_x, half), 0.0)
         m = grip
         if np.any(fading):
             m = m * (1.0 - fading * speed)

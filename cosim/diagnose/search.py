@@ -18,7 +18,7 @@ from ..calibrate.simulator import Simulator
 from ..errors import UnbuiltError, UnknownNameError, listing
 from ..system.provider import expected, locate
 from ..system.variants import apply
-from .candidates import Candidate, balances, candidates
+from .candidates import Candidate, candidates
 from .established import needed, settle
 from .fitter import ITERATIONS, Say
 from .grounding import grounded
@@ -31,7 +31,7 @@ from .rounds import Round
 from .secant import Bench, model_values
 from .shafts import geared
 from .shortlist import promising, remaining
-from .signature import Signature, kind, merge, worthy
+from .signature import Signature, merge, worthy
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -43,8 +43,7 @@ OFF = 400.0
 full: by their logarithm, fits end far from their minima, and beside that much, moments at which
 casters turn over are small."""
 SIMPLER = 1
-"""Simpler laws at the best one's place that are fitted as far where much more is missing; and the
-best one's law on all members of its group (swivels of casters), if it acts on one."""
+"""Simpler laws at the best one's place that are fitted as far where much more is missing."""
 UNWANTED, SLIGHT = 2, 0.1
 """So many where unused runs want none, if they gain this share of what the best one gains."""
 RIVAL = 0.5
@@ -280,14 +279,15 @@ class Search(LateValueFitter):
             fitted: the best model so far.
 
         Returns:
-            None if the law that explains most there is in that model, or no law is better.
+            None if a law that explains as much as any there is in that model, or none is better.
         """
         declared = self.memo.get(frozenset())
         assert declared is not None
         start = self.unfitted(declared)
         current = self.scored(start)
-        first = current.signatures[0] if current.signatures else None
-        if first is None or fitted.labels & {first.candidate.label, *first.same}:
+        least = CLOSE * max((item.score.gain for item in current.signatures), default=0.0)
+        close = [item for item in current.signatures if item.score.gain >= least]
+        if any(fitted.labels & {item.candidate.label, *item.same} for item in close):
             return None
         current = self._decided(declared, start, current)
         winner = current.winner
@@ -360,12 +360,11 @@ class Search(LateValueFitter):
         assert winner is not None
         models = [winner]
         if self.raw.unstable:  # quick fits end anywhere, so the better law is not known yet
-            near = [f for f in current.fitted if f.effects[-1] in current.near]
             models += [
-                f for f in near if f.effects[-1].place == winner.effects[-1].place
+                f for f in current.fitted
+                if f.effects[-1] in current.near and f.effects[-1].place == winner.effects[-1].place
                 and f.quantity == winner.quantity and f.complexity < winner.complexity
             ][:SIMPLER]  # fmt: skip
-            models += self.grouped(winner, near)[:SIMPLER]
         begun: dict[int, Fitted] = {}
         for f in reversed(models):
             begun[id(f)] = restarted(self, f, base, list(begun.values()))
@@ -388,20 +387,6 @@ class Search(LateValueFitter):
         if swapped is not kept:
             current.follow(self.snapped(self.released(swapped, base), base))
             current.open = is_open(current.winner.estimate)
-
-    def grouped(self, winner: Fitted, fitted: Sequence[Fitted]) -> list[Fitted]:
-        """Fits of a winner's law on the whole group that its place is a member of.
-
-        What one caster explains by far too much friction, all of them may explain by a little.
-        """
-        single, last = balances(winner.problem), winner.effects[-1]
-        if (last.instance, last.port) not in single:
-            return []
-        return [
-            f for f in fitted
-            if kind(f.effects[-1]) == kind(last)
-            and (f.effects[-1].instance, f.effects[-1].port) not in single
-        ]  # fmt: skip
 
     def recount(self, current: Round) -> Fitted:
         """The base of a round; with a winner that is near, residuals count by logarithm again.
