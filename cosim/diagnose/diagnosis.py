@@ -199,13 +199,14 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
     current = base
     winners: list[Round] = []
     proposed, whole = asked is not None, None
-    anew: Round | None = None
+    anew: Round | None = None  # around nominal values, asked once
+    waiting: Round | None = None
     for number in range(ROUNDS if asked is None else 0):
         say(f"round {number + 1}: {len(search.known)} candidates")
         try:
-            if anew is not None and anew not in search.rounds:
-                stage, winners = anew, []
-                search.rounds.append(anew)
+            if waiting is not None:
+                stage, winners, waiting = waiting, [], None
+                search.rounds.append(stage)
             else:
                 stage = search.round(current)
         except UnbuiltError as error:
@@ -231,6 +232,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
                 current = found
                 continue
             if anew is None and (anew := around_nominal(search, current)) is not None:
+                waiting = anew
                 continue
             break
         say(f"added: {stage.winner.effects[-1].label}")
@@ -254,6 +256,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
         if not any(s.structured for p in PURPOSES for s in tests_of(search, shortened, p)):
             current = without_slow_parts(search, reconsidered(search, shortened, winners))
             if anew is None and (anew := around_nominal(search, current)) is not None:
+                waiting = anew
                 continue
             break
         current = shortened
