@@ -239,10 +239,10 @@ def test_a_model_that_is_far_off_gets_the_next_candidates_if_unused_runs_want_no
 
     current = SimpleNamespace(signatures=signatures, winner=None, open=True)
     search: Any = SimpleNamespace(
-        scored=lambda start, among: current, attempted=attempted, say=lambda text: None,
+        attempted=attempted, say=lambda text: None,
         fitting=SimpleNamespace(largest=float),
     )  # fmt: skip
     monkeypatch.setattr("cosim.diagnose.search.promising", lambda *_: signatures[:2])
-    found = Search._round(search, cast(Any, base), cast(Any, base))
+    found = Search._decided(search, cast(Any, base), cast(Any, base), cast(Any, current))
     assert made == attempts
     assert (found.winner is not None) is any(right in labels for labels in attempts)
