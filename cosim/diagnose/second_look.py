@@ -13,6 +13,7 @@ from .rounds import Round
 from .search import Search
 from .shortlist import PART
 from .table import candidates_of
+from .verdict import TENTH
 from .whiteness import WhitenessTest, whiteness_tests
 
 
@@ -26,8 +27,16 @@ def tests_of(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest
 def around_nominal(search: Search, current: Fitted) -> Round | None:
     """A round around nominal values whose law explains more than a model with more than noise left.
 
-    None where start values that decide when casters turn over hide first orders, and none is found.
+    Not asked where what is left is a tenth (RMS) of what was explained: a model that evidently does
+    nearly what the right one does. Nor where start values that decide when casters turn over hide
+    first orders.
     """
+    declared = search.memo.get(frozenset())
+    assert declared is not None
+    beyond = current.estimate.robust - 0.5 * current.estimate.count
+    explained = declared.estimate.robust - current.estimate.robust
+    if current.effects and beyond <= TENTH**2 * explained:
+        return None
     left = [t for p in PURPOSES for t in tests_of(search, current, p)]
     some = any(t.structured or (t.slow_parts and current.effects) for t in left)
     if not some or search.raw.unstable:
