@@ -79,7 +79,8 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
             s for s in seen
             if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
         ][:EXTRA]  # fmt: skip
-        chosen += groups_of(chosen, seen, single, PART * best)
+        # where casters turn over, first orders of a group say nothing
+        chosen += groups_of(chosen, seen, single, 0.0 if judge.raw.unstable else PART * best)
     return sorted(chosen, key=lambda s: -s.score.gain)
 
 
