@@ -209,7 +209,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
                 search.rounds.append(stage)
             else:
                 stage = search.round(current)
-        except UnbuiltError as error:
+        except CosimError as error:  # what earlier rounds have found is kept
             if not winners:
                 raise
             result.warnings.append(f"no further effect was looked for: {error}")

@@ -303,12 +303,19 @@ class Fitter(Judge):
             self.say(f"no fit from nominal values: {error}")
             return None
 
-    def unfitted(self, base: Fitted) -> Fitted:
-        """A model with its declared parameters at their nominal values."""
+    def unfitted(self, base: Fitted) -> Fitted | None:
+        """A model with its declared parameters at their nominal values.
+
+        None if that cannot be simulated: sizes of effects were fitted beside other values.
+        """
         theta = base.problem.nominal
         for name, value in self.effects(base).items():
             theta[base.problem.index(name)] = value
-        found = self.judged(fit(base.simulator, theta, effort=INTERVALS))
+        try:
+            found = self.judged(fit(base.simulator, theta, effort=INTERVALS))
+        except CosimError as error:
+            self.say(f"nothing around nominal values: {error}")
+            return None
         found.effects, found.signature = base.effects, base.signature
         return found
 

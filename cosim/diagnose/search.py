@@ -253,7 +253,9 @@ class Search(LateValueFitter):
         current = self._round(base, base, among)
         if current.winner is None and self.far(base):
             self.say("parameters stand at their bounds: once more around their nominal values")
-            current = self._round(base, self.unfitted(base), among)
+            nominal = self.unfitted(base)
+            if nominal is not None:
+                current = self._round(base, nominal, among)
         self.rounds.append(current)
         if self.whole and current.winner is not None and among is None:
             self.prepare(current.winner.problem)
@@ -279,11 +281,14 @@ class Search(LateValueFitter):
             fitted: the best model so far.
 
         Returns:
-            None if a law that explains as much as any there is in that model, or none is better.
+            None if a law that explains as much as any there is in that model, none is better, or
+            nothing can be simulated there.
         """
         declared = self.memo.get(frozenset())
         assert declared is not None
         start = self.unfitted(declared)
+        if start is None:
+            return None
         current = self.scored(start)
         least = CLOSE * max((item.score.gain for item in current.signatures), default=0.0)
         close = [item for item in current.signatures if item.score.gain >= least]

@@ -76,14 +76,20 @@ def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> 
 def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
     """Columns that two runs have exchanged: each fits the other's signal ten times better.
 
-    As for two channels, over all samples; no other column of the two runs does.
+    As for two channels, over all samples, but for each of the two runs; no other column of them
+    does. Of many short runs some are alike by chance, and a model that is off is so in most of
+    them: both fit their own signal ten times worse, too, than the other runs do (median).
     """
     every = range(len(problem.channels))
+    own = {run.name: _mean_squares(problem, run, models[run.name]) for run in problem.runs}
     for a, first in enumerate(problem.runs):
         for second in problem.runs[a + 1 :]:
-            straight = [_between(problem, models, first, first, second, i) for i in every]
+            pair = {first.name, second.name}
+            others = [square for name, square in own.items() if name not in pair]
+            usual = np.nanmedian(others, axis=0) if others else np.zeros(len(every))
             crossed = [
-                _between(problem, models, second, first, second, i) < 0.1 * straight[i]
+                _fits(problem, models, first, second, i, usual[i])
+                and _fits(problem, models, second, first, i, usual[i])
                 for i in every
             ]
             if sum(crossed) != 1 or len(crossed) < 2:
@@ -96,17 +102,27 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
             yield Finding("error", "swapped", first.name, channel.name, text)
 
 
-def _between(
-    problem: Problem, models: Mapping[str, Vector], model: MeasuredRun, first: MeasuredRun,
-    second: MeasuredRun, index: int,
-) -> float:  # fmt: skip
-    """Misfit of a column of two runs: that of the first against a model, and the other's."""
-    size = min(len(first.data), len(second.data))
-    total = 0.0
-    for run, other in ((first, model), (second, first if model is second else second)):
-        apart = run.data[:size, index] - models[other.name][:size, index]
-        total += float(np.nansum((apart / problem.channels[index].sigma) ** 2))
-    return total
+def _mean_squares(problem: Problem, run: MeasuredRun, model: Vector) -> Vector:
+    """Of each column's misfit over its noise; NaN of one that was not measured."""
+    size = min(len(run.data), len(model))
+    apart = (run.data[:size] - model[:size]) / problem.sigma
+    counts = np.isfinite(apart).sum(axis=0)
+    return np.where(counts > 0, np.nansum(apart**2, axis=0) / np.maximum(counts, 1), np.nan)
+
+
+def _fits(
+    problem: Problem, models: Mapping[str, Vector], run: MeasuredRun, other: MeasuredRun,
+    index: int, usual: float,
+) -> bool:  # fmt: skip
+    """Whether a run's column fits the other run's signal ten times better than its own.
+
+    And its own ten times worse than usual.
+    """
+    size = min(len(run.data), len(other.data))
+    cut = replace(run, data=run.data[:size])
+    straight = _mean_squares(problem, cut, models[run.name])[index]
+    crossed = _mean_squares(problem, cut, models[other.name])[index]
+    return bool(crossed < 0.1 * straight and straight > 10.0 * usual)
 
 
 def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: int) -> float:

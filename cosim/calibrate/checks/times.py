@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 SHORT = 50
-"""Fewer samples than this are no run."""
+"""Fewer samples than this are no run, unless most runs are as short: windows of a log. All runs
+together need as many."""
 GAP = 5.0
 """Intervals longer than this many usual ones are worth a word."""
 UNEVEN = 0.2
@@ -42,15 +43,18 @@ def interval(times: Vector) -> float:
 
 def check_times(problem: Problem) -> Iterator[Finding]:
     """Faults of the clocks, run by run and between runs; none of these tests is of chance."""
+    sizes = [run.times.size for run in problem.runs]
+    windows = sum(sizes) >= SHORT
+    least = min(SHORT, int(np.median(sizes))) if windows else SHORT
     for run in problem.runs:
-        yield from _run(problem, run)
+        yield from _run(problem, run, least)
     if problem.source.rate is None:  # else each clock has been compared with that
         yield from _units(problem)
 
 
 def _units(problem: Problem) -> Iterator[Finding]:
     """Clocks that count in thousandths of the unit that the other runs or the step are in."""
-    each = {run.name: interval(run.times) for run in problem.runs if run.times.size >= SHORT}
+    each = {run.name: interval(run.times) for run in problem.runs if run.times.size > 1}
     if not each or min(each.values()) <= 0.0:
         return
     least = min(each.values())
@@ -77,10 +81,10 @@ def _thousands(ratio: float) -> bool:
     return power >= 1 and abs(ratio / 1e3**power - 1.0) < EVEN
 
 
-def _run(problem: Problem, run: MeasuredRun) -> Iterator[Finding]:
+def _run(problem: Problem, run: MeasuredRun, least: int) -> Iterator[Finding]:
     steps = np.diff(run.times)
-    if run.times.size < SHORT:
-        text = f"has {run.times.size} samples; a run needs {SHORT} or more"
+    if run.times.size < max(least, 2):
+        text = f"has {run.times.size} samples; a run needs {max(least, 2)} or more"
         yield Finding("error", "short", run.name, "time", text)
         return
     if np.any(steps <= 0.0):
