@@ -81,7 +81,8 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
     them: both fit their own signal ten times worse, too, than the other runs do (median).
     """
     every = range(len(problem.channels))
-    own = {run.name: _mean_squares(problem, run, models[run.name]) for run in problem.runs}
+    sigma = problem.sigma
+    own = {run.name: _mean_squares(run.data, models[run.name], sigma) for run in problem.runs}
     for a, first in enumerate(problem.runs):
         for second in problem.runs[a + 1 :]:
             pair = {first.name, second.name}
@@ -102,10 +103,10 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
             yield Finding("error", "swapped", first.name, channel.name, text)
 
 
-def _mean_squares(problem: Problem, run: MeasuredRun, model: Vector) -> Vector:
+def _mean_squares(data: Vector, model: Vector, sigma: Vector) -> Vector:
     """Of each column's misfit over its noise; NaN of one that was not measured."""
-    size = min(len(run.data), len(model))
-    apart = (run.data[:size] - model[:size]) / problem.sigma
+    size = min(len(data), len(model))
+    apart = (data[:size] - model[:size]) / sigma
     counts = np.isfinite(apart).sum(axis=0)
     return np.where(counts > 0, np.nansum(apart**2, axis=0) / np.maximum(counts, 1), np.nan)
 
@@ -118,10 +119,9 @@ def _fits(
 
     And its own ten times worse than usual.
     """
-    size = min(len(run.data), len(other.data))
-    cut = replace(run, data=run.data[:size])
-    straight = _mean_squares(problem, cut, models[run.name])[index]
-    crossed = _mean_squares(problem, cut, models[other.name])[index]
+    both = run.data[: len(other.data)]
+    straight = _mean_squares(both, models[run.name], problem.sigma)[index]
+    crossed = _mean_squares(both, models[other.name], problem.sigma)[index]
     return bool(crossed < 0.1 * straight and straight > 10.0 * usual)
 
 
