@@ -20,6 +20,8 @@ Source: Boyd, Vandenberghe, Convex Optimization (2004), 11.3.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
@@ -48,14 +50,21 @@ def steady(differences: Vector, times: Vector) -> Vector:
         differences: counts within the interval that ends at each of the times.
         times: of the samples [s].
     """
-    intervals = np.diff(times)
-    usual = np.abs(intervals - np.median(intervals)) < UNEVEN * np.median(intervals)
     found = differences.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], usual, [False]])))
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in stretches(times):
         counted = np.concatenate([[0.0], np.cumsum(differences[first + 1 : last + 1])])
         found[first + 1 : last + 1] = np.diff(smoothest(counted))
     return found
+
+
+def stretches(times: Vector) -> Iterator[tuple[int, int]]:
+    """First and last sample of each stretch of equal intervals."""
+    if times.size < 2:
+        return
+    intervals = np.diff(times)
+    usual = np.abs(intervals - np.median(intervals)) < UNEVEN * np.median(intervals)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], usual, [False]])))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def smoothest(counts: Vector) -> Vector:

@@ -19,6 +19,7 @@ from ..reading.schema import shown
 from ..spec.units import Unit
 from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
+from .between import between
 from .checks.finding import Finding, Source, check_allowed
 from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
@@ -474,8 +475,9 @@ class Joined(MappedLogs):
             values, how = np.append(np.diff(values) / np.diff(times), 0.0), "hold"
             before = 0.0
         elif how == "window":  # mean over the interval that ends
-            values, how = np.append(values[1:], values[-1]), "hold"
-            before = float(values[0])
+            before, how = float(values[0]), "hold"
+            if times.size > 1:
+                times, values = between(times, values, float(self.table["step"]))
         else:
             before = float(values[0])
         if times[0] > 0.0:
