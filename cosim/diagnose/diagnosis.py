@@ -178,7 +178,8 @@ def _searched(
     if why:
         _stopped(result, search, why)
     assert result.after is not None
-    if not search.lacking(result.after):
+    cut = result.ended and result.after is base  # runs were ended since it was fitted: it lacks
+    if not cut and not search.lacking(result.after):
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
     _tested(result)
