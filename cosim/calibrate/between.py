@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ..data.signals import Table
 from .counts import stretches
 
 Vector = NDArray[np.float64]
@@ -26,16 +27,29 @@ FEW = 3
 """Intervals of a stretch; of fewer nothing is told but their means."""
 
 
-def between(times: Vector, means: Vector, step: float) -> tuple[Vector, Vector]:
-    """Times from which on values are held, and these; the means themselves where a step is as long.
+class Parts(Table):
+    """A table in which each sample of a column has become several values.
 
-    Where intervals are not equal (lost samples), means are held.
+    Attributes:
+        parts: how many, usually; their noise is one number.
+    """
+
+    parts: int = 1
+
+
+def between(times: Vector, means: Vector, step: float) -> tuple[Vector, Vector, int]:
+    """Times from which on values are held, these, and how many a sample usually becomes.
+
+    They are the means themselves where a step is as long as an interval; where intervals are not
+    equal (lost samples), means are held.
 
     Args:
         times: of the samples [s].
         means: over the interval that ends at each of them; the first is of no interval.
         step: communication step, into which intervals are divided [s].
     """
+    if times.size < 2:
+        return times, means, 1
     intervals = np.diff(times)
     parts = np.maximum(np.rint(intervals / step).astype(int), 1)
     passed = np.concatenate([[0.0], np.cumsum(means[1:] * intervals)])
@@ -49,6 +63,5 @@ def between(times: Vector, means: Vector, step: float) -> tuple[Vector, Vector]:
         for k in range(first, last):
             ends = np.append(begins[k], times[k + 1])
             values[k] = np.diff(way(ends)) / np.diff(ends)
-    return np.append(np.concatenate(begins), times[-1]), np.append(
-        np.concatenate(values), means[-1]
-    )
+    fine = np.append(np.concatenate(begins), times[-1])
+    return fine, np.append(np.concatenate(values), means[-1]), int(np.median(parts))

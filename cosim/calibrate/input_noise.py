@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.signals import Table
+from .between import Parts
 from .checks.finding import Finding
 from .whitening import LEAST, InputNoise
 
@@ -103,7 +104,9 @@ def _columns(
     """
     problem = simulator.problem
     count = int(np.searchsorted(table.times, run.times[-1], "right"))
-    width = max(1, -(-count // BLOCKS))
+    each = table.parts if isinstance(table, Parts) else 1  # values that share one noise
+    samples = max(1, -(-count // (each * BLOCKS)))
+    width = each * samples
     blocks = np.arange(0, count, width)
     nodes = np.unique(np.linspace(0, blocks.size - 1, NODES).round().astype(int))
     change = LARGE * sigma
@@ -118,7 +121,7 @@ def _columns(
         return {target: other}
 
     base, *rest = simulator.driven(problem.nominal, run, [{}, *(moved(int(k)) for k in nodes)])
-    one = sigma / np.sqrt(width) / change / problem.sigma
+    one = sigma / np.sqrt(samples) / change / problem.sigma
     responses = [np.where(np.isfinite(run.data), (r - base) * one, 0.0) for r in rest]
     begins = np.searchsorted(run.times, table.times[blocks])
     between = _better(responses, begins[nodes])
@@ -135,7 +138,7 @@ def _columns(
     ends = np.append(begins[1:], run.times.size)
     for block, (begin, end) in enumerate(zip(begins, ends, strict=True)):
         last = found[min(end, run.times.size - 1), :, block]
-        bridges[begin:end] += last**2 * (1.0 - 1.0 / width**2) / 6.0
+        bridges[begin:end] += last**2 * (1.0 - 1.0 / samples**2) / 6.0
     return found, bridges
 
 

@@ -19,7 +19,7 @@ from ..reading.schema import shown
 from ..spec.units import Unit
 from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
-from .between import between
+from .between import Parts, between
 from .checks.finding import Finding, Source, check_allowed
 from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
@@ -465,6 +465,7 @@ class Joined(MappedLogs):
             if entry.get("interpolation") == "window":
                 values = steady(values, times)
             values = values * quantum
+        parts = 1
         gain, offset, unit = self.conversion(target, column, entry)
         values = values * gain + offset if offset else values * gain
         times = snapped(times + lead, float(self.table["step"]))
@@ -476,8 +477,7 @@ class Joined(MappedLogs):
             before = 0.0
         elif how == "window":  # mean over the interval that ends
             before, how = float(values[0]), "hold"
-            if times.size > 1:
-                times, values = between(times, values, float(self.table["step"]))
+            times, values, parts = between(times, values, float(self.table["step"]))
         else:
             before = float(values[0])
         if times[0] > 0.0:
@@ -485,10 +485,9 @@ class Joined(MappedLogs):
         if "period" in self.table:  # recorded points may pass the last sample
             times = np.append(times, times[-1] + float(self.table["period"]))
             values = np.append(values, values[-1])
-        return Table(
-            times,
-            values,
-            unit=unit,
-            interpolation=how,  # type: ignore[arg-type]
+        table = Parts(
+            times, values, unit=unit, interpolation=how,  # type: ignore[arg-type]
             text=f"{log.name}:{column}",
-        )
+        )  # fmt: skip
+        table.parts = parts
+        return table

@@ -118,6 +118,20 @@ def test_residuals_and_derivatives_are_made_white_alike(tmp_path: Path) -> None:
     assert np.array_equal(run.white(slope.values), changed.values, equal_nan=True)
 
 
+def test_values_that_one_sample_became_share_its_noise(tmp_path: Path) -> None:
+    """Speeds over intervals, held over them or moving within them: the pose walks as far."""
+    said, spread = f'interpolation = "window", sigma = {SIGMA}', []
+    for step in ("0.02", "0.005"):
+        logged(tmp_path, 3, SIGMA, said)
+        text = (tmp_path / "dataset.toml").read_text()
+        (tmp_path / "dataset.toml").write_text(text.replace("step = 0.02", f"step = {step}"))
+        problem = read_problem(tmp_path)
+        _, notes = propagated(simulator(problem, 1))
+        spread.append([float(note.text.split("up to ")[1].split()[0]) for note in notes])
+    # blocks of samples begin elsewhere; parts counted one by one would give a half
+    assert spread[1] == pytest.approx(spread[0], rel=0.1)
+
+
 def test_one_direction_is_taken_off_by_its_variance() -> None:
     factors = np.zeros((4, 1, 1))
     factors[:2, 0, 0] = 3.0
