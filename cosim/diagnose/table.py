@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,12 +15,14 @@ from .linear import SampleStack
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
+from .verdict import doubts, gate
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
 NEAR, MOST = 0.9, 12
 """Models that are compared with each other: those that explain this share of what the best one
-does, and how many at most. Others differ by more than any run could leave open."""
+does, or are as near to the best that can be named that neither fitted nor unused runs need tell
+them apart; and how many at most. Others differ by more than any run could leave open."""
 FIRST_ORDERS = 3
 """Candidates without a fit that are kept as hints."""
 NORMAL = 1.96
@@ -63,15 +66,20 @@ def table_of(
             )
         )
     rough = _first_orders(models, rounds) if rounds else []
-    return Table(
+    table = Table(
         (*models, *rough),
-        tuple(_compared(judge, fits, models)),
+        (),
         candidates_of(rounds),
         judge.fitting.size,
         judge.checking.size if unused else 0,
         ended=tuple(ended.items()),
         stopped=stopped,
     )
+    compared = [
+        Comparison(i, k, judge.better(fits[i], fits[k]))
+        for i, k in combinations(comparable(table), 2)
+    ]
+    return replace(table, comparisons=tuple(compared))
 
 
 def candidates_of(rounds: Sequence[Round]) -> int:
@@ -123,13 +131,19 @@ def _force(place: Place) -> Force:
     )  # fmt: skip
 
 
-def _compared(judge: Judge, fits: list[Fitted], models: list[Model]) -> list[Comparison]:
-    """Comparisons of models that explain nearly as much as the best one."""
+def comparable(table: Table) -> list[int]:
+    """Places of the models that explain nearly as much as the best one, or as one to be named.
+
+    Args:
+        table: of all models; its comparisons are not needed.
+    """
+    models = [m for m in table.models if not m.rough]
     most = max((m.score for m in models[1:]), default=0.0)
+    named = max((m.score for m in models[1:] if not doubts(table, m)), default=np.inf)
     least = models[0].score + NEAR * (most - models[0].score)
+    least = min(least, named - 2.0 * gate(table.candidates))  # of fitted and of unused runs
     near = [i for i, m in enumerate(models) if i and m.score >= least]
-    near = sorted(near, key=lambda i: -models[i].score)[:MOST]
-    return [Comparison(i, k, judge.better(fits[i], fits[k])) for i, k in combinations(near, 2)]
+    return sorted(near, key=lambda i: -models[i].score)[:MOST]
 
 
 def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:

@@ -12,6 +12,7 @@ import pytest
 
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.facts import Comparison, Force, Gain, Law, Left, Model, Table, Value
+from cosim.diagnose.table import comparable
 from cosim.diagnose.verdict import above, beaten, decide, gate, proposal, unasked
 
 COUNT = 4000
@@ -321,6 +322,21 @@ def test_two_laws_that_the_data_do_not_tell_apart_are_confounded() -> None:
     found = decide(table(FAR, *rivals, alike=((1, 2),)))
     assert found.kind == "confounded" and found.others == (("cogging at motor.shaft",),)
     assert decide(table(FAR, *rivals)).kind == "effect_found"
+
+
+def test_laws_are_compared_with_the_one_to_be_named_where_little_is_to_be_explained() -> None:
+    """A better one that cannot be named, with half of the evidence, hides no rival of it."""
+    found = [
+        replace(model(*laws), fitted=-fitted, unused=-unused)
+        for laws, fitted, unused in (
+            ((), 30.0, 68.0),
+            ((law("delay", half=1.0),), 30.0, 15.0),
+            ((law("coulomb"),), 21.0, 36.5),
+            ((law("bristle", "motor.shaft"),), 20.6, 38.0),
+            ((law("viscous"),), 28.0, 66.0),
+        )
+    ]
+    assert comparable(table(*found)) == [1, 2, 3]
 
 
 def test_a_law_is_no_name_where_one_without_a_known_strength_does_better() -> None:
