@@ -218,6 +218,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
             break
         if number == 0:
             result.power = power(stage, search.fitting)
+            result.warnings += [stage.unasked] if stage.failed else []
             if stage.winner is not None or any(
                 s.structured for p in PURPOSES for s in tests_of(search, base, p)
             ):

@@ -9,6 +9,9 @@ from .models import Fitted
 from .probes import Probe
 from .signature import Signature, unscored
 
+SHOWN = 3
+"""Candidates that are named where some could not be simulated."""
+
 
 @dataclass
 class Round:
@@ -27,6 +30,7 @@ class Round:
             were simulated in.
         quick: what the best quick fit gained on all runs [nats].
         near: candidates whose quick fits gained nearly as much.
+        failed: candidates that could not be simulated at any strength, and why.
         compared: effects of the model in which its winner was last compared with others; empty if
             that was the round's own.
     """
@@ -42,6 +46,18 @@ class Round:
     quick: float = 0.0
     near: frozenset[Candidate] = frozenset()
     compared: frozenset[Candidate] = frozenset()
+    failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def unasked(self) -> str:
+        """Which candidates could not be asked, and why the first of them could not."""
+        names = list(self.failed)
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        why = next(iter(self.failed.values()), "").partition("\n")[0]
+        return (
+            f"not asked, since they cannot be simulated: {', '.join(names[:SHOWN])}{more}; the "
+            f"first: {why}"
+        )
 
     def follow(self, better: Fitted) -> None:
         """Let another fit of the winner take its place."""

@@ -218,7 +218,9 @@ class Search(LateValueFitter):
         ]
         stack = self.telling(base)
         bench = self.bench(base, stack)
-        signatures = bench.followed(bench.begun(chosen, thorough=stack is not self.fitting))
+        begun = bench.begun(chosen, thorough=stack is not self.fitting)
+        failed = {t.probe.candidate.label: t.error for t in begun if t.best is None}
+        signatures = bench.followed(begun)
         self.evaluations += bench.evaluations
         probes = {s.candidate: s.probe for s in signatures}
         aside: tuple[str, ...] = ()
@@ -238,7 +240,10 @@ class Search(LateValueFitter):
         named = {s.candidate.label: float(p) for s, p in zip(signatures, corrected, strict=True)}
         named |= {label: named[s.candidate.label] for s in signatures for label in s.same}
         signatures.sort(key=lambda s: -s.score.gain)
-        return Round(base, signatures, named, aside, probes=probes)
+        current = Round(base, signatures, named, aside, probes=probes, failed=failed)
+        if failed:
+            self.say(current.unasked)
+        return current
 
     def round(self, base: Fitted, among: Collection[str] | None = None) -> Round:
         """Score, refit the best, choose.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
-from ..calibrate.simulator import Simulator
+from ..calibrate.simulator import PATIENCE, Simulator
 from ..errors import CosimError
 from .candidates import Candidate
 from .choices import choices
@@ -38,9 +38,6 @@ FLOOR = 1e-3
 only cost time."""
 RUNAWAY = 1e15
 """Model values over sigma beyond which nothing was simulated; their squares still fit floats."""
-PATIENCE = 10.0
-"""Times as much work as without the effect: a fidelity with more states takes a few times as much,
-and what takes more is an instability that a solver tries to resolve."""
 SECONDS = {"": (0.0,), "turn": (0.0, 0.5 * np.pi), "shift": (0.0, 1.0)}
 """Values of a second parameter between which all others are mixed, by its kind."""
 FARTHEST = 100.0
@@ -174,7 +171,8 @@ class Bench:
                 found = self._measure(
                     trials, value, self.at(trials.probe.problem, values) - self.model
                 )
-            except CosimError:
+            except CosimError as error:
+                trials.error = str(error)
                 continue
             if trials.best is None or found.score.gain > trials.best.score.gain:
                 trials.best = found
@@ -205,7 +203,9 @@ class Bench:
                     - self.model
                     for second in seconds
                 ]
-            except CosimError:
+            except CosimError as error:
+                for t in trials:
+                    t.error = str(error)
                 factor *= 0.1  # too strong for the system to run
                 continue
             for t in trials:
@@ -325,7 +325,8 @@ class Bench:
                 - self.model
                 for second in seconds
             ]
-        except CosimError:
+        except CosimError as error:
+            trials.error = str(error)
             trials.value = value * 0.1  # too strong for the system to run
             return
         found = self._mixed(trials, value, changes)
@@ -407,6 +408,7 @@ class Trials:
         open: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
         known: whether its second parameter is known well enough to begin with.
+        error: of the last one that could not be simulated.
     """
 
     probe: Probe
@@ -421,6 +423,7 @@ class Trials:
     open: bool = True
     rough: bool = False
     known: bool = False
+    error: str = ""
 
     def between(self) -> float | None:
         """Where the residual would ask for the whole strength, if trials lie on both sides of it.
