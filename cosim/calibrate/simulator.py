@@ -35,6 +35,13 @@ PATIENCE, MORE = 10.0, 2.0
 times as much: what takes more is an instability that a solver tries to resolve."""
 
 
+class Patience(dict[str, float]):
+    """Limits on the work of runs, by run, for problems whose FMUs may take more by themselves.
+
+    A limit that is exceeded becomes `PATIENCE` times what these FMUs take at nominal values.
+    """
+
+
 class Simulator:
     """Runs a problem.
 
@@ -59,7 +66,7 @@ class Simulator:
     ) -> None:
         self.problem = problem
         self.workers = workers or cores()
-        self.limits: Mapping[str, float] = dict(limits or {})
+        self.limits: Mapping[str, float] = limits or {}
         self.evaluations = 0
         self.costs: dict[str, float] = {}
         self._pool = pool or SessionPool()
@@ -210,7 +217,7 @@ class Simulator:
         An effect may bring the first state, or the fastest, whose solver divides each step at any
         values; at the nominal ones it does nothing.
         """
-        if math.isinf(limit):
+        if math.isinf(limit) or not isinstance(self.limits, Patience):
             return None
         nominal = self.problem.values(self.problem.nominal, run)
         try:

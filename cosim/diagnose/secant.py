@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.problem import Problem
-from ..calibrate.simulator import PATIENCE, Simulator
+from ..calibrate.simulator import PATIENCE, Patience, Simulator
 from ..errors import CosimError
 from .candidates import Candidate
 from .choices import choices
@@ -469,9 +469,9 @@ def _mismatch(item: Signature) -> float:
     return abs(float(np.log(max(item.score.amplitude, 1e-6))))
 
 
-def patience(base: Simulator) -> dict[str, float]:
+def patience(base: Simulator) -> Patience:
     """Work that the runs may take with an effect, from what they took without."""
-    return {run: PATIENCE * cost for run, cost in base.costs.items()}
+    return Patience({run: PATIENCE * cost for run, cost in base.costs.items()})
 
 
 def model_values(simulator: Simulator, theta: Vector, stack: SampleStack) -> Vector:

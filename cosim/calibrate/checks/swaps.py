@@ -87,7 +87,7 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
         for second in problem.runs[a + 1 :]:
             pair = {first.name, second.name}
             others = [square for name, square in own.items() if name not in pair]
-            usual = np.nanmedian(others, axis=0) if others else np.zeros(len(every))
+            usual = _medians(np.reshape(others, (-1, len(every))))
             crossed = [
                 _fits(problem, models, first, second, i, usual[i])
                 and _fits(problem, models, second, first, i, usual[i])
@@ -109,6 +109,12 @@ def _mean_squares(data: Vector, model: Vector, sigma: Vector) -> Vector:
     apart = (data[:size] - model[:size]) / sigma
     counts = np.isfinite(apart).sum(axis=0)
     return np.where(counts > 0, np.nansum(apart**2, axis=0) / np.maximum(counts, 1), np.nan)
+
+
+def _medians(rows: Vector) -> Vector:
+    """Of each column, without what was not measured; 0 of none."""
+    return np.array([np.median(c[np.isfinite(c)]) if np.any(np.isfinite(c)) else 0.0
+                     for c in rows.T])  # fmt: skip
 
 
 def _fits(
