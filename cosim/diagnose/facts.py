@@ -173,6 +173,8 @@ class Model:
         forces: what free forces would explain of the rest, the best first; None if not asked.
         worst: sum of squares over sigma beyond noise that it leaves in the run in which free forces
             were tried on the declared model.
+        squares: the same in all runs, every window in full; likelihoods count those far off by
+            their logarithm where runs may turn unstable.
         rough: not fitted, a first order from the declared model: it can be a hint alone.
     """
 
@@ -184,6 +186,7 @@ class Model:
     gain: Gain | None = None
     forces: tuple[Force, ...] | None = None
     worst: float = 0.0
+    squares: float = 0.0
     rough: bool = False
 
     @property

@@ -63,6 +63,8 @@ def table_of(
                 judge.better(declared, f) if f.effects else None,
                 tuple(map(_force, forces[f.labels])) if f.labels in forces else None,
                 _excess(judge, f, run),
+                _beyond(judge.fit_data - f.fit)
+                + (_beyond(judge.check_data - f.check) if unused else 0.0),
             )
         )
     rough = _first_orders(models, rounds) if rounds else []
@@ -93,6 +95,11 @@ def _excess(judge: Judge, fitted: Fitted, run: str) -> float:
     values = rows[judge.fitting.names.index(run)]
     values = values[np.isfinite(values)]
     return float(values @ values) - values.size
+
+
+def _beyond(residual: Vector) -> float:
+    """Sum of squares over sigma beyond noise."""
+    return float(residual @ residual) - residual.size
 
 
 def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:

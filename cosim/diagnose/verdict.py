@@ -187,7 +187,8 @@ def stands(table: Table, place: int) -> bool:
     if not declared.forces or _by_force(declared, model) > 0.0 or not carries_over(model):
         return False
     left = _excess(table, model)
-    return left <= TENTH**2 * (_excess(table, declared) - left)
+    # what was explained counts in full, also where runs may turn unstable
+    return left <= TENTH**2 * (max(_excess(table, declared), declared.squares) - left)
 
 
 def beaten(table: Table, place: int) -> int | None:

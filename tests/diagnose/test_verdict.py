@@ -289,6 +289,15 @@ def test_what_is_left_must_be_noise_or_little_that_no_force_explains(
         assert any("more than noise in speed" in text for text in hint.why)
 
 
+def test_what_was_explained_counts_in_full_where_likelihoods_count_by_logarithms() -> None:
+    """Of runs in which casters turn over a wrong moment counts little, and so would all else."""
+    declared = replace(model(rms=40.0, force=0.9), fitted=-3.0 * COUNT, unused=-3.0 * COUNT)
+    one = model(law(), rms=1.25, force=0.2)
+    assert decide(table(declared, one)).kind == "unexplained"
+    squares = 2.0 * COUNT * (40.0**2 - 1.0)
+    assert decide(table(replace(declared, squares=squares), one)).kind == "effect_found"
+
+
 def test_a_law_must_leave_less_than_a_free_force_would() -> None:
     """Where it leaves more than noise: a curve with nine knots is no better than a law."""
     for share, kind in ((0.99, "effect_found"), (0.9999, "unexplained")):
