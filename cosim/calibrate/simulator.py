@@ -30,16 +30,6 @@ from .threads import shared
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-PATIENCE, MORE = 10.0, 2.0
-"""Times as much work as without an effect, or as with it where it does nothing, if that is so many
-times as much: what takes more is an instability that a solver tries to resolve."""
-
-
-class Patience(dict[str, float]):
-    """Limits on the work of runs, by run, for problems whose FMUs may take more by themselves.
-
-    A limit that is exceeded becomes `PATIENCE` times what these FMUs take at nominal values.
-    """
 
 
 class Simulator:
@@ -66,7 +56,7 @@ class Simulator:
     ) -> None:
         self.problem = problem
         self.workers = workers or cores()
-        self.limits: Mapping[str, float] = limits or {}
+        self.limits: Mapping[str, float] = dict(limits or {})
         self.evaluations = 0
         self.costs: dict[str, float] = {}
         self._pool = pool or SessionPool()
@@ -202,34 +192,7 @@ class Simulator:
         return made
 
     def _ran(self, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]) -> Ran:
-        limit = self.limits.get(run.name, math.inf)
-        try:
-            return self._within(limit, values, run, later)
-        except FmuCallError:
-            wider = self._wider(limit, run)
-            if wider is None:
-                raise
-            return self._within(wider, values, run, later)
-
-    def _wider(self, limit: float, run: MeasuredRun) -> float | None:
-        """The limit by the work of these very FMUs, None if that is much as without an effect.
-
-        An effect may bring the first state, or the fastest, whose solver divides each step at any
-        values; at the nominal ones it does nothing.
-        """
-        if math.isinf(limit) or not isinstance(self.limits, Patience):
-            return None
-        nominal = self.problem.values(self.problem.nominal, run)
-        try:
-            usual = self._within(PATIENCE * limit, nominal, run, {}).cost
-        except FmuCallError:
-            return None
-        return PATIENCE * usual if usual > MORE * limit / PATIENCE else None
-
-    def _within(
-        self, limit: float, values: dict[str, float], run: MeasuredRun, later: Mapping[str, float]
-    ) -> Ran:
-        key = self._key(run)
+        key, limit = self._key(run), self.limits.get(run.name, math.inf)
         if later:  # only sessions of this process can be driven by what is late
             key = key._replace(run=(key.run, "late"))
         clocks = {CLOCK + name: value for name, value in later.items()}

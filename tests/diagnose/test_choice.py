@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.calibrate.simulator import PATIENCE, Simulator
 from cosim.diagnose.established import examined
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
+from cosim.diagnose.secant import PATIENCE, SOLVED, Simulator
 from cosim.diagnose.shortlist import REFITS, kin, promising
 from cosim.errors import CosimError
 
@@ -274,8 +274,13 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
 
 @pytest.mark.parametrize(
     "close, limit",
-    [(None, None), (2000, PATIENCE * 2000)],
-    ids=["nothing known", "a multiple"],
+    [
+        (None, None),
+        (2000, PATIENCE * 2000),
+        # no solver in 1000 communication steps of one member: an effect may bring the first one
+        (1000, PATIENCE * (1000 + SOLVED * 1000)),
+    ],
+    ids=["nothing known", "a multiple", "no state"],
 )
 def test_quick_fits_have_a_limit_on_work(
     close: int | None, limit: float | None, monkeypatch: pytest.MonkeyPatch
@@ -283,11 +288,12 @@ def test_quick_fits_have_a_limit_on_work(
     search: Any = Search.__new__(Search)
     search.judged = lambda estimate: estimate
     monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda simulator, *_, **__: simulator.limits)
-    problem = SimpleNamespace()
+    run = SimpleNamespace(times=np.arange(11.0), lead=0.0)
+    problem: Any = SimpleNamespace(instances={"arm": ""}, step=0.01, run=lambda name: run)
     known: Any = None if close is None else SimpleNamespace(
         simulator=SimpleNamespace(problem=problem, costs={"A": close}), known=None
     )  # fmt: skip
-    limits = search.fitted(Simulator(problem), [0.0], known)  # type: ignore[arg-type]
+    limits = search.fitted(Simulator(problem), np.zeros(1), known)
     assert limits == ({} if limit is None else {"A": pytest.approx(limit)})
 
 
