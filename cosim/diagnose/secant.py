@@ -475,9 +475,9 @@ def _mismatch(item: Signature) -> float:
 
 def patience(base: Simulator) -> dict[str, float]:
     """Work that the runs may take with an effect, from what they took without."""
-    members, found = len(base.problem.instances), {}
+    found = {}
     for name, cost in base.costs.items():
-        run = base.problem.run(name)
+        members, run = len(base.problem.instances), base.problem.run(name)
         steps = (float(run.times[-1] - run.times[0]) + run.lead) / base.problem.step
         solved = cost > (members + 0.5) * steps  # a communication step of each member counts as one
         found[name] = PATIENCE * (cost if solved else cost + SOLVED * steps)

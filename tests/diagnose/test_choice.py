@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.established import examined
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.search import Search
-from cosim.diagnose.secant import PATIENCE, SOLVED, Simulator
+from cosim.diagnose.secant import PATIENCE, SOLVED
 from cosim.diagnose.shortlist import REFITS, kin, promising
 from cosim.errors import CosimError
 
@@ -130,7 +131,7 @@ def test_start_values_that_cannot_be_estimated_leave_the_winner(
     def fail(*_: Any) -> None:
         raise CosimError("unstable")
 
-    simulator = SimpleNamespace(costs={}, limited=lambda limits: simulator)
+    simulator: Any = SimpleNamespace(costs={}, limited=lambda limits: simulator)
     monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
     monkeypatch.setattr("cosim.diagnose.late_values.released", fail)
     estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
@@ -156,7 +157,7 @@ def test_start_values_stay_where_a_joint_fit_loses_them(
         estimate = SimpleNamespace(theta=None, robust=cost, count=2)
         return SimpleNamespace(problem=None, simulator=simulator, estimate=estimate)
 
-    simulator = SimpleNamespace(limited=lambda limits: simulator)
+    simulator: Any = SimpleNamespace(limited=lambda limits: simulator)
     monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
     monkeypatch.setattr("cosim.diagnose.late_values.released", lambda *_: (simulator, None, 5.0))
     monkeypatch.setattr("cosim.diagnose.late_values.late_estimated", lambda _: True)
