@@ -28,8 +28,9 @@ Vector = NDArray[np.float64]
 Item = TypeVar("Item")
 PATIENCE, SOLVED = 10.0, 20.0
 """Times as much work as without the effect: a fidelity with more states takes a few times as much,
-and what takes more is an instability that a solver tries to resolve. Where nothing had a state, the
-first one brings a solver: so many steps in each communication step (0.1 ms of 2 ms, 1 ms of 20)."""
+and what takes more is an instability that a solver tries to resolve. A model without states, or
+with slow ones, takes next to nothing: with an effect, a solver makes so many steps per
+communication step (0.1 ms of 2 ms, 1 ms of 20)."""
 VISIBLE = 1.0
 """Least norm of a signature that a second trial aims at: as large as the noise's own projection."""
 WORTH = 0.5
@@ -477,10 +478,9 @@ def patience(base: Simulator) -> dict[str, float]:
     """Work that the runs may take with an effect, from what they took without."""
     found = {}
     for name, cost in base.costs.items():
-        members, run = len(base.problem.instances), base.problem.run(name)
+        run = base.problem.run(name)
         steps = (float(run.times[-1] - run.times[0]) + run.lead) / base.problem.step
-        solved = cost > (members + 0.5) * steps  # a communication step of each member counts as one
-        found[name] = PATIENCE * (cost if solved else cost + SOLVED * steps)
+        found[name] = PATIENCE * max(cost, SOLVED * steps)
     return found
 
 

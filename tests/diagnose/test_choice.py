@@ -277,9 +277,9 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
     "close, limit",
     [
         (None, None),
-        (2000, PATIENCE * 2000),
-        # no solver in 1000 communication steps of one member: an effect may bring the first one
-        (1000, PATIENCE * (1000 + SOLVED * 1000)),
+        (30000, PATIENCE * 30000),
+        # next to no solver in 1000 communication steps: an effect may bring the first one
+        (1000, PATIENCE * SOLVED * 1000),
     ],
     ids=["nothing known", "a multiple", "no state"],
 )
@@ -290,7 +290,7 @@ def test_quick_fits_have_a_limit_on_work(
     search.judged = lambda estimate: estimate
     monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda simulator, *_, **__: simulator.limits)
     run = SimpleNamespace(times=np.arange(11.0), lead=0.0)
-    problem: Any = SimpleNamespace(instances={"arm": ""}, step=0.01, run=lambda name: run)
+    problem: Any = SimpleNamespace(step=0.01, run=lambda name: run)
     known: Any = None if close is None else SimpleNamespace(
         simulator=SimpleNamespace(problem=problem, costs={"A": close}), known=None
     )  # fmt: skip
