@@ -72,6 +72,8 @@ class Balance:
         group: name shared with the like balances of parts that share parameters
             (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
         effort: what the attached effects add (scalar or vector SX; 0 without effects).
+        lean: what effects add to gravity (3), body axes [m/s2]; only of kind `body`. Its wrench on
+            the mass that the balance names, and on what effects add, is part of `effort`.
         mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
             rotational inertia about the reference point (3x3) [kg.m2]; only of kind `body`.
     """
@@ -82,6 +84,7 @@ class Balance:
     signals: dict[str, SX]
     effort: SX
     group: str = ""
+    lean: SX = None
     mass: SX = 0.0
     first_moment: SX = None
     inertia: SX = None

@@ -134,6 +134,13 @@ class EffectModel:
             )
         self._balance.effort = self._balance.effort + effort
 
+    def lean(self, change: SX) -> None:
+        """Add to gravity (3), body axes [m/s2]: it acts on all mass of the body, and is supplied.
+
+        The balance must offer `mass` and `first_moment`.
+        """
+        self._balance.lean = self._balance.lean + change
+
     def add_mass(self, mass: SX, position: SX, inertia: SX) -> None:
         """Add a rigid mass [kg] at a position (3) [m], with its inertia about its centre (3x3)."""
         position = ca.SX(position)

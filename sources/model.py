@@ -294,6 +294,7 @@ class Model:
         balance = Balance(
             full, kind, unit or declared.effort_unit, expressions, effort, self._group(name)
         )
+        balance.lean = ca.SX.zeros(3)
         balance.first_moment = ca.SX.zeros(3)
         balance.inertia = ca.SX.zeros(3, 3)
         root.balances[full] = balance
@@ -306,7 +307,17 @@ class Model:
                 from .effect_model import EffectModel  # it builds on this module
 
                 attachment.law(EffectModel(self, attachment, balance, grouped=place != full))
+        if not balance.lean.is_zero():
+            self._lean(balance)
         return balance
+
+    def _lean(self, balance: Balance) -> None:
+        """Let the change of gravity act on a body and on what effects add to it."""
+        s = balance.signals
+        force = (s["mass"] + balance.mass) * balance.lean
+        moment = ca.cross(s["first_moment"] + balance.first_moment, balance.lean)
+        balance.effort = balance.effort + ca.vertcat(force, moment)
+        self._root.inflows.append(ca.dot(force, s["velocity"]) + ca.dot(moment, s["rate"]))
 
     def _group(self, name: str) -> str:
         return self._full(name)

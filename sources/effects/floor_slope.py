@@ -4,8 +4,10 @@
 
 in world axes, which stay those of the floor. Positive slope rises towards the heading.
 
-Not modelled: the effect's own payloads on the slope, an arm beyond the weight that the base carries
-for it (give the arm its tilt by `base_tilt`).
+An arm on the base feels it in `mount_acceleration`: a mount that is held on a slope and one that
+accelerates are one to it. A payload of the same body feels it, too.
+
+Not modelled: the energy that the arm gains going downhill, in the arm's own account.
 
 Source: statics.
 """
@@ -39,17 +41,13 @@ EFFECT = Effect(
 
 
 def law(e: EffectModel) -> None:
-    """Add the wrench of the leaning gravity."""
-    p, s = e.parameters(SLOPE, HEADING), e.signals("mass", "first_moment", R="rotation")
-    g_0 = -(s.R @ e.signal("gravity"))[2]
+    """Let gravity lean."""
+    p, R = e.parameters(SLOPE, HEADING), e.signal("rotation")
+    g_0 = -(R @ e.signal("gravity"))[2]
     lean = g_0 * ca.vertcat(
         -ca.sin(p.slope) * ca.cos(p.heading),
         -ca.sin(p.slope) * ca.sin(p.heading),
         1 - ca.cos(p.slope),
     )
-    change = s.R.T @ lean
-    force = s.mass * change
-    moment = ca.cross(s.first_moment, change)
-    e.add(ca.vertcat(force, moment))
-    e.supply(ca.dot(force, e.signal("velocity")) + ca.dot(moment, e.signal("rate")))
+    e.lean(R.T @ lean)
     e.loss(0)

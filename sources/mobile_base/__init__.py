@@ -43,7 +43,7 @@ MOUNT_RATE = Quantity("mount_rate", "rad/s", "angular velocity of the mount, bod
 MOUNT_ACCELERATION = Quantity(
     "mount_acceleration",
     "m/s2",
-    "second derivative of the mount's world position, in body axes",
+    "second derivative of the mount's world position, less what a slope adds to gravity, body axes",
     size=3,
 )
 MOUNT_ANGULAR_ACCELERATION = Quantity(

@@ -7,7 +7,7 @@ Base and arm thus move together without iteration, though they are separate comp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -25,7 +25,8 @@ class Mount:
         x, y: position in front of and to the left of O [m].
         height: above the floor [m].
         inertia: Lambda (6x6).
-        bias: p (6).
+        bias: p (6), with what a floor that leans does.
+        lean: what gravity differs from straight down (3).
     """
 
     x: SX
@@ -34,17 +35,14 @@ class Mount:
     inertia: SX
     bias: SX
 
-    @property
-    def weight(self) -> SX:
-        """Weight of the arm, as far as its bias is its weight [N]."""
-        return self.bias[2]
+    lean: SX
 
-    @property
-    def weight_moment(self) -> SX:
-        """Weight times horizontal position of the arm's mass centre from O (3) [N.m]."""
-        return ca.vertcat(
-            self.x * self.bias[2] - self.bias[4], self.y * self.bias[2] + self.bias[3], 0
-        )
+    def leaning(self, lean: SX) -> Mount:
+        """The same where gravity has changed by so much (3), body axes [m/s2].
+
+        To the arm that is an acceleration of the mount the other way.
+        """
+        return replace(self, bias=self.bias - self.inertia[:, :3] @ lean, lean=lean)
 
 
 def read_mount(m: Model) -> Mount:
@@ -52,11 +50,12 @@ def read_mount(m: Model) -> Mount:
     u = m.inputs(qs.ARM_INERTIA, qs.ARM_BIAS)
     p = m.parameters(qs.MOUNT_X, qs.MOUNT_Y, qs.MOUNT_Z)
     inertia = unpack(u.arm_inertia, 6)
-    return Mount(p.mount_x, p.mount_y, p.mount_z, inertia, u.arm_bias)
+    return Mount(p.mount_x, p.mount_y, p.mount_z, inertia, u.arm_bias, ca.SX.zeros(3))
 
 
 def write_motion(
     m: Model,
+    mount: Mount,
     position: SX,
     quaternion: SX,
     velocity: SX,
@@ -69,7 +68,7 @@ def write_motion(
     m.output(qs.MOUNT_QUATERNION, quaternion)
     m.output(qs.MOUNT_VELOCITY, velocity)
     m.output(qs.MOUNT_RATE, rate)
-    m.output(qs.MOUNT_ACCELERATION, acceleration)
+    m.output(qs.MOUNT_ACCELERATION, acceleration - mount.lean)
     m.output(qs.MOUNT_ANGULAR_ACCELERATION, angular)
 
 
@@ -100,6 +99,7 @@ def write_planar_motion(
     v_mx, v_my = v_x - w * mount.y, v_y + w * mount.x
     write_motion(
         m,
+        mount,
         ca.vertcat(x + d_x, y + d_y, mount.height),
         ca.vertcat(ca.cos(phi / 2), 0, 0, ca.sin(phi / 2)),
         ca.vertcat(v_mx, v_my, 0),

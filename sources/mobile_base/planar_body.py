@@ -82,7 +82,7 @@ class PlanarBody:
             bs.DRIVE_INERTIA,
         )
         x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI, bs.VEL_X, bs.VEL_Y, bs.YAW_RATE)
-        self._m, self._mount, self._places, self._carried = m, mount, places, carried
+        self._m, self._places, self._carried = m, places, carried
         self._states = x
         self.pose = (x.pose_x, x.pose_y, x.pose_phi)
         self.twist = (x.vel_x, x.vel_y, x.yaw_rate)
@@ -109,10 +109,10 @@ class PlanarBody:
             rotation=ca.vertcat(
                 ca.horzcat(cos, -sin, 0), ca.horzcat(sin, cos, 0), ca.horzcat(0, 0, 1)
             ),
-            mass=own + carried.mass + mount.weight / bs.GRAVITY,
-            first_moment=ca.vertcat(s_x + carried.x, s_y + carried.y, 0)
-            + mount.weight_moment / bs.GRAVITY,
+            mass=own + carried.mass,
+            first_moment=ca.vertcat(s_x + carried.x, s_y + carried.y, 0),
         )
+        self._mount = mount.leaning(body.lean)
         self._own = own + body.mass
         self._s_x, self._s_y = s_x + body.first_moment[0], s_y + body.first_moment[1]
         self._yaw = yaw + body.inertia[2, 2]

@@ -194,9 +194,10 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
         gravity=-bs.GRAVITY * up,
         position=ca.vertcat(x.pose_x, x.pose_y, x.pose_z),
         rotation=rotation,
-        mass=plain.mass + unsprung + mount.weight / bs.GRAVITY,
-        first_moment=plain.first + mount.weight_moment / bs.GRAVITY,
+        mass=plain.mass + unsprung,
+        first_moment=plain.first,
     )
+    mount = mount.leaning(body.lean)
     payload = _Mass(body.mass, body.first_moment, body.inertia)
     all_mass = plain + payload
 
@@ -277,6 +278,7 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     write_wheels(m, wheels, (*legs.lift, *caster_loads))
     write_motion(
         m,
+        mount,
         ca.vertcat(x.pose_x, x.pose_y, x.pose_z) + rotation @ mu,
         _quaternion(x.pose_phi, x.pitch, x.roll),
         v_m,

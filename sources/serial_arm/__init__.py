@@ -26,7 +26,7 @@ MOUNT_RATE = Quantity("mount_rate", "rad/s", "angular velocity of the mount, mou
 MOUNT_ACCELERATION = Quantity(
     "mount_acceleration",
     "m/s2",
-    "acceleration of the mount (second derivative of its position), mount axes",
+    "second derivative of the mount's position, less what a slope adds to gravity, mount axes",
     size=3,
 )
 MOUNT_ANGULAR_ACCELERATION = Quantity(

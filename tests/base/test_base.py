@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from sources.function import Oracle
 from sources.variant import build_model
@@ -422,6 +423,56 @@ def test_slope_accelerates_a_free_base_by_g_sin_slope_over_its_inertia() -> None
     inertia = 98.0 + 2 * 0.00716 / 0.1**2 + 4 * 0.00092 / 0.0625**2
     # the casters turn over backwards but hardly within 50 mm; creep of 1e-4 of the speed
     assert y["v"][-1] == pytest.approx(-98.0 * G * np.sin(0.01) / inertia, rel=2e-3)
+
+
+@pytest.mark.parametrize("variant", DYNAMIC)
+def test_what_a_base_carries_on_a_slope_feels_it(variant: str) -> None:
+    """A load on the mount, a payload of the body and a heavier body are one."""
+    base, rng = oracle_of(variant + "+floor_slope+payload"), np.random.default_rng(5)
+    slope = {"floor_slope.slope": 0.03, "floor_slope.heading": 0.7}
+    place = np.array([0.1, -0.05, 0.2])
+    mount = [base.model.variables[f"mount_{axis}"].start for axis in "xyz"]
+    at = np.array([*mount[:2], mount[2] - 0.1]) + place  # from O
+    for _ in range(5):
+        state = moving(variant, rng)
+        if variant == PLANAR:  # its loads feel what an arm does as it turns, but not a payload
+            state["yaw_rate"] = 0.0
+        phi, pitch, roll = (state.get(name, 0.0) for name in ("pose_phi", "pitch", "roll"))
+        turn = Rotation.from_euler("ZYX", [phi, pitch, roll]).as_matrix()
+        rate = np.array([state.get(f"{name}_rate", 0.0) for name in ("roll", "pitch", "yaw")])
+        arm = locked_arm(12.0, place, turn[2], rate)
+        carried = base.outputs({**state, **slope, **arm, "payload.mass": 0.0})
+        payload = {f"payload.position[{k + 1}]": x for k, x in enumerate(at)}
+        loaded = base.outputs({**state, **slope, **payload, "payload.mass": 12.0})
+        for k in (1, 2, 3):
+            one = carried[f"mount_acceleration[{k}]"]
+            # six forces of 1e6 N/m against each other; else rounding
+            assert one == pytest.approx(loaded[f"mount_acceleration[{k}]"], rel=1e-9, abs=1e-9)
+
+
+def test_an_arm_at_rest_on_a_slope_hangs_as_on_a_tilted_mount() -> None:
+    """A base that is held on a slope tells the arm of it as an acceleration."""
+    base, heading = oracle_of(PLANAR + "+floor_slope"), 0.7
+    slope = {"floor_slope.slope": 0.02, "floor_slope.heading": heading}
+    mount_x = base.model.variables["mount_x"].start
+    leaning, rates = base.outputs(slope), base.derivatives(slope)
+    # a base at rest glides off before its wheels resist: without what it does itself
+    moves = (rates["vel_x"], rates["vel_y"] + mount_x * rates["yaw_rate"], 0.0)  # mount in front
+    told = {
+        f"mount_acceleration[{k + 1}]": leaning[f"mount_acceleration[{k + 1}]"] - own
+        for k, own in enumerate(moves)
+    }
+    arm = oracle_of("ur5_arm/rigid_moving+base_tilt")
+    q = {f"angle[{k + 1}]": x for k, x in enumerate((0.3, -1.0, 0.8, -0.4, 1.2, 0.1))}
+    level = {"base_tilt.tilt": 0.0}
+    on_slope = arm.derivatives({**q, **level, **told})
+    tilted = arm.derivatives(
+        {**q, "base_tilt.tilt": 0.02, "base_tilt.heading": heading - np.pi / 2}
+    )
+    flat = arm.derivatives({**q, **level})
+    for k in range(1, 7):
+        change = tilted[f"speed[{k}]"] - flat[f"speed[{k}]"]
+        assert on_slope[f"speed[{k}]"] - flat[f"speed[{k}]"] == pytest.approx(change, rel=1e-9)
 
 
 def test_bristles_hold_a_braked_base_across_a_slope() -> None:
