@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.budget import Budget, StoppedError
-from ..calibrate.checks.examine import check_data, examine
+from ..calibrate.checks.examine import examine
 from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.checks.late import check_late
-from ..calibrate.deferred import step_error
 from ..calibrate.input_noise import propagated
 from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, ScenarioError, UnbuiltError
+from ..errors import CosimError, UnbuiltError
 from .adding import made_of
 from .answer import Verdict, percent
 from .bursts import bursts, times
+from .candidates import candidates
 from .carriers import leave_fmus
 from .established import examined
 from .experiment import propose
@@ -30,9 +30,9 @@ from .fitter import BRINGS
 from .foreign import Adapter, attached
 from .foreign_file import leave_system
 from .foreign_words import placed
-from .further import judged
+from .further import Further, looked
 from .grey_box import Site, single, site, unnamed
-from .linear import SampleStack
+from .left_over import left_over
 from .localise import everywhere, localise
 from .models import Fitted, is_open
 from .power import power
@@ -45,7 +45,7 @@ from .table import candidates_of, table_of
 from .together import ahead, together
 from .unstable import ends
 from .verdict import HALF, above, decide, proposal, unasked
-from .whiteness import CALIBRATED, whiteness_tests
+from .whiteness import CALIBRATED
 
 ALL = 0.9
 """Share of the worst run that a free curve at one place must explain for one law there to be asked
@@ -87,15 +87,12 @@ def diagnose(
             can enter there, or the budget ends before the declared parameters are fitted.
         UnknownNameError: there is no such place.
     """
-    begun = time.perf_counter()
     problem, adapters = attached(problem)
     asked = site(problem, placed(law_at, adapters)) if law_at else None
     budget = budget or Budget()
+    task = _Task(asked, adapters, out, say, tuple(without), law, workers, budget)
     try:
-        return _diagnosed(
-            problem, Simulator(problem, workers=workers, pool=SessionPool(budget)), asked, adapters,
-            out, say, without, law, begun,
-        )  # fmt: skip
+        return _diagnosed(problem, task)
     except StoppedError as stopped:
         raise CosimError(
             f"{problem.name}: stopped {stopped}, before the declared parameters were fitted; there "
@@ -103,70 +100,116 @@ def diagnose(
         ) from stopped
 
 
+@dataclass(frozen=True)
+class _Task:
+    """How `diagnose` was called."""
+
+    asked: Site | None
+    adapters: tuple[Adapter, ...]
+    out: Path | None
+    say: Callable[[str], None]
+    without: tuple[str, ...]
+    law: bool
+    workers: int | None
+    budget: Budget
+    begun: float = field(default_factory=time.perf_counter)
+
+
 def _diagnosed(
-    problem: Problem,
-    simulator: Simulator,
-    asked: Site | None,
-    adapters: tuple[Adapter, ...],
-    out: Path | None,
-    say: Callable[[str], None],
-    without: Iterable[str],
-    law: bool,
-    begun: float,
+    problem: Problem, task: _Task, first: Collection[str] = (), base: Fitted | None = None
 ) -> Diagnosis:
+    """The diagnosis on one system, or on one with more parts if what is missing shows there.
+
+    Args:
+        problem: the declared system and its data.
+        task: how it was called.
+        first: labels of candidates that are considered before all others, if any.
+        base: the declared model on the smaller system, to begin with.
+    """
+    simulator = Simulator(problem, workers=task.workers, pool=SessionPool(task.budget))
     findings = examine(simulator)
     if any(f.severity == "error" for f in findings):
-        return _refused(problem, findings, begun)
+        return _refused(problem, findings, task)
+    # threads of BLAS wait in loops, at the cost of simulations
     with threadpool_limits(1, user_api="blas"):
         simulator, counted = propagated(simulator)
-    findings += counted
-    search = Search(simulator, say, None if asked is None else [], without=without)
-    search.prepare()
-    try:
-        # threads of BLAS wait in loops, at the cost of simulations
-        with threadpool_limits(1, user_api="blas"):
-            base = search.calibrated()
-            late = passed(check_late(base.estimate), problem.source.allow)
+        findings += counted
+        search = Search(simulator, task.say, None if task.asked is None else [],
+                        without=task.without)  # fmt: skip
+        if first:
+            search.narrowed(first)
+        search.prepare()
+        try:
+            calibrated = search.calibrated(None if base is None else base.estimate.values)
+            late = passed(check_late(calibrated.estimate), problem.source.allow)
             findings += late
             if any(f.severity == "error" for f in late):
-                return _refused(problem, findings, begun)
-            return _searched(search, base, findings, out, say, begun, asked, adapters, law)
-    finally:
-        search.close()
+                return _refused(problem, findings, task)
+            further, notes = looked(problem, calibrated, simulator.workers)
+            whole, why = (None, "") if task.asked else _shown(further, problem, "before", task.say)
+            named: set[str] = set()
+            if whole is None:
+                result = _searched(search, calibrated, findings, task)
+                result.further, result.warnings = further, result.warnings + notes
+                _look_further(result)
+                if result.answer.laws:
+                    named = {law.label for law in result.answer.laws}
+                    whole, why = _shown(further, problem, "after", task.say)
+            if whole is not None:
+                smaller = {c.label for c in candidates(problem)}
+                own = {c.label for c in candidates(whole)} - smaller
+                # what was named gets its turn beside what the smaller system lacks
+                result = _diagnosed(whole, task, own | named, calibrated)
+                result.warnings.insert(0, why)
+                return result
+            return _written(result, task)
+        finally:
+            search.close()
 
 
-def _refused(problem: Problem, findings: list[Finding], begun: float) -> Diagnosis:
+def _shown(
+    further: Iterable[Further], raw: Problem, which: str, say: Callable[[str], None]
+) -> tuple[Problem | None, str]:
+    """The system in whose own channels what is missing shows, if there is one, and a sentence."""
+    for item in further:
+        if tests := item.unseen(raw, which):
+            smaller, larger = raw.file.path.stem, item.problem.file.path.stem
+            channels = ", ".join(f"{t.channel} ({t.rms:.3g} times its noise)" for t in tests)
+            why = (
+                f"diagnosed with {larger}: what is missing shows in {channels}, more than in any "
+                f"channel of {smaller}"
+            )
+            say(why)
+            return item.problem, why
+    return None, ""
+
+
+def _refused(problem: Problem, findings: list[Finding], task: _Task) -> Diagnosis:
     """The verdict on data that cannot be used."""
     errors = tuple(lines(f for f in findings if f.severity == "error"))
     table = Table(errors=errors)
     result = Diagnosis(problem, decide(table), table, findings=findings)
     result.warnings = lines(f for f in findings if f.severity != "error")
-    result.wall = time.perf_counter() - begun
+    result.wall = time.perf_counter() - task.begun
     return result
 
 
-def _searched(
-    search: Search,
-    base: Fitted,
-    findings: list[Finding],
-    out: Path | None,
-    say: Callable[[str], None],
-    begun: float,
-    asked: Site | None = None,
-    adapters: tuple[Adapter, ...] = (),
-    law: bool = True,
-) -> Diagnosis:
-    problem = search.raw
+def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task) -> Diagnosis:
+    problem, asked = search.raw, task.asked
     result = Diagnosis(problem, Verdict(""), search=search, before=base, findings=findings)
-    result.adapters = adapters
+    result.adapters = task.adapters
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
     result.asked, why = asked is not None, ""
     try:
-        _judged(result, search, _found(result, search, base, asked))
+        current = _found(result, search, base, asked)
+        if not search.whole and not asked and search.lacking(current):
+            search.widened()
+            current = _found(result, search, current, asked)
+        _judged(result, search, current)
         assert result.after is not None
-        if asked or (law and result.verdict == "unexplained"):
+        if asked or (task.law and result.verdict == "unexplained"):
             if asked is None and not search.raw.late:
                 _placed(result)
                 _single(result)
@@ -182,15 +225,21 @@ def _searched(
     if not cut and not search.lacking(result.after):
         sudden = bursts(search.fit_data - result.after.fit, search.fitting)
         result.bursts = times(sudden, list(search.fitting.runs))
-    _tested(result)
+    left_over(result)
+    return result
+
+
+def _written(result: Diagnosis, task: _Task) -> Diagnosis:
+    """The result with its files."""
+    problem, after, out = result.problem, result.after, task.out
+    assert after is not None
     if result.law is not None:
         result.files += result.law.leave_fmu(out)
-    _look_further(result)
     if out is not None and result.answer.laws:
-        result.files += leave_fmus(problem, result.after.effects, out, result.warnings)
-        made = made_of(problem, result.after)
-        result.files += leave_system(problem, adapters, made, out, result.warnings)
-    result.wall = time.perf_counter() - begun
+        result.files += leave_fmus(problem, after.effects, out, result.warnings)
+        made = made_of(problem, after)
+        result.files += leave_system(problem, result.adapters, made, out, result.warnings)
+    result.wall = time.perf_counter() - task.begun
     return result
 
 
@@ -216,7 +265,7 @@ def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) 
             result.warnings.append(f"no further effect was looked for: {error}")
             say(result.warnings[-1])
             break
-        if number == 0:
+        if number == 0 and base is result.before:
             result.power = power(stage, search.fitting)
             result.warnings += [stage.unasked] if stage.failed else []
             if stage.winner is not None or any(
@@ -416,53 +465,20 @@ def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitt
     return search.shortened(current, sizes)
 
 
-def _tested(result: Diagnosis) -> None:
-    """Residuals of both models in all runs, and tests on them."""
-    before, after = result.before, result.after
-    assert before is not None and after is not None
-    for which, fitted in (("before", before), ("after", after)):
-        if which == "after" and after is before:
-            result.residuals |= {
-                ("after", name): v for (kind, name), v in list(result.residuals.items())
-            }
-        else:
-            _residuals(result, which, fitted)
-        for purpose in PURPOSES:
-            runs = [r for r in result.problem.runs if r.purpose == purpose]
-            if runs:
-                stack = SampleStack(result.problem, runs)
-                vector = stack.vector([result.residuals[which, r.name] for r in runs])
-                result.structure[which, purpose] = whiteness_tests(vector, stack)
-
-
-def _residuals(result: Diagnosis, which: str, fitted: Fitted) -> None:
-    """Residuals against the data as measured, the step's error removed at these parameters."""
-    step = result.problem.step
-    whole = {run.name: run for run in result.problem.runs}
-    runs = [replace(whole[run.name], starts=run.starts) for run in fitted.problem.runs]
-    problem = fitted.problem.changed(runs=runs, step=step)
-    simulator = fitted.simulator.limited({}).of(problem)
-    theta = fitted.estimate.theta
-    errors = step_error(simulator, theta, step)
-    for name, residual in simulator.residuals(theta, None):
-        result.residuals[which, name] = residual + whole[name].white(errors[name] / problem.sigma)
-    simulator.close()
-
-
 def _look_further(result: Diagnosis) -> None:
-    """Judge the models on runs that need another system."""
-    assert result.search is not None and result.before is not None and result.after is not None
-    for read in result.problem.further:
+    """Judge the model with what was found on runs of other systems, too."""
+    search, before, after = result.search, result.before, result.after
+    assert search is not None and before is not None and after is not None
+    for item in list(result.further):
+        search.say(f"further runs: {', '.join(run.name for run in item.problem.runs)}")
+        if after is before:
+            item.residuals |= {
+                ("after", n): v for (which, n), v in list(item.residuals.items())
+                if which == "before"
+            }  # fmt: skip
+            continue
         try:
-            problem = read()
-            if not problem.runs:
-                continue
-            result.search.say(f"further runs: {', '.join(run.name for run in problem.runs)}")
-            found = passed(check_data(problem), problem.source.allow)
-            wrong = [f for f in found if f.run and f.severity == "error"]
-            if wrong:
-                raise ScenarioError("; ".join(map(str, wrong)))
-            simulator = Simulator(problem, workers=result.search.simulator.workers)
-            result.further.append(judged(simulator, result.problem, result.before, result.after))
+            item.judge("after", result.problem, after)
         except CosimError as error:  # they are an extra: the verdict stands without them
+            result.further.remove(item)
             result.warnings.append(f"further runs are not judged: {error}")

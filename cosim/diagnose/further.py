@@ -1,8 +1,9 @@
-"""Runs that need another system: the models that were found are judged there, nothing is fitted.
+"""Runs and channels that need another system: the models that were found are judged there.
 
-Runs in which an arm swings, say, on a base that was diagnosed with its arm folded. Parameters and
-effects are carried over by the names of instances and variables; start values of the runs are
-estimated, as for all unused runs.
+Runs in which an arm swings, say, and the currents of its joints, on a base that was diagnosed with
+its arm folded. Parameters and effects are carried over by the names of instances and variables;
+nothing is fitted but start values of the runs, as for all unused runs. What shows most in channels
+that the first system does not have is missing in the other one (`Further.unseen`).
 """
 
 from __future__ import annotations
@@ -12,13 +13,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.checks.examine import check_data
+from ..calibrate.checks.finding import passed
+from ..calibrate.deferred import step_error
 from ..calibrate.nuisance import late_estimated, released, settled
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import VariantError
+from ..errors import CosimError, ScenarioError, VariantError
+from .linear import SampleStack
 from .models import Fitted
+from .whiteness import WhitenessTest, whiteness_tests
 
 Vector = NDArray[np.float64]
+FITTED, BEYOND = "identification", 2.0
+"""Times the worst shared channel's RMS over the noise from which one that only the other system has
+shows something of its own: on a lever, an error of the pose is a little more at an arm's end."""
 
 
 @dataclass
@@ -26,12 +35,58 @@ class Further:
     """Models on runs of another system.
 
     Attributes:
-        problem: that system with its runs.
+        simulator: of that system with its runs.
         residuals: (`before`/`after`, run) -> residuals over sigma.
     """
 
-    problem: Problem
+    simulator: Simulator
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
+
+    @property
+    def problem(self) -> Problem:
+        """That system with its runs."""
+        return self.simulator.problem
+
+    def judge(self, which: str, raw: Problem, fitted: Fitted) -> None:
+        """Keep the residuals of a model.
+
+        Args:
+            which: `before` or `after`.
+            raw: the system that was diagnosed, as declared.
+            fitted: the model.
+
+        Raises:
+            CosimError: an effect does not fit, or the other system cannot be simulated.
+        """
+        problem = carried(self.problem, raw, fitted)
+        model, theta = self.simulator.of(problem), problem.nominal
+        if late_estimated(fitted.problem) and problem.late:
+            model, theta, _ = released(model, theta)
+        else:
+            theta = settled(model, theta, [run.name for run in problem.runs])
+        errors = step_error(model, theta, problem.step)
+        for name, residual in model.residuals(theta, None):
+            exact = problem.run(name).white(errors[name] / problem.sigma)
+            self.residuals[which, name] = residual + exact
+        model.close()
+
+    def unseen(self, raw: Problem, which: str) -> list[WhitenessTest]:
+        """Channels that only this system has, above their noise and farther than all shared ones.
+
+        What is missing shows in them first, so that it is looked for there. Nothing if this system
+        has no runs that a model may be fitted to.
+        """
+        runs = [run for run in self.problem.runs if (which, run.name) in self.residuals]
+        if not any(run.purpose == FITTED for run in runs):
+            return []
+        stack = SampleStack(self.problem, runs)
+        tests = whiteness_tests(
+            stack.vector([self.residuals[which, run.name] for run in runs]), stack
+        )
+        shared = {channel.name for channel in raw.channels}
+        most = max((t.lasting for t in tests if t.channel in shared), default=0.0)
+        own = [t for t in tests if t.channel not in shared and t.structured]
+        return sorted((t for t in own if t.lasting > BEYOND * most), key=lambda t: -t.lasting)
 
     def rms(self, which: str, column: int, run: str | None = None) -> float | None:
         """RMS residual of a channel over sigma, over all runs or in one."""
@@ -57,34 +112,30 @@ class Further:
         }
 
 
-def judged(simulator: Simulator, raw: Problem, before: Fitted, after: Fitted) -> Further:
-    """Residuals of two models in the runs of another system.
+def looked(raw: Problem, base: Fitted, workers: int) -> tuple[list[Further], list[str]]:
+    """The declared model on the runs of other systems, and why some are not judged.
 
     Args:
-        simulator: of that system with its runs.
-        raw: the system that was diagnosed, as declared.
-        before, after: without and with what was found.
-
-    Raises:
-        CosimError: an effect does not fit, or the other system cannot be simulated.
+        raw: the system that is diagnosed, as declared.
+        base: the declared model, calibrated.
+        workers: threads.
     """
-    found = Further(simulator.problem)
-    for which, fitted in (("before", before), ("after", after)):
-        if which == "after" and after is before:
-            found.residuals |= {
-                ("after", name): v for (_, name), v in list(found.residuals.items())
-            }
-            break
-        problem = carried(simulator.problem, raw, fitted)
-        model, theta = simulator.of(problem), problem.nominal
-        if late_estimated(fitted.problem) and problem.late:
-            model, theta, _ = released(model, theta)
-        else:
-            theta = settled(model, theta, [run.name for run in problem.runs])
-        for name, residual in model.residuals(theta, None):
-            found.residuals[which, name] = residual
-        model.close()
-    return found
+    found, warnings = [], []
+    for read in raw.further:
+        try:
+            problem = read()
+            if not problem.runs:
+                continue
+            wrong = [f for f in passed(check_data(problem), problem.source.allow)
+                     if f.run and f.severity == "error"]  # fmt: skip
+            if wrong:
+                raise ScenarioError("; ".join(map(str, wrong)))
+            item = Further(Simulator(problem, workers=workers))
+            item.judge("before", raw, base)
+            found.append(item)
+        except CosimError as error:  # they are an extra: the verdict stands without them
+            warnings.append(f"further runs are not judged: {error}")
+    return found, warnings
 
 
 def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:

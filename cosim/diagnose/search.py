@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +110,14 @@ class Search(LateValueFitter):
         with suppress(UnbuiltError):  # the round that asks for them says so
             self._build(problem, _changes(self.offered(candidates(problem)), problem))
 
+    def narrowed(self, labels: Collection[str]) -> None:
+        """Consider some candidates alone, until `widened`."""
+        self.known, self.whole = [c for c in self.known if c.label in labels], False
+
+    def widened(self) -> None:
+        """Consider all candidates of the catalogue."""
+        self.known, self.whole = self.offered(candidates(self.declared)), True
+
     def offered(self, known: list[Candidate]) -> list[Candidate]:
         """Those that are not left out."""
         return [c for c in known if c.effect not in self.withheld]
@@ -127,13 +136,22 @@ class Search(LateValueFitter):
         """Stop building."""
         self._builder.shutdown(wait=True, cancel_futures=True)
 
-    def calibrated(self) -> Fitted:
-        """Fit the declared system, errors of the communication step removed from then on."""
+    def calibrated(self, start: Mapping[str, float] | None = None) -> Fitted:
+        """Fit the declared system, errors of the communication step removed from then on.
+
+        Args:
+            start: parameters of another system's fit, from which this one's are not far.
+        """
         raw = self.raw
         step = raw.search.step
         exact = raw.ticks and step == raw.step
-        effort = Effort("far", "polished" if exact else "draft", ITERATIONS)
-        first = fit(self.simulator.of(raw.changed(step=step)), effort=effort)
+        end: Literal["draft", "polished"] = "polished" if exact else "draft"
+        effort = Effort("far" if start is None else "near", end, ITERATIONS)
+        theta = raw.nominal
+        for name, value in (start or {}).items():
+            if name in raw.names:
+                theta[raw.index(name)] = value
+        first = fit(self.simulator.of(raw.changed(step=step)), theta, effort=effort)
         if raw.late and typical(r for _, r in first.residuals) > OFF:
             raw = self.count_in_full()
         self.evaluations += first.evaluations

@@ -19,7 +19,7 @@ from cosim.diagnose import Diagnosis
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import _look_further
-from cosim.diagnose.further import carried, judged
+from cosim.diagnose.further import Further, carried, looked
 from cosim.diagnose.story.facts import Facts
 from cosim.errors import ScenarioError, VariantError
 from cosim.installation import places
@@ -77,6 +77,14 @@ def model(problem: Problem, **values: float) -> SimpleNamespace:
     return SimpleNamespace(effects=(), problem=problem, estimate=SimpleNamespace(theta=theta))
 
 
+def judged(problem: Problem, raw: Problem, before: Any, after: Any) -> Further:
+    """Two models on another system."""
+    found = Further(simulator(problem))
+    found.judge("before", raw, before)
+    found.judge("after", raw, after)
+    return found
+
+
 def test_other_runs_are_left_to_the_other_mapping(raw: Problem) -> None:
     (read,) = raw.further
     other = read()
@@ -92,7 +100,7 @@ def test_the_model_that_was_found_is_what_judges(raw: Problem, folder: Path) -> 
     before = model(raw, R_a=0.3)
     after = model(COULOMB.added_to(raw), R_a=0.3, tau_c=0.4)
     after.effects = (COULOMB,)
-    found = judged(simulator(other), raw, before, after)
+    found = judged(other, raw, before, after)
     direct = COULOMB.added_to(read_problem(folder, mapping=folder / "warm.toml"))
     theta = model(direct, R_a=0.3, tau_c=0.4).estimate.theta
     ((_, expected),) = simulator(direct).residuals(theta, None)
@@ -127,7 +135,7 @@ def test_start_values_of_those_runs_are_estimated(raw: Problem) -> None:
     held = other.changed(runs=moved)
     free = held.with_parameters([*other.parameters, own])
     plain = model(raw)
-    first, second = (judged(simulator(p), raw, plain, plain) for p in (held, free))
+    first, second = (judged(p, raw, plain, plain) for p in (held, free))
     column = [c.name for c in other.channels].index("angle")
     assert first.rms("before", column) > 5.0
     assert second.rms("before", column) < 0.01
@@ -146,38 +154,71 @@ def test_an_effect_on_another_instance_is_refused(raw: Problem) -> None:
 
 
 def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
-    said: list[str] = []
-    before = model(raw)
-    search = SimpleNamespace(say=said.append, simulator=simulator(raw))
+    base: Any = model(raw)
 
     def broken() -> Problem:
         raise ScenarioError("warm.toml: there is no entry 'x'")
 
-    def found(problem: Problem) -> Diagnosis:
-        it: Any = search
-        return Diagnosis(
-            problem, Verdict("nothing_missing"), search=it, before=before, after=before
-        )
-
-    result = found(replace_further(raw, broken))
-    _look_further(result)
-    assert result.further == []
-    assert result.warnings == ["further runs are not judged: warm.toml: there is no entry 'x'"]
-    result = found(raw)
-    _look_further(result)
-    assert [run.name for run in result.further[0].problem.runs] == ["MX1"]
-    assert said == ["further runs: MX1"]
-    assert result.warnings == []
+    found, warnings = looked(replace_further(raw, broken), base, 1)
+    assert found == []
+    assert warnings == ["further runs are not judged: warm.toml: there is no entry 'x'"]
 
     def frozen() -> Problem:
         other = raw.further[0]()
         stuck = {run.name: np.where(np.isnan(run.data), np.nan, 0.5) for run in other.runs}
         return other.with_data(stuck)
 
-    result = found(replace_further(raw, frozen))
+    found, warnings = looked(replace_further(raw, frozen), base, 1)
+    assert found == []
+    assert "further runs are not judged: error: run MX1 speed:" in warnings[0]
+
+
+def test_they_are_judged_before_and_after(raw: Problem) -> None:
+    said: list[str] = []
+    before: Any = model(raw)
+    search: Any = SimpleNamespace(say=said.append)
+    found, warnings = looked(raw, before, 1)
+    result = Diagnosis(raw, Verdict("nothing_missing"), search=search, before=before, after=before)
+    result.further = found
+    _look_further(result)
+    assert [run.name for run in result.further[0].problem.runs] == ["MX1"]
+    assert {which for which, _ in result.further[0].residuals} == {"before", "after"}
+    assert said == ["further runs: MX1"]
+    assert warnings == result.warnings == []
+
+    after: Any = model(COULOMB.added_to(raw), tau_c=0.4)
+    after.effects = (replace(COULOMB, instance="gearbox"),)  # it does not fit there
+    result = replace(result, after=after, further=list(found))
     _look_further(result)
     assert result.further == []
-    assert "further runs are not judged: error: run MX1 speed:" in result.warnings[0]
+    assert result.warnings[0].startswith("further runs are not judged: ")
+
+
+def test_only_what_shows_most_in_channels_of_its_own_is_unseen(raw: Problem) -> None:
+    """Channels that both systems have are what the smaller one is judged by."""
+    base: Any = model(raw)
+    (item,), _ = looked(raw, base, 1)
+    smaller = raw.changed(channels=[c for c in raw.channels if c.name != "angle"])
+    column = [c.name for c in raw.channels].index("angle")
+    (key,) = item.residuals
+    noise = np.random.default_rng(4).standard_normal(item.residuals[key].shape)
+    slow = 3.0 * np.sin(np.arange(noise.shape[0]) / 50.0)
+
+    def shown(added: dict[int, float], purpose: str = "identification") -> list[str]:
+        values = noise.copy()
+        for one, size in added.items():
+            values[:, one] += size * slow
+        item.residuals[key] = values
+        run = replace(item.problem.runs[0], purpose=purpose)
+        item.simulator.problem = item.problem.changed(runs=[run])
+        return [t.channel for t in item.unseen(smaller, "before")]
+
+    other = 0 if column else 1
+    assert shown({}) == []
+    assert shown({column: 1.0}) == ["angle"]
+    assert shown({column: 1.0, other: 1.0}) == []  # it may be what moves the other one
+    assert shown({column: 3.0, other: 1.0}) == ["angle"]
+    assert shown({column: 1.0}, "validation") == []  # nothing can be fitted there
 
 
 def replace_further(problem: Problem, read: object) -> Problem:

@@ -16,7 +16,8 @@ from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import Diagnosis
 from cosim.diagnose.answer import Verdict
-from cosim.diagnose.diagnosis import _shortened, _tested
+from cosim.diagnose.diagnosis import _shortened
+from cosim.diagnose.left_over import left_over
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
@@ -110,7 +111,7 @@ def found_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Found]:
     def exact(simulator: Simulator, *_: Any) -> dict[str, float]:
         return {run.name: 0.0 for run in simulator.problem.runs}
 
-    for module in ("fitter", "diagnosis"):
+    for module in ("fitter", "left_over"):
         monkeypatch.setattr(f"cosim.diagnose.{module}.step_error", exact)
 
     def found(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Found:
@@ -136,7 +137,7 @@ def test_further_effects_are_looked_for_before_that(
     middle = float(first.times[first.times.size // 2])
     assert result.ended == ({first.name: pytest.approx(middle, abs=0.02)} if gone else {})
     result.after = found
-    _tested(result)
+    left_over(result)
     # tables have the runs in full
     assert result.residuals["after", first.name].shape == first.data.shape
     assert (">1.00 s</td>" in sections.ended(result.ended)) == gone
