@@ -134,8 +134,9 @@ def _print(result: Diagnosis) -> None:
     for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
-        if others := " or ".join(effect["other_places"]):
-            text = f"    or at {others}: these runs do not tell which"
+        if found := effect["other_places"]:
+            others = " or ".join(o if " at " in o else f"at {o}" for o in found)
+            text = f"    or {others}: these runs do not tell which"
             console.print(text, soft_wrap=True, markup=False, highlight=False)
     for hint in result.answer.hints:
         console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)

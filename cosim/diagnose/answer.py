@@ -102,9 +102,11 @@ class Verdict:
         if self.kind == "effect_found":
             text = (
                 f"{names} {explain} {percent(self.explained)} of what the declared model leaves "
-                "beyond noise. The gain holds on runs that were not used for fitting, and no other "
-                "effect of the catalogue does as well."
-            )
+                "beyond noise. The gain holds on runs that were not used for fitting, and no "
+                + ("effect of the catalogue does better."
+                   if any(map(_law, sum(self.places.values(), ())))
+                   else "other effect of the catalogue does as well.")
+            )  # fmt: skip
             return text + self._elsewhere() + tail + self._ended()
         if self.kind == "confounded":
             others = ", ".join(" and ".join(labels) for labels in self.others)
@@ -135,10 +137,13 @@ class Verdict:
         return text + self._ended()
 
     def _elsewhere(self) -> str:
-        return "".join(
-            f" The data do not tell {label} from the same at {', '.join(places)}."
-            for label, places in self.places.items()
-        )
+        text = ""
+        for label, found in self.places.items():
+            places = [name for name in found if not _law(name)]
+            same = [f"the same at {', '.join(places)}"] if places else []
+            others = ", ".join([*same, *filter(_law, found)])
+            text += f" The data do not tell {label} from {others}."
+        return text
 
     def _ended(self) -> str:
         if not self.ended:
@@ -181,6 +186,11 @@ class Verdict:
             "hints": [hint.to_dict() for hint in self.hints],
             "stopped": self.stopped,
         }
+
+
+def _law(name: str) -> bool:
+    """Whether what does the same is another law, not the same elsewhere."""
+    return " at " in name
 
 
 def parameters(law: Law) -> dict[str, dict[str, Any]]:

@@ -464,7 +464,7 @@ class Fitter(Judge):
         if self.gain(fitted, result) <= GATE or not unused.passed:
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
-        result = without_redundant(self, result, others)
+        result = self.again(without_redundant(self, result, others), fitted, base)
         return result if quick else self.sharpened(result, base, draft=True)
 
     def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:

@@ -255,6 +255,9 @@ def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
                 trial = search.approached(trial, winner, base)
             else:
                 law = False
+            if item.placed and search.total(base, trial) > CLOSE * search.total(base, winner):
+                # elsewhere its mass, say, is another one, and with it what the exchange adds
+                trial = search.sharpened(trial, base, draft=True)
             near = search.total(base, trial) > NEAR * search.total(base, winner)
             if law and near and (late := search.released(trial, base)) is not trial:
                 trial = search.refined(base, late, quick=True, share=0.0)
@@ -300,14 +303,14 @@ def _alike(
     found += [(t, None) for t in kin(search, base, stage) if t.candidate not in fitted]
     found += _simpler(stage)
     # another law that does nearly as well elsewhere has not been fitted as far; one with more
-    # parameters makes up by them for what a limit does
+    # parameters makes up by them for what a limit does, and lacks what is held of its place
     least = CLOSE * search.total(base, winner)
     found += [
         (f.signature, f) for f in stage.fitted
         if f.signature is not None and f.effects[-1].effect != name and f.effects[-1] in near
-        and f.effects[-1].place != winner.effects[-1].place
-        and f.signature.probe.own <= winner.signature.probe.own
-        and search.accepted(base, f) and search.total(base, f) > least
+        and f.effects[-1].place != winner.effects[-1].place and search.accepted(base, f)
+        and (f.signature.placed or (f.signature.probe.own <= winner.signature.probe.own
+                                    and search.total(base, f) > least))
     ][:OTHERS]  # fmt: skip
     unique = {item.candidate: (item, f) for item, f in reversed(found)}
     return sorted(

@@ -73,6 +73,11 @@ class Signature:
         return len(self.fixed) + bool(self.probe.mix)
 
     @property
+    def placed(self) -> bool:
+        """Whether it stands at one of a few values that were tried, along one axis of a place."""
+        return any(p.name in self.fixed for p in self.probe.others if p.hints.tries)
+
+    @property
     def strength(self) -> Parameter:
         """Its strength parameter."""
         return self.probe.strength

@@ -358,7 +358,11 @@ def _named(table: Table, best: int) -> Verdict:
         if not mine or not other or len(rival.laws) > len(model.laws):
             continue  # more than is missed
         if not all(law.there for law in rival.laws):
-            continue  # a smaller set
+            alone = len(mine) == len(other) == 1 and not _one_answer(model, rival)
+            if alone and all(law.there or law is other[0] for law in rival.laws):
+                # it is there, or leaving it out would do as well; its strength does not show
+                places[mine[0].label].append(other[0].label)
+            continue  # else a smaller set
         if len(mine) == len(other) == 1 and mine[0].effect == other[0].effect:
             places[mine[0].label].append(other[0].place)
         elif not _one_answer(model, rival):

@@ -83,7 +83,7 @@ def effects(facts: Facts, symbols: Mapping[str, str]) -> Html:
             tag("h3", label(item["effect"], item["place"])),
             tag("p", *said),
             table(_head("parameter", "value", "95 % interval"), rows, "parameters of the effect"),
-            tag("p", f"The data do not tell it from the same at: {places}.", class_="note")
+            tag("p", f"The data do not tell it from: {places}.", class_="note")
             if places else "",
         ]  # fmt: skip
     return section("effects", "What was found", *parts)

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.arm_question import write
 from cosim.calibrate import read_problem
 from cosim.diagnose.candidates import candidates
+from cosim.diagnose.search import Search
 from sources.effects.payload import POSITION
 from tests.problems import simulator
 
@@ -41,3 +43,22 @@ def test_a_place_shows_on_either_side_only_where_there_is_a_mass() -> None:
     # about linear: the wrong side is refused and the right one explains what a start needs
     alike = np.sum(left * right) / np.sqrt(np.sum(left**2) * np.sum(right**2))
     assert alike < -0.9
+
+
+@pytest.mark.slow
+def test_a_shift_of_the_load_is_compared_with_a_payload_whose_place_is_fitted(
+    tmp_path: Path,
+) -> None:
+    """Tried along one axis alone, its place would tell it from a shift that does the same."""
+    names = ("load_shift at base.load", "payload at base.body")
+    write(tmp_path, {names[1]: 8.0}, 22)
+    problem = read_problem(tmp_path).only(["IN1", "IN2", "CN1", "S1", "CN2"])
+    search = Search(simulator(problem), only=[c for c in candidates(problem) if c.label in names])
+    search.round(search.calibrated())
+    search.close()
+    shift, payload = (search.memo.get(frozenset([name])) for name in names)
+    assert shift is not None and payload is not None
+    assert payload.signature is not None and payload.signature.placed
+    assert not shift.signature.placed
+    assert payload.gate is not None  # judged on unused runs, too, once what is redundant is held
+    assert not search.apart(shift, payload)

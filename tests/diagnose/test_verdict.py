@@ -389,6 +389,20 @@ def test_the_same_law_elsewhere_is_another_place_and_no_rival() -> None:
     assert decide(table(FAR, model(twin))).places == {twin.label: ("bristle at motor.shaft",)}
 
 
+def test_a_law_that_does_the_same_with_a_strength_that_does_not_show_is_said() -> None:
+    """It is there, or leaving it out would do as well; beside another law that says nothing."""
+    vague = law("payload", "base.body", value=0.3, half=0.4)
+    found = decide(table(FAR, model(law(), gain=1.0), model(vague), alike=((1, 2),)))
+    assert found.kind == "effect_found" and found.laws == (law(),)
+    assert found.places == {"coulomb at load.flange": ("payload at base.body",)}
+    assert "no effect of the catalogue does better. The data do not tell coulomb" in found.reason
+    assert found.reason.endswith("coulomb at load.flange from payload at base.body.")
+    clear = law("viscous", "motor.shaft")
+    other = model(law("delay", "motor.shaft"), vague)
+    found = decide(table(FAR, model(law(), clear, gain=1.0), other, alike=((1, 2),)))
+    assert not any(found.places.values())
+
+
 @pytest.mark.parametrize("more", [0.0, 1.0])
 def test_a_law_and_its_special_case_are_one_answer(more: float) -> None:
     """The simpler one is named, though its likelihood is less by a hair."""
