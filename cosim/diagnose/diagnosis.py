@@ -148,23 +148,40 @@ def _diagnosed(
             further, notes = looked(problem, calibrated, simulator.workers)
             whole, why = (None, "") if task.asked else _shown(further, problem, "before", task.say)
             named: set[str] = set()
+            result = None
             if whole is None:
-                result = _searched(search, calibrated, findings, task)
-                result.further, result.warnings = further, result.warnings + notes
-                _look_further(result)
+                result = _smaller(search, calibrated, findings, task, further)
                 if result.answer.laws:
                     named = {law.label for law in result.answer.laws}
                     whole, why = _shown(further, problem, "after", task.say)
             if whole is not None:
-                smaller = {c.label for c in candidates(problem)}
-                own = {c.label for c in candidates(whole)} - smaller
-                # what was named gets its turn beside what the smaller system lacks
-                result = _diagnosed(whole, task, own | named, calibrated)
-                result.warnings.insert(0, why)
-                return result
+                own = {c.label for c in candidates(whole)} - {c.label for c in candidates(problem)}
+                try:  # what was named gets its turn beside what the smaller system lacks
+                    larger = _diagnosed(whole, task, own | named, calibrated)
+                    larger.warnings.insert(0, why)
+                    return larger
+                except (CosimError, StoppedError) as error:  # what the smaller one says stays
+                    notes.append(f"not {why}: {error}")
+            if result is None:
+                result = _smaller(search, calibrated, findings, task, further)
+            result.warnings += notes
             return _written(result, task)
         finally:
             search.close()
+
+
+def _smaller(
+    search: Search,
+    base: Fitted,
+    findings: list[Finding],
+    task: _Task,
+    further: list[Further],
+) -> Diagnosis:
+    """What one system says, judged in larger ones."""
+    result = _searched(search, base, findings, task)
+    result.further = further
+    _look_further(result)
+    return result
 
 
 def _shown(
@@ -173,12 +190,9 @@ def _shown(
     """The system in whose own channels what is missing shows, if there is one, and a sentence."""
     for item in further:
         if tests := item.unseen(raw, which):
-            smaller, larger = raw.file.path.stem, item.problem.file.path.stem
-            channels = ", ".join(f"{t.channel} ({t.rms:.3g} times its noise)" for t in tests)
-            why = (
-                f"diagnosed with {larger}: what is missing shows in {channels}, more than in any "
-                f"channel of {smaller}"
-            )
+            shown = ", ".join(f"{t.channel} ({t.rms:.3g} times its noise)" for t in tests)
+            why = f"diagnosed with {item.problem.file.path.stem}: what is missing shows in {shown}"
+            why += f", more than in any channel of {raw.file.path.stem}"
             say(why)
             return item.problem, why
     return None, ""

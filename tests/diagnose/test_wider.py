@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,9 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose import Diagnosis, diagnose
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.search import Search
+from cosim.errors import CosimError
 from tests.diagnose import disc
 
 pytestmark = pytest.mark.slow
@@ -90,6 +93,24 @@ def test_both_parts_are_asked_where_both_lack_something(tmp_path: Path) -> None:
     assert result.problem.file.path.stem == "both"
     names = {law.label for law in result.answer.laws}
     assert names == {"coulomb at rider.flange", "coulomb at load.flange"}
+
+
+def test_what_the_smaller_system_says_stays_where_the_larger_one_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calibrated = Search.calibrated
+
+    def failing(self: Search, start: Mapping[str, float] | None = None) -> Fitted:
+        if start is not None:
+            raise CosimError("run stopped at t = 1 s")
+        return calibrated(self)
+
+    monkeypatch.setattr(Search, "calibrated", failing)
+    result = found(tmp_path, nothing, friction)
+    assert result.problem.file.path.stem == "system" and result.verdict == "nothing_missing"
+    (said,) = (text for text in result.warnings if text.startswith("not diagnosed with both"))
+    assert "w_2 (" in said and said.endswith(": run stopped at t = 1 s")
+    assert result.further[0].rms("after", 2) > 2.0
 
 
 @pytest.mark.parametrize(("law", "names"), [(nothing, []), (friction, ["coulomb at load.flange"])])
