@@ -218,7 +218,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
     result.asked, why = asked is not None, ""
     try:
         current = _found(result, search, base, asked)
-        if not search.whole and not asked and search.lacking(current):
+        if search.narrow and search.lacking(current):
             search.widened()
             current = _found(result, search, current, asked)
         _judged(result, search, current)

@@ -152,13 +152,16 @@ class Fitter(Judge):
             matrix *= root[:, None]
         return Absorber(matrix, fitted.problem, fitted.estimate.at_bound)
 
-    def refit(self, base: Fitted, item: Signature, *, again: bool = True) -> Fitted | None:
+    def refit(
+        self, base: Fitted, item: Signature, *, again: bool = True, goal: float = 0.0
+    ) -> Fitted | None:
         """Fit the declared parameters and the effect's strength together.
 
         Args:
             base: model without the effect.
             item: the effect.
             again: from nominal values, too, where the base and a quick fit are far off.
+            goal: gain [nats] that unkept derivatives must promise for other starts to be tried.
         """
         problem = item.candidate.added_to(base.problem)
         _, others = new_parameters(base.problem, problem)
@@ -202,7 +205,7 @@ class Fitter(Judge):
                 usual = item.strength.span if bend else 0.0
                 first = self._doubled(simulator, first, min(costs), item.strength.name, usual)
             result = self.fitted(simulator, first, base.estimate)
-            if result.estimate.unkept > GATE:
+            if result.estimate.unkept > max(GATE, goal - self.gain(base, result)):
                 result = self._elsewhere(simulator, rest, result)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)

@@ -38,7 +38,8 @@ from .whiteness import whiteness_tests
 Vector = NDArray[np.float64]
 REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
-second share counts where the model before was far off."""
+second share counts where the model before was far off, and for what derivatives must promise beside
+a law that explains nearly all."""
 OFF = 400.0
 """Mean square over the noise's of a channel's typical windows beyond which all residuals count in
 full: by their logarithm, fits end far from their minima, and beside that much, moments at which
@@ -82,7 +83,7 @@ class Search(LateValueFitter):
     ) -> None:
         super().__init__(simulator, CHECK, say)
         self.declared = problem = simulator.problem
-        self.whole = only is None
+        self.whole, self.narrow = only is None, False
         self.withheld = frozenset(without)
         self.known = candidates(problem) if only is None else only
         names = {c.effect for c in self.known}
@@ -113,10 +114,12 @@ class Search(LateValueFitter):
     def narrowed(self, labels: Collection[str]) -> None:
         """Consider some candidates alone, until `widened`."""
         self.known, self.whole = [c for c in self.known if c.label in labels], False
+        self.narrow = True
 
     def widened(self) -> None:
         """Consider all candidates of the catalogue."""
         self.known, self.whole = self.offered(candidates(self.declared)), True
+        self.narrow = False
 
     def offered(self, known: list[Candidate]) -> list[Candidate]:
         """Those that are not left out."""
@@ -364,7 +367,9 @@ class Search(LateValueFitter):
         for item in items:
             explained = self.explained(base, current.fitted)
             if not explained or item.score.gain >= RIVAL * most:
-                self.tried(start, current, item, again=early and not explained)
+                gains = [self.gain(base, f) for f in current.fitted]
+                goal = LOOSE * max(gains) if explained else 0.0
+                self.tried(start, current, item, again=early and not explained, goal=goal)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)
         current.near = nearly(self, base, current)
@@ -431,9 +436,11 @@ class Search(LateValueFitter):
         current.quick = max(self.total(base, f) for f in current.fitted)
         return base
 
-    def tried(self, start: Fitted, current: Round, item: Signature, *, again: bool) -> None:
-        """Refit a candidate from a model's parameters and note what that gains."""
-        base, fitted = current.base, self.refit(start, item, again=again)
+    def tried(
+        self, start: Fitted, current: Round, item: Signature, *, again: bool, goal: float = 0.0
+    ) -> None:
+        """Refit a candidate from a model's parameters and note what that gains (see `refit`)."""
+        base, fitted = current.base, self.refit(start, item, again=again, goal=goal)
         if fitted is None:
             return
         fitted.p_value = current.corrected[item.candidate.label]

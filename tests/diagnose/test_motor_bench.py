@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,13 +13,14 @@ import pytest
 
 from benchmarks.bench import Bench
 from benchmarks.motor_plant import draw, write_sets
+from cosim.calibrate.budget import Budget
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.parts import Parameter
 from cosim.cli.diagnose import _value
 from cosim.diagnose import Diagnosis
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.candidates import Candidate, candidates
-from cosim.diagnose.diagnosis import _searched
+from cosim.diagnose.diagnosis import _searched, _Task, _written
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
 from cosim.diagnose.story.facts import interval
@@ -93,7 +93,8 @@ def test_the_result_is_complete(sets: dict[str, Path], tmp_path: Path) -> None:
     ]
     search = Search(simulator(problem), only=chosen)
     base = search.calibrated()
-    result = _searched(search, base, [], tmp_path, lambda text: None, time.perf_counter())
+    task = _Task(None, (), tmp_path, lambda text: None, (), law=True, workers=None, budget=Budget())
+    result = _written(_searched(search, base, [], task), task)
     search.close()
     table = result.to_dict()
     assert table["verdict"] == "effect_found"
