@@ -63,7 +63,12 @@ class Further:
         if late_estimated(fitted.problem) and problem.late:
             model, theta, _ = released(model, theta)
         else:
-            theta = settled(model, theta, [run.name for run in problem.runs])
+            known = dict(zip(fitted.problem.names, fitted.estimate.theta.tolist(), strict=True))
+            for i, name in enumerate(problem.names):
+                theta[i] = known.get(name, theta[i])
+            seen = {run.name for run in fitted.problem.runs}
+            others = [run.name for run in problem.runs if run.name not in seen]
+            theta = settled(model, theta, others)
         errors = step_error(model, theta, problem.step)
         for name, residual in model.residuals(theta, None):
             exact = problem.run(name).white(errors[name] / problem.sigma)
