@@ -367,8 +367,9 @@ class Search(LateValueFitter):
         for item in items:
             explained = self.explained(base, current.fitted)
             if not explained or item.score.gain >= RIVAL * most:
-                gains = [self.gain(base, f) for f in current.fitted]
-                goal = LOOSE * max(gains) if explained else 0.0
+                goal = 0.0
+                if explained:
+                    goal = LOOSE * max(self.gain(base, f) for f in current.fitted)
                 self.tried(start, current, item, again=early and not explained, goal=goal)
         current.fitted.sort(key=lambda f: -self.total(base, f))
         current.quick = max((self.total(base, f) for f in current.fitted), default=0.0)

@@ -12,7 +12,7 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.models import GATE, Gate
 from cosim.diagnose.rivals import MOST, _alike, _others, restarted
 from cosim.diagnose.rounds import Round
-from cosim.diagnose.search import CLOSE, Search
+from cosim.diagnose.search import CLOSE, LOOSE, Search
 from cosim.diagnose.shortlist import kin
 from tests.problems import simulator
 
@@ -22,11 +22,14 @@ class Law(NamedTuple):
     place: str
 
 
-def fit(effect: str, place: str, gain: float, own: int = 1, twins: tuple[Any, ...] = ()) -> Any:
+def fit(
+    effect: str, place: str, gain: float, own: int = 1, twins: tuple[Any, ...] = (),
+    *, placed: bool = False,
+) -> Any:  # fmt: skip
     """A fit with what it gains, how many parameters its law has, and what is one with it."""
     law = Law(effect, place)
     signature = SimpleNamespace(
-        candidate=law, probe=SimpleNamespace(own=own), same=(), tuned=0, twins=twins
+        candidate=law, probe=SimpleNamespace(own=own), same=(), tuned=0, twins=twins, placed=placed
     )
     return SimpleNamespace(effects=(law,), signature=signature, complexity=9, gain=gain)
 
@@ -56,12 +59,18 @@ def test_another_law_is_tried_before_the_same_one_at_a_fourth_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "own", "challenges"), [(96.0, 1, True), (90.0, 1, False), (96.0, 2, False)]
-)
+    ("gain", "own", "placed", "challenges"),
+    [
+        (96.0, 1, False, True), (90.0, 1, False, False), (96.0, 2, False, False),
+        # its place was tried along one axis: it has more to give
+        (90.0, 4, True, True), (70.0, 4, True, False),
+    ],
+)  # fmt: skip
 def test_another_law_elsewhere_is_fitted_as_far_if_it_is_close(
-    gain: float, own: int, challenges: bool
+    gain: float, own: int, placed: bool, challenges: bool
 ) -> None:
-    winner, other = fit("gain", "sensor", 100.0), fit("radius_offset", "wheel", gain, own)
+    winner = fit("gain", "sensor", 100.0)
+    other = fit("radius_offset", "wheel", gain, own, placed=placed)
     found = places(_alike(SEARCH, None, stage([winner, other]), set()))  # type: ignore[arg-type]
     assert (other.effects[-1] in found) is challenges
 
@@ -184,24 +193,27 @@ class Seen(Exception):
     """What follows the quick fits is of no interest."""
 
 
-@pytest.mark.parametrize(("unstable", "again"), [(False, True), (True, False)])
-def test_quick_fits_begin_from_nominal_values_too_unless_the_best_one_does_later(
-    unstable: bool, again: bool
+@pytest.mark.parametrize(
+    ("unstable", "explained", "again", "goal"),
+    [(False, False, True, 0.0), (True, False, False, 0.0), (False, True, False, LOOSE * 9.0)],
+)
+def test_quick_fits_begin_elsewhere_too_unless_the_best_one_does_later_or_explains_all(
+    unstable: bool, explained: bool, again: bool, goal: float
 ) -> None:
-    def tried(start: Any, current: Any, item: Any, again: bool) -> None:
-        raise Seen(again)
+    def tried(start: Any, current: Any, item: Any, again: bool, goal: float) -> None:
+        raise Seen(again, goal)
 
     item: Any = SimpleNamespace(
         candidate=SimpleNamespace(change=()), score=SimpleNamespace(gain=9.0)
     )
     search: Any = SimpleNamespace(
-        raw=SimpleNamespace(unstable=unstable), tried=tried, explained=lambda base, fits: False,
-        _build=lambda problem, changes: None,
+        raw=SimpleNamespace(unstable=unstable), tried=tried, explained=lambda base, fits: explained,
+        _build=lambda problem, changes: None, gain=lambda base, f: f.gain,
     )  # fmt: skip
     current = stage([fit("coulomb", "wheel", 9.0)])
     with pytest.raises(Seen) as seen:
         Search.attempted(search, cast(Any, SimpleNamespace(problem=None)), current, [item])
-    assert seen.value.args == (again,)
+    assert seen.value.args == (again, goal)
 
 
 LABELS = [f"law {index}" for index in range(10)]
