@@ -232,6 +232,8 @@ class Joined(MappedLogs):
         sigma = math.sqrt(sigma**2 + rounding)
         if not sigma > 0.0:
             raise ScenarioError(f"{where}: its noise is not known; give sigma")
+        if (by := str(entry.get("by", ""))) and by not in self.system.members:
+            raise UnknownNameError(f"{where}: by: {listing(self.system.members, by)}")
         return Channel(
             name,
             unit,
@@ -242,6 +244,7 @@ class Joined(MappedLogs):
             str(entry.get("transform", "sample")),
             float(entry.get("window", 0.0)),
             float(entry.get("shift", 0.0)),
+            by,
         )
 
     def declared(self) -> list[Parameter]:

@@ -112,6 +112,8 @@ class Channel:
         window: [s].
         shift: the column's value at t is the signal's at t + shift [s], where the exchange delays
             the signal.
+        by: sensor of the system that takes part in it though the signal is not its own; what is
+            wrong with that sensor shows in the channel, and not in the model of it.
     """
 
     name: str
@@ -123,6 +125,7 @@ class Channel:
     transform: str = "sample"
     window: float = 0.0
     shift: float = 0.0
+    by: str = ""
 
     def of(self, sampler: Sampler, values: Vector, late: float = 0.0, drift: float = 0.0) -> Vector:
         """What the channel would read, of a signal that was recorded at the sampler's times.

@@ -80,7 +80,7 @@ CHANNEL: dict[str, Check] = {
     "signal": text, "column": text, "gain": number, "offset": number, "sigma": positive,
     "quantum": at_least_zero, "roundings": positive,
     "transform": one_of("sample", "mean", "difference"), "window": positive, "unit": text,
-    "shift": number, "optional": flag,
+    "shift": number, "optional": flag, "by": text,
 }  # fmt: skip
 INPUT: dict[str, Check] = {
     "column": text, "columns": either("a column or a list of columns", text, texts),

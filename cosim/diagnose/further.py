@@ -78,8 +78,9 @@ class Further:
     def unseen(self, raw: Problem, which: str) -> list[WhitenessTest]:
         """Channels that only this system has, above their noise and farther than all shared ones.
 
-        What is missing shows in them first, so that it is looked for there. Nothing if this system
-        has no runs that a model may be fitted to.
+        What is missing shows in them first, so that it is looked for there; not in what a sensor of
+        both systems takes part in (`Channel.by`). Nothing if this system has no runs that a model
+        may be fitted to.
         """
         runs = [run for run in self.problem.runs if (which, run.name) in self.residuals]
         if not any(run.purpose == FITTED for run in runs):
@@ -90,7 +91,8 @@ class Further:
         )
         shared = {channel.name for channel in raw.channels}
         most = max((t.lasting for t in tests if t.channel in shared), default=0.0)
-        own = [t for t in tests if t.channel not in shared and t.structured]
+        beside = {channel.name for channel in self.problem.channels if channel.by in raw.instances}
+        own = [t for t in tests if t.channel not in shared | beside and t.structured]
         return sorted((t for t in own if t.lasting > BEYOND * most), key=lambda t: -t.lasting)
 
     def rms(self, which: str, column: int, run: str | None = None) -> float | None:

@@ -21,7 +21,7 @@ from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.diagnosis import _look_further
 from cosim.diagnose.further import Further, carried, looked
 from cosim.diagnose.story.facts import Facts
-from cosim.errors import ScenarioError, VariantError
+from cosim.errors import ScenarioError, UnknownNameError, VariantError
 from cosim.installation import places
 from cosim.report import sections
 from tests.problems import simulator
@@ -219,6 +219,20 @@ def test_only_what_shows_most_in_channels_of_its_own_is_unseen(raw: Problem) -> 
     assert shown({column: 1.0, other: 1.0}) == []  # it may be what moves the other one
     assert shown({column: 3.0, other: 1.0}) == ["angle"]
     assert shown({column: 1.0}, "validation") == []  # nothing can be fitted there
+    beside = [replace(c, by="encoder") if c.name == "angle" else c for c in item.problem.channels]
+    item.simulator.problem = item.problem.changed(channels=beside)
+    assert "encoder" in smaller.instances
+    assert shown({column: 3.0}) == []  # what a late encoder does, say
+
+
+def test_a_channel_names_a_sensor_of_the_system(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "by.toml"
+    base, system = ((folder / name).as_posix() for name in ("warm.toml", "warm_bench.toml"))
+    by = '[channels.angle]\nsignal = "encoder.phi_meas"\nby = "encodr"\n'
+    text = f'base = "{base}"\nsystem = "{system}"\n{by}'
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UnknownNameError, match=r"channel angle: by: did you mean 'encoder'\?"):
+        read_problem(folder, mapping=path)
 
 
 def replace_further(problem: Problem, read: object) -> Problem:
