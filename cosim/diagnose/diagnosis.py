@@ -158,8 +158,10 @@ def _diagnosed(
                 own = {c.label for c in candidates(whole)} - {c.label for c in candidates(problem)}
                 try:  # what was named gets its turn beside what the smaller system lacks
                     larger = _diagnosed(whole, task, own | named, calibrated)
-                    larger.warnings.insert(0, why)
-                    return larger
+                    if larger.verdict != "bad_data":
+                        larger.warnings.insert(0, why)
+                        return larger
+                    notes.append(f"not {why}: {larger.reason}")
                 except (CosimError, StoppedError) as error:  # what the smaller one says stays
                     notes.append(f"not {why}: {error}")
             if result is None:

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.calibrate.checks.finding import Finding
 from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import Diagnosis, diagnose
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
@@ -95,21 +97,27 @@ def test_both_parts_are_asked_where_both_lack_something(tmp_path: Path) -> None:
     assert names == {"coulomb at rider.flange", "coulomb at load.flange"}
 
 
+@pytest.mark.parametrize("refused", [False, True])
 def test_what_the_smaller_system_says_stays_where_the_larger_one_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: bool
 ) -> None:
-    calibrated = Search.calibrated
+    calibrated, why = Search.calibrated, "run stopped at t = 1 s"
 
     def failing(self: Search, start: Mapping[str, float] | None = None) -> Fitted:
-        if start is not None:
-            raise CosimError("run stopped at t = 1 s")
+        if start is not None and not refused:
+            raise CosimError(why)
         return calibrated(self)
 
+    def examined(simulator: Simulator) -> list[Finding]:
+        wrong = refused and simulator.problem.file.path.stem == "both"
+        return [Finding("error", "clock", "", "", why)] if wrong else []
+
     monkeypatch.setattr(Search, "calibrated", failing)
+    monkeypatch.setattr("cosim.diagnose.diagnosis.examine", examined)
     result = found(tmp_path, nothing, friction)
     assert result.problem.file.path.stem == "system" and result.verdict == "nothing_missing"
     (said,) = (text for text in result.warnings if text.startswith("not diagnosed with both"))
-    assert "w_2 (" in said and said.endswith(": run stopped at t = 1 s")
+    assert "w_2 (" in said and why in said
     assert result.further[0].rms("after", 2) > 2.0
 
 
