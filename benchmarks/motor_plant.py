@@ -49,6 +49,8 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "torque_ripple": (0.05, ("torque_ripple",)),
 }
 """Name -> size, and the names of the catalogue that are the same law."""
+CONTAINED = {"elastic_gear": "backlash"}
+"""Law -> law that contains it: what yields besides play is the stiffness of the play's contact."""
 USUAL = {"winding_heating": 60.0, "stribeck": 0.5, "command_delay": 1.0, "cogging": 12.0,
          "torque_ripple": 12.0}  # fmt: skip
 """Name -> shape: time constant [s], Stribeck speed [rad/s, output], factor on the delay, cycles per

@@ -175,14 +175,12 @@ def judged(
 
 
 def judged_several(
-    row: dict[str, Any], bench: Bench, sizes: list[float], names: dict[str, Any]
+    row: dict[str, Any], bench: Bench, sizes: list[float], plant: Any
 ) -> dict[str, Any]:
     """The row of a bench with several effects: right if those that show are named, no others."""
-    wanted = [
-        set(names[law.name][1])
-        for law, size in zip(bench.laws, sizes, strict=True)
-        if size >= MATERIAL
-    ]
+    visible = {law.name for law, size in zip(bench.laws, sizes, strict=True) if size >= MATERIAL}
+    within = getattr(plant, "CONTAINED", {})
+    wanted = [set(plant.EFFECTS[name][1]) for name in visible if within.get(name) not in visible]
     named = row["named"]
     right = len(named) == len(wanted) and all(names & set(named) for names in wanted)
     return {
@@ -219,7 +217,7 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
         row |= {"shape": bench.shape, "shown": sizes[0]}
         if bench.effect != "none":
             row["foreign"] = arguments.withheld or not accepted
-        yield row if not bench.others else judged_several(row, bench, sizes, plant.EFFECTS)
+        yield row if not bench.others else judged_several(row, bench, sizes, plant)
 
 
 def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[str, Any]]:

@@ -147,10 +147,14 @@ def freed(search: LateValueFitter, less: Fitted, fitted: Fitted) -> Fitted:
         less: the model as it is.
         fitted: with the further effect.
     """
-    problem = composed(search.raw, fitted, less.effects)
-    whole = composed(search.raw, fitted, ())
-    for effect in less.effects:
-        whole = effect.added_to(whole)
+    try:
+        problem = composed(search.raw, fitted, less.effects)
+        whole = composed(search.raw, fitted, ())
+        for effect in less.effects:
+            whole = effect.added_to(whole)
+    except CosimError as error:  # a law on what the further effect brings (a shaft that yields)
+        search.say(f"{', '.join(sorted(less.labels))} alone: {error}")
+        return less
     held = [p for p in whole.parameters if p.name not in problem.names]
     if not held:
         return less

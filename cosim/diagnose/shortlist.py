@@ -77,7 +77,7 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
         least = best * (SHARED if is_open(current.base.estimate) else 1.0)
         chosen += [
             s for s in seen
-            if s.candidate.label not in known and s.score.z > GATE_Z and s.score.gain > least
+            if s.candidate.label not in known and s.score.gain > least
         ][:EXTRA]  # fmt: skip
         # where casters turn over, first orders of a group say nothing
         chosen += groups_of(chosen, seen, single, 0.0 if judge.raw.unstable else PART * best)
@@ -91,7 +91,7 @@ def remaining(judge: Judge, current: Round, tried: list[Signature]) -> list[Sign
     significance may be the right one.
     """
     known = {s.candidate.label for s in tried}
-    seen = [s for s in able(judge, current) if s.score.z > GATE_Z]
+    seen = able(judge, current)
     best = max((s.score.gain for s in seen), default=0.0)
     few = [s for s in seen if s.score.gain > PART * best]
     return [s for s in few if s.candidate.label not in known][:REFITS]

@@ -185,3 +185,19 @@ def test_a_law_beside_another_gives_way_to_all_parameters_of_that_one(
     assert noted == ([found] if instead else [])
     if instead:
         assert (found.effects, found.signature) == ((payload,), 3)
+
+
+def test_a_law_that_stands_on_another_is_not_asked_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stiffening spring acts on a gear that yields; a rigid one has no spring."""
+
+    def refused(*_: Any) -> None:
+        raise CosimError("effect 'cubic_stiffness@spring' fits no balance")
+
+    monkeypatch.setattr(established, "composed", refused)
+    said: list[str] = []
+    search: Any = SimpleNamespace(raw=None, say=said.append)
+    spring: Any = SimpleNamespace(effects=("cubic_stiffness",), labels={"cubic_stiffness at gear"})
+    assert established.freed(search, spring, spring) is spring
+    assert said == [
+        "cubic_stiffness at gear alone: effect 'cubic_stiffness@spring' fits no balance"
+    ]
