@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +34,11 @@ def check_copies(problem: Problem) -> Iterator[Finding]:
     its rows are the same: such runs are copies for a fit, too.
     """
     seen: dict[bytes, list[tuple[int, int]]] = defaultdict(list)
+    sizes = []
     for number, run in enumerate(problem.runs):
-        for index, key in _rows(run.data):
+        rows = _rows(run.data)
+        sizes.append(len(rows))
+        for index, key in rows:
             seen[key].append((number, index))
     common: dict[tuple[int, int], Counter[int]] = defaultdict(Counter)
     for places in seen.values():
@@ -46,7 +49,7 @@ def check_copies(problem: Problem) -> Iterator[Finding]:
     for (first, second), offsets in sorted(common.items()):
         offset, count = offsets.most_common(1)[0]
         a, b = problem.runs[first], problem.runs[second]
-        shorter = min(len(_rows(a.data)), len(_rows(b.data)))
+        shorter = min(sizes[first], sizes[second])
         if count < SHORT or count < SHARE * shorter:
             continue
         shifted = f", {abs(offset)} samples apart" if offset else ""
@@ -71,10 +74,12 @@ def check_columns(problem: Problem) -> Iterator[Finding]:
     for index, channel in enumerate(problem.channels):
         if noise([run.data[:, index] for run in problem.runs]) is None:
             continue
+        column = _side_by_side([run.data[:, index] for run in problem.runs])
         for a, first in enumerate(problem.runs):
-            for second in problem.runs[a + 1 :]:
+            alike = _same(column[:, a, None], column[:, a + 1 :]) >= SAME
+            for second in (problem.runs[a + 1 + k] for k in np.flatnonzero(alike)):
                 same = _same(first.data, second.data)
-                if same[index] < SAME or np.nanmin(same) >= SAME:
+                if np.nanmin(same) >= SAME:
                     continue  # whole runs: `check_copies`
                 text = (
                     f"is that of run {first.name}: {same[index]:.0%} of its samples are the same, "
@@ -83,8 +88,16 @@ def check_columns(problem: Problem) -> Iterator[Finding]:
                 yield Finding("error", "mixed", second.name, channel.name, text)
 
 
+def _side_by_side(columns: Sequence[Vector]) -> Vector:
+    """Columns of several lengths in one table, NaN behind the end of the shorter ones."""
+    table = np.full((max(map(len, columns)), len(columns)), np.nan)
+    for place, values in zip(table.T, columns, strict=True):
+        place[: len(values)] = values
+    return table
+
+
 def _same(first: Vector, second: Vector) -> Vector:
-    """Share of samples that two runs have in common, by column; 0 where too few are measured."""
+    """Share of samples that two tables have in common, by column; 0 where too few are measured."""
     size = min(len(first), len(second))
     one, two = first[:size], second[:size]
     good = np.isfinite(one) & np.isfinite(two)

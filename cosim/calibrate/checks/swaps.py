@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..simulator import Simulator
 
 Vector = NDArray[np.float64]
+WORSE = 10.0
+"""Times as large as in the other one's place is the mean square misfit of an exchanged column."""
 UNLIKE = 0.01
 """Share of the misfit that columns of different units must keep when exchanged: their numbers are
 alike by chance only."""
@@ -45,7 +47,7 @@ def check_channels(
             crossed = _misfit(problem, models, a, b) + _misfit(problem, models, b, a)
             alike = first.unit == second.unit
             mixed = alike and crossed < straight and _differs(problem, models, a, b)
-            if crossed < (0.1 if alike else UNLIKE) * straight or mixed:
+            if crossed < (1.0 / WORSE if alike else UNLIKE) * straight or mixed:
                 text = (
                     f"each fits the other's signal ({second.signal}, {first.signal}) far better: "
                     "the two columns look swapped"
@@ -74,23 +76,25 @@ def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> 
 
 
 def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
-    """Columns that two runs have exchanged: each fits the other's signal ten times better.
+    """Columns that two runs have exchanged: each fits the other's signal `WORSE` times better.
 
     As for two channels, over all samples, but for each of the two runs; no other column of them
     does. Of many short runs some are alike by chance, and a model that is off is so in most of
-    them: both fit their own signal ten times worse, too, than the other runs do (median).
+    them: both fit their own signal as much worse, too, than the other runs do (median).
     """
     every = range(len(problem.channels))
-    sigma = problem.sigma
-    own = {run.name: _mean_squares(run.data, models[run.name], sigma) for run in problem.runs}
-    for a, first in enumerate(problem.runs):
-        for second in problem.runs[a + 1 :]:
-            pair = {first.name, second.name}
-            others = [square for name, square in own.items() if name not in pair]
-            usual = _medians(np.reshape(others, (-1, len(every))))
+    own = np.array([_mean_squares(r.data, models[r.name], problem.sigma) for r in problem.runs])
+    # no median of all runs but two is less; it is 0 of none
+    least = np.sort(np.nan_to_num(own), axis=0)[(len(own) - 3) // 2] if len(own) > 2 else 0.0
+    suspect = [k for k, square in enumerate(own) if np.any(square > WORSE * least)]
+    for place, a in enumerate(suspect):
+        for b in suspect[place + 1 :]:
+            first, second = problem.runs[a], problem.runs[b]
+            usual = _medians(np.delete(own, (a, b), axis=0))
             crossed = [
-                _fits(problem, models, first, second, i, usual[i])
-                and _fits(problem, models, second, first, i, usual[i])
+                min(own[a, i], own[b, i]) > WORSE * usual[i]
+                and _crossed(problem, models, first, second)[i] < own[a, i] / WORSE
+                and _crossed(problem, models, second, first)[i] < own[b, i] / WORSE
                 for i in every
             ]
             if sum(crossed) != 1 or len(crossed) < 2:
@@ -117,18 +121,11 @@ def _medians(rows: Vector) -> Vector:
                      for c in rows.T])  # fmt: skip
 
 
-def _fits(
-    problem: Problem, models: Mapping[str, Vector], run: MeasuredRun, other: MeasuredRun,
-    index: int, usual: float,
-) -> bool:  # fmt: skip
-    """Whether a run's column fits the other run's signal ten times better than its own.
-
-    And its own ten times worse than usual.
-    """
-    both = run.data[: len(other.data)]
-    straight = _mean_squares(both, models[run.name], problem.sigma)[index]
-    crossed = _mean_squares(both, models[other.name], problem.sigma)[index]
-    return bool(crossed < 0.1 * straight and straight > 10.0 * usual)
+def _crossed(
+    problem: Problem, models: Mapping[str, Vector], run: MeasuredRun, other: MeasuredRun
+) -> Vector:
+    """Of a run's columns the mean square of the misfit to the other run's signals."""
+    return _mean_squares(run.data, models[other.name], problem.sigma)
 
 
 def _misfit(problem: Problem, models: Mapping[str, Vector], data: int, model: int) -> float:
