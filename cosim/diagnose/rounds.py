@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from .candidates import Candidate
@@ -10,7 +11,13 @@ from .probes import Probe
 from .signature import Signature, unscored
 
 SHOWN = 3
-"""Candidates that are named where some could not be simulated."""
+"""Candidates, or runs, that a message names."""
+
+
+def named_few(names: Sequence[str]) -> str:
+    """The first `SHOWN` names, and how many more there are."""
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + more
 
 
 @dataclass
@@ -51,12 +58,10 @@ class Round:
     @property
     def unasked(self) -> str:
         """Which candidates could not be asked, and why the first of them could not."""
-        names = list(self.failed)
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
         why = next(iter(self.failed.values()), "").partition("\n")[0]
         return (
-            f"not asked, since they cannot be simulated: {', '.join(names[:SHOWN])}{more}; the "
-            f"first: {why}"
+            f"not asked, since they cannot be simulated: {named_few(list(self.failed))}; "
+            f"the first: {why}"
         )
 
     def follow(self, better: Fitted) -> None:

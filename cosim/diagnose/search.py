@@ -28,7 +28,7 @@ from .linear import SampleStack, holm
 from .models import GATE, Fitted, compare, is_open, more_general
 from .probes import batches
 from .rivals import challenged, nearly, reconsidered, restarted
-from .rounds import Round
+from .rounds import Round, named_few
 from .secant import Bench, model_values
 from .shafts import geared
 from .shortlist import promising, remaining
@@ -250,8 +250,9 @@ class Search(LateValueFitter):
             kept = worthy(signatures, stated)
             labels = {s.candidate.label for s in kept}
             aside = tuple(s.candidate.label for s in signatures if s.candidate.label not in labels)
-            runs = ", ".join(stack.names)
-            self.say(f"{runs}: {len(kept)} of {len(signatures)} candidates are left")
+            self.say(
+                f"{named_few(stack.names)}: {len(kept)} of {len(signatures)} candidates are left"
+            )
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
             self.evaluations += bench.evaluations

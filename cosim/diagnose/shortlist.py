@@ -25,7 +25,7 @@ this share of what the best one gains, and at most `WHOLES`: members must not cr
 EXTRA = 2
 """Where something is evidently missing, so many that gain more than the best one are refitted
 though not significant: the blocks' variance is then that of what is missing. A gain of `SHARED`
-times the best one's will do where the model is far off."""
+times the best one's will do where the model is far off, beyond `GATE_Z`."""
 
 
 def able(judge: Judge, current: Round) -> list[Signature]:
@@ -78,6 +78,7 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
         chosen += [
             s for s in seen
             if s.candidate.label not in known and s.score.gain > least
+            and (s.score.z > GATE_Z or s.score.gain > best)
         ][:EXTRA]  # fmt: skip
         # where casters turn over, first orders of a group say nothing
         chosen += groups_of(chosen, seen, single, 0.0 if judge.raw.unstable else PART * best)

@@ -236,18 +236,20 @@ def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
 
 
 @pytest.mark.parametrize(
-    "mean_square, lacking, gain, expected",
+    "mean_square, lacking, gain, z, expected",
     [
-        (1e3, True, 4.4e7, ["lag", "delay"]),
-        (1.0, True, 4.4e7, ["lag"]),
-        (1.0, True, 8e7, ["delay", "lag"]),  # more than any significant one
-        (1.0, False, 8e7, ["lag"]),
+        (1e3, True, 4.4e7, 4.0, ["lag", "delay"]),
+        (1.0, True, 4.4e7, 4.0, ["lag"]),
+        (1.0, True, 8e7, 4.0, ["delay", "lag"]),  # more than any significant one
+        (1.0, True, 8e7, 1.7, ["delay", "lag"]),  # a slope that one run of six shows
+        (1.0, False, 8e7, 4.0, ["lag"]),
     ],
 )
 def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_too(
     mean_square: float,
     lacking: bool,
     gain: float,
+    z: float,
     expected: list[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -258,7 +260,7 @@ def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_
             score=SimpleNamespace(gain=gain, z=z), unseen=False, asked=None,
         )
         for label, gain, z in sorted(
-            (("lag", 6.8e7, 10.7), ("delay", gain, 4.0), ("ripple", 4e7, 1.9), ("sag", 3e7, 4.0)),
+            (("lag", 6.8e7, 10.7), ("delay", gain, z), ("ripple", 4e7, 1.9), ("sag", 3e7, 4.0)),
             key=lambda item: -item[1],
         )
     ]  # fmt: skip

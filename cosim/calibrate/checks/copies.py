@@ -77,7 +77,7 @@ def check_columns(problem: Problem) -> Iterator[Finding]:
         column = _side_by_side([run.data[:, index] for run in problem.runs])
         for a, first in enumerate(problem.runs):
             alike = _same(column[:, a, None], column[:, a + 1 :]) >= SAME
-            for second in (problem.runs[a + 1 + k] for k in np.flatnonzero(alike)):
+            for second in (problem.runs[a + 1 + k] for k in np.flatnonzero(alike).tolist()):
                 same = _same(first.data, second.data)
                 if np.nanmin(same) >= SAME:
                     continue  # whole runs: `check_copies`

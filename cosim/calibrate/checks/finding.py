@@ -152,9 +152,10 @@ def lines(findings: Iterable[Finding]) -> list[str]:
         alike.setdefault((finding.severity, finding.kind, finding.column), []).append(finding)
     found = []
     for group in alike.values():
-        if len(group) <= FEW:
+        runs = list(dict.fromkeys(finding.run for finding in group))
+        if len(runs) <= FEW:
             found += [str(finding) for finding in group]
         else:
-            rest = f" (so, too, in {len(group) - 1} other runs: {group[1].run}, …, {group[-1].run})"
+            rest = f" (so, too, in {len(runs) - 1} other runs: {runs[1]}, …, {runs[-1]})"
             found.append(str(replace(group[0], text=group[0].text + rest)))
     return found

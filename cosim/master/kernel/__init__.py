@@ -79,14 +79,18 @@ def library_name(target: str = "") -> str:
     Args:
         target: machine and system, such as x86_64-linux; this machine's if not given.
     """
-    content = b"\0".join(path.read_bytes() for path in SOURCES)
-    digest = hashlib.sha256(content).hexdigest()[:16]
     if not target:
         machine = platform.machine().lower()
         machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
         target = f"{machine}-{platform.system().lower()}"
     suffix = {"windows": ".dll", "darwin": ".dylib"}.get(target.rpartition("-")[2], ".so")
-    return f"kernel-{digest}-{target}{suffix}"
+    return f"kernel-{_digest(SOURCES)}-{target}{suffix}"
+
+
+@lru_cache(maxsize=1)
+def _digest(sources: tuple[Path, ...]) -> str:
+    """Of the sources, read once: a system of short runs asks for the library hundreds of times."""
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
 def cache_folder() -> Path:
