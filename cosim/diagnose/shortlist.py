@@ -92,7 +92,7 @@ def remaining(judge: Judge, current: Round, tried: list[Signature]) -> list[Sign
     significance may be the right one.
     """
     known = {s.candidate.label for s in tried}
-    seen = able(judge, current)
+    seen = [s for s in able(judge, current) if s.score.z > GATE_Z]
     best = max((s.score.gain for s in seen), default=0.0)
     few = [s for s in seen if s.score.gain > PART * best]
     return [s for s in few if s.candidate.label not in known][:REFITS]
