@@ -2,10 +2,11 @@
 
 It shares no code with the components that are to explain its data: one loop over the ticks of the
 current controller, many benches at once as arrays, effects written down here once more. What it
-shares is when within a tick things act, which the sheet does not say: the current at its start
-drives the shaft, whose new speed moves the angle. An angle that leads by half a tick, or a torque
-by the current's mean, is worth 0.05 to 1 of the noise over a run, and parameters are found with a
-bias of several of their tiny standard deviations; that would test the tick and not the laws.
+shares is how the shaft moves between ticks, which the sheet does not say: in four parts, the
+current at the start of each drives the shaft, whose new speed moves the angle. That is a lead of
+12.5 us against a shaft that moves continuously; it is worth a tenth of the noise over a run, and
+parameters would be found with a bias of one or two of their tiny deviations. That would test
+ticks, not laws.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from benchmarks.bench import Bench, Logged, parameters, write_set
 
 Vector = NDArray[np.float64]
 TICK = 5e-5
+PARTS = 4  # of a tick, as the laboratory's logs of this rig are told best
+PART = TICK / PARTS
 COUNT = 2 * np.pi / 65536  # of the encoder [rad]
 K_PLAY, D_TWIST = 2e4, 1.5  # of the spring beside a gap, and of any spring [SI, output]
 RATIO, L_A, J_ROTOR, U_MAX, I_MAX, KP_I, KI_I = 10.167, 4e-4, 1.6e-4, 48.0, 30.0, 0.80, 560.0
@@ -240,20 +243,21 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
         free = np.abs(wanted) < U_MAX
         current_integral = current_integral + np.where(free, KI_I * error * TICK, 0.0)
         u = clip(wanted, -U_MAX, U_MAX)
-        # all rates at the tick's start; the current by the midpoint rule, its winding is fast
-        constant = torque_constant(i, angle)
-        w_rate, out_rate = speed_rates(i, w, angle, w_out, angle_out, constant)
-        middle = i + 0.5 * TICK * current_rate(i, w, constant)
-        i = i + TICK * current_rate(middle, w, torque_constant(middle, angle))
-        w = w + TICK * w_rate
-        angle = angle + TICK * w
-        if has["elastic"]:
-            w_out = w_out + TICK * out_rate
-            angle_out = angle_out + TICK * w_out
-        else:  # one shaft
-            w_out, angle_out = w, angle
-        if has["heating"]:
-            heat = heat + TICK * (resistance * i**2 - heat) / t_th
+        for _ in range(PARTS):
+            # all rates at the part's start; the current by the midpoint rule, its winding is fast
+            constant = torque_constant(i, angle)
+            w_rate, out_rate = speed_rates(i, w, angle, w_out, angle_out, constant)
+            middle = i + 0.5 * PART * current_rate(i, w, constant)
+            i = i + PART * current_rate(middle, w, torque_constant(middle, angle))
+            w = w + PART * w_rate
+            angle = angle + PART * w
+            if has["elastic"]:
+                w_out = w_out + PART * out_rate
+                angle_out = angle_out + PART * w_out
+            else:  # one shaft
+                w_out, angle_out = w, angle
+            if has["heating"]:
+                heat = heat + PART * (resistance * i**2 - heat) / t_th
     return {name: np.array(values) for name, values in rows.items()}
 
 

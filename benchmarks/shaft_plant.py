@@ -78,5 +78,5 @@ def shaft(law: Law, seed: int, level: float = 0.5) -> Problem:
          Parameter("b", "N.m.s/rad", 0.12, 0.05, 0.2, (("load.b", 1.0),))],
         [Channel("w", "rad/s", SIGMA["w"], "load.w"),
          Channel("phi", "rad", SIGMA["phi"], "load.phi")],
-        runs, SAMPLE, Coarse(SAMPLE), ticks=True,
+        runs, SAMPLE, Coarse(SAMPLE), tick=SAMPLE,
     )  # fmt: skip

@@ -181,7 +181,7 @@ def _rms(rows: Vector) -> Vector:
 def calibrated(simulator: Simulator, theta: Vector | None = None) -> tuple[Estimate, StepError]:
     """Estimate the parameters of a problem, free of what its communication step adds.
 
-    Where the rig exchanges in ticks of the step there is nothing to take off.
+    Where the rig has ticks, the step is fine enough for them and there is nothing to take off.
 
     Args:
         simulator: of the problem.
@@ -191,8 +191,8 @@ def calibrated(simulator: Simulator, theta: Vector | None = None) -> tuple[Estim
     # sums over more threads are rounded in another way, and jumps make much of that
     with threadpool_limits(1, user_api="blas"):
         estimate = fit(simulator, theta)
-        if problem.ticks:
-            text = f"the rig exchanges in ticks of {problem.step:g} s"
+        if problem.tick is not None:
+            text = f"{problem.step:g} s is fine enough for the rig's ticks of {problem.tick:g} s"
             return estimate, StepError(problem.step, problem.step, text=text)
         try:
             return _corrected(simulator, estimate)

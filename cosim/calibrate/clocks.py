@@ -70,7 +70,7 @@ class Shift:
         targets = [(CLOCK + name, 1.0) for name in self.channels]
         targets += [(CLOCK + name, -1.0) for name in self.inputs]
         # held commands act at ticks of a rig that has them
-        lattice = problem.search.step if self.inputs and problem.ticks else 0.0
+        lattice = problem.search.step if self.inputs and problem.tick else 0.0
         hints = SearchHints(tries=(*(-d for d in sizes), *sizes), lattice=lattice)
         delay = Parameter(
             prefix + "t_d", "s", 0.0, -reach, reach, tuple(targets), "effect", strength=True,

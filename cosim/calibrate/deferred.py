@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 def step_error(simulator: Simulator, theta: Vector, step: float) -> dict[str, Vector]:
     """What the exchange at communication points adds to the model values, by run.
 
-    Where the rig exchanges in ticks of the problem's step, that is the difference to this step.
+    Where the rig has ticks, the problem's step is exact, and that is the difference to it.
     Otherwise the exchange is of first order: twice the change that halving the step makes
     (Richardson). In the units of the channels.
 
@@ -25,9 +25,10 @@ def step_error(simulator: Simulator, theta: Vector, step: float) -> dict[str, Ve
         step: at which the model values are taken.
     """
     problem = simulator.problem
-    if problem.ticks and step == problem.step:
+    ticks = problem.tick is not None
+    if ticks and step == problem.step:
         return {run.name: np.zeros(run.data.shape) for run in problem.runs}
-    factor, fine = (1.0, problem.step) if problem.ticks else (2.0, step / 2.0)
+    factor, fine = (1.0, problem.step) if ticks else (2.0, step / 2.0)
     # limits on time are those of another step
     coarse, exact = (
         simulator.limited({}).of(problem.changed(step=size)).residuals(theta, None, plain=True)

@@ -27,9 +27,10 @@ from .counts import steady
 from .mapped_logs import MappedLogs
 from .model import Model
 from .named import named, readings
-from .parts import CLOCK, COINCIDENT, Channel, Coarse, MeasuredRun, Parameter, check_parameters
+from .parts import CLOCK, COINCIDENT, Channel, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .scales import known, per_second, scaled
+from .steps import steps
 
 Vector = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ class Joined(MappedLogs):
         self.system = model.plain({})
         self.algorithm = str(table.get("algorithm", "jacobi"))
         self.options = dict(table.get("options", {}))
-        search = self.search()
+        search, tick = steps(table, str(self.path))
         for options in (self.options, {**self.options, **search.options}):
             with within(str(self.path)):  # what the master refuses is said before data are read
                 Master(self.system, self.algorithm, search.step, options=options).compile([], [])
@@ -118,7 +119,7 @@ class Joined(MappedLogs):
             algorithm=self.algorithm,
             options=self.options,
             period=float(table["period"]) if "period" in table else None,
-            ticks=bool(table.get("ticks", False)),
+            tick=tick,
             relative=[tuple(names) for names in self.table.get("relative", [])],
             late=[p for p in stated if p.late],
             source=self._source(present),
@@ -188,19 +189,6 @@ class Joined(MappedLogs):
             return self.system.variables(name)[1][0].unit
         except UnknownNameError as error:
             raise UnknownNameError(f"{where}: {error}") from None
-
-    def search(self) -> Coarse:
-        """How the system is run in a search."""
-        step, table = self.table.get("search_step"), self.table.get("search", {})
-        if table and (step is None or step == self.table["step"] or not self.table.get("ticks")):
-            raise ScenarioError(
-                f"{self.path}: [search] needs a search_step other than step = "
-                f"{self.table['step']} and ticks = true: its error is measured against these ticks"
-            )
-        parameters = {name: float(v) for name, v in flatten(table.get("parameters", {})).items()}
-        if step is None:
-            return Coarse(float(self.table["step"]))
-        return Coarse(float(step), table.get("options", {}), parameters)
 
     def _column(self, channel: Channel) -> str:
         return self.columns[channel.name]

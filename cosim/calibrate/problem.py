@@ -52,7 +52,8 @@ class Problem:
         constants: full variable name -> value for all runs.
         algorithm, options: of the master; a search may have further options.
         period: time between recorded points [s]; the sample interval if not given.
-        ticks: the rig itself exchanges once per `step`, so no finer exchange is more exact.
+        tick: period of the rig's own fastest loop [s], which `step` divides: no finer exchange than
+            `step` is more exact. Unknown if None, and what `step` adds is measured.
         relative: channels x, y, yaw of planar poses in the frame of the run's anchor.
         late: parameters of single runs that are held until `nuisance.released` estimates them.
         far: whether all residuals count in full, since nearly all are large (see `unstable`).
@@ -74,7 +75,7 @@ class Problem:
     algorithm: str = "jacobi"
     options: Mapping[str, Any] = field(default_factory=dict)
     period: float | None = None
-    ticks: bool = False
+    tick: float | None = None
     relative: Sequence[Sequence[str]] = ()
     late: Sequence[Parameter] = ()
     far: bool = False

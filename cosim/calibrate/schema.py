@@ -144,7 +144,7 @@ def _table_of(keys: Mapping[str, Check]) -> Check:
 MAPPING: dict[str, Check] = {
     "description": text, "origin": text, "rig": text, "system": text, "base": text,
     "further": texts, "diagnosed": flag,
-    "step": positive, "algorithm": text, "options": table, "period": positive, "ticks": flag,
+    "step": positive, "algorithm": text, "options": table, "period": positive, "tick": positive,
     "search_step": positive, "search": _table_of(SEARCH), "lead": at_least_zero,
     "time": text, "resample": positive, "gap": positive, "only": table,
     "relative": list_of(list_of(text, 3)), "variants": table_of(text), "without": texts,

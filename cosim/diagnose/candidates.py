@@ -150,7 +150,7 @@ def delays(problem: Problem) -> list[Candidate]:
     groups = {
         f"{name}.outputs": Shift(channels=tuple(few)) for name, few in gives.items() if few[1:]
     } | {f"{name}.inputs": Shift(inputs=tuple(few)) for name, few in takes.items() if few[1:]}
-    if len(gives) == len(takes) == 1 and not declared and not problem.ticks:
+    if len(gives) == len(takes) == 1 and not declared and problem.tick is None:
         (giver,), (taker,) = gives, takes
         if {f"{giver}.outputs", f"{taker}.inputs"} <= groups.keys():
             groups[f"{taker}.inputs"] = groups[f"{giver}.outputs"]

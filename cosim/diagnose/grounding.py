@@ -17,7 +17,7 @@ from .models import Fitted
 if TYPE_CHECKING:
     from .fitter import Fitter
 
-EVIDENT = 5.0
+EVIDENT = 3.0
 """Deviations by which the cost exceeds that of noise: half a sum of n squares varies by
 sqrt(n / 2)."""
 STEPS = Effort("near", "draft", iterations=4)
@@ -33,7 +33,7 @@ def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
         base: from which gains count.
     """
     raw = fitter.raw
-    coarse = raw.ticks and raw.search.step != raw.step
+    coarse = raw.tick is not None and raw.search.step != raw.step
     noise = 0.5 * winner.estimate.count
     if not coarse or raw.unstable or winner.estimate.cost < noise + EVIDENT * noise**0.5:
         return winner

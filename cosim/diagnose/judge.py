@@ -238,8 +238,8 @@ def tick_of(raw: Problem, effect: str, unit: str) -> float:
         raw: the problem.
         effect, unit: of the law's strength.
     """
-    if not raw.ticks:
+    if raw.tick is None:
         return 0.0
     if effect == SKEW:
-        return raw.step / max(float(run.times[-1] - run.times[0]) for run in raw.runs)
-    return raw.step if unit == "s" else 0.0
+        return raw.tick / max(float(run.times[-1] - run.times[0]) for run in raw.runs)
+    return raw.tick if unit == "s" else 0.0

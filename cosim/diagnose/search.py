@@ -147,7 +147,7 @@ class Search(LateValueFitter):
         """
         raw = self.raw
         step = raw.search.step
-        exact = raw.ticks and step == raw.step
+        exact = raw.tick is not None and step == raw.step
         end: Literal["draft", "polished"] = "polished" if exact else "draft"
         effort = Effort("far" if start is None else "near", end, ITERATIONS)
         theta = raw.nominal

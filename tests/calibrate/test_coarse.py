@@ -41,11 +41,14 @@ def test_unknown_names_in_search_parameters_are_refused(short: Problem) -> None:
     ("lines", "text"),
     [
         (
-            "ticks = true\nsearch_step = 2e-3\n[search.option]\nextrapolation = 1",
+            "tick = 1e-3\nsearch_step = 2e-3\n[search.option]\nextrapolation = 1",
             "has no key 'option'",
         ),
-        ("search_step = 2e-3\n[search.options]\nextrapolation = 1", "ticks = true"),
-        ("ticks = true\n[search.options]\nextrapolation = 1", "search_step other than step"),
+        ("search_step = 2e-3\n[search.options]\nextrapolation = 1", "the rig's tick"),
+        ("tick = 1e-3\n[search.options]\nextrapolation = 1", "search_step other than step"),
+        ("tick = 1.5e-3", "tick = 0.0015 s is no whole number of steps of 0.001 s"),
+        ("tick = 5e-4", "tick = 0.0005 s is no whole number of steps of 0.001 s"),
+        ("ticks = true", "has no key 'ticks'"),
     ],
 )
 def test_faults_of_a_search_are_named(tmp_path: Path, lines: str, text: str) -> None:

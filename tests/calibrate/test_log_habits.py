@@ -326,7 +326,7 @@ def test_two_files_of_a_run_are_joined_on_their_own_clocks(tmp_path: Path) -> No
         ({"CHANNEL": ', transform = "means"'}, "transform 'means' is not known; did you mean"),
         ({"INPUT": '{ column = "tau", interpolation = "lin" }'}, "'lin' is not known; did you"),
         ({"TOP": "period = -1.0"}, "period must be greater than 0, not -1.0"),
-        ({"TOP": 'ticks = "yes"'}, "ticks must be true or false, not 'yes'"),
+        ({"TOP": 'diagnosed = "yes"'}, "diagnosed must be true or false, not 'yes'"),
         ({"TOP": "lead = true"}, "lead must be a number, not True"),
         ({"TOP": '[checks]\nallow = ["spike"]'}, "'spike' is no kind of finding; did you"),
         ({"TOP": '[checks]\nallow = ["short"]'}, "'short' (too few samples) stops any fit"),

@@ -146,14 +146,14 @@ def test_options_of_the_algorithm_are_those_of_a_scenario(folder: Path) -> None:
 
 
 def test_a_rig_that_exchanges_in_ticks_is_left_alone(folder: Path) -> None:
-    problem = data_set(folder, more="ticks = true")
+    problem = data_set(folder, more=f"tick = {STEP}")
     exact = Simulator(problem).simulate(np.array([K, D]), "R")[:, 0]
-    problem = data_set(folder, more="ticks = true", exact=exact)
+    problem = data_set(folder, more=f"tick = {STEP}", exact=exact)
     estimate, exchange = calibrated(Simulator(problem))
     assert not exchange.corrected and "ticks" in str(exchange)
     assert holds(estimate, "d", D) and holds(estimate, "k", K)
     # the same data, taken for those of a machine without ticks
-    other, _ = calibrated(Simulator(problem.changed(ticks=False)))
+    other, _ = calibrated(Simulator(problem.changed(tick=None)))
     assert not holds(other, "d", D)
 
 

@@ -83,7 +83,7 @@ def test_a_shift_below_the_tick_of_the_rig_has_no_name(
     place = layout()
     run = SimpleNamespace(times=np.array([0.0, 10.0]))
     rig: Any = SimpleNamespace(
-        raw=SimpleNamespace(ticks=True, step=5e-4, runs=[run]), fitting=place, checking=place
+        raw=SimpleNamespace(tick=5e-4, step=5e-4, runs=[run]), fitting=place, checking=place
     )
     model = np.zeros(place.size)
     base: Any = SimpleNamespace(fit=model, check=model)

@@ -268,7 +268,7 @@ step = 0.05
 algorithm = "gauss_seidel"
 options = { extrapolation = 1 }
 period = 0.1
-ticks = true
+tick = 0.05
 search_step = 0.1
 time = "time"
 gap = 0.3
