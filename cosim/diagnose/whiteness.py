@@ -13,9 +13,10 @@ from .linear import SampleStack
 
 Vector = NDArray[np.float64]
 BURST = 0.01
-"""Share of the windows, those with the largest residuals, that do not count. Where casters turn
-over the smallest difference decides when: for some tenths of a second a model that is right is off
-by tens of sigma. What lasts no longer in all runs together is no ground to look for a cause."""
+"""Share of the windows, those with the largest residuals, that do not count where start values
+decide when something turns over (`Problem.late`): for some tenths of a second a model that is right
+is off by tens of sigma there. What lasts no longer in all runs together is no ground to look for a
+cause. Elsewhere a right model has no such moments, and a wrong one may be wrong in few."""
 CALIBRATED = 1.1
 """RMS over noise up to which a model counts as calibrated: the sheets give noise to a few percent,
 and thousands of samples make any smaller excess significant without making it worth a cause."""
@@ -28,7 +29,7 @@ class WhitenessTest:
     Attributes:
         channel: its name.
         rms: over the noise.
-        lasting: the same without the worst windows (see `BURST`).
+        lasting: the same without the worst windows, where runs may have such (see `BURST`).
         slow: RMS of sums over windows, over what white residuals of the given noise give.
         correlation: of neighbouring samples.
         freedom: effective number of independent residuals.
@@ -76,6 +77,7 @@ def structured(lasting: float, p_value: float) -> bool:
 def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]:
     """Test each channel over all runs of a stack."""
     rows = stack.by_run(residual)
+    share = BURST if stack.problem.late else 0.0
     found = []
     for column, channel in enumerate(stack.problem.channels):
         squares, products, pairs, count = 0.0, 0.0, 0, 0
@@ -97,7 +99,7 @@ def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]
         slow = float(np.mean(sums)) if sums.size else variance
         freedom = count * min(variance / max(slow, 1e-300), 1.0)
         sizes = np.mean(np.square(windows), axis=1)
-        kept = np.argsort(sizes)[: sizes.size - int(BURST * sizes.size)]
+        kept = np.argsort(sizes)[: sizes.size - int(share * sizes.size)]
         lasting = float(np.mean(sizes[kept])) if sizes.size else variance
         p_value = float(chdtrc(kept.size, np.sum(sums[kept]))) if sums.size else 1.0
         found.append(

@@ -18,11 +18,13 @@ from cosim.errors import CosimError
 RATE, SECONDS = 100, 40
 
 
-def layout(unstable: bool = False) -> SampleStack:
+def layout(unstable: bool = False, *, tips: bool = False) -> SampleStack:
     """One run of one channel, sampled at `RATE`."""
     times = np.arange(RATE * SECONDS) / RATE
     run: Any = SimpleNamespace(name="A", times=times, data=np.zeros((times.size, 1)))
-    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name="y")], unstable=unstable)
+    problem: Any = SimpleNamespace(
+        channels=[SimpleNamespace(name="y")], unstable=unstable, late=tips
+    )
     return SampleStack(problem, [run])
 
 
@@ -238,14 +240,18 @@ def test_a_value_that_was_tried_from_a_list_counts() -> None:
     assert law({"n": 1.0}, "tau_c", "psi", "n").complexity == cogging.complexity
 
 
-def test_a_burst_is_no_structure_and_what_lasts_is() -> None:
+def test_a_burst_is_no_structure_where_something_may_turn_over() -> None:
     place = layout()
+    tips = layout(tips=True)
     noise = np.random.default_rng(4).standard_normal(place.size)
     burst, lasting = np.zeros(place.size), np.zeros(place.size)
     burst[1000:1040] = 20.0  # 0.4 s of 40 s: 1 % of the windows
     lasting[::10] = 20.0 * np.sqrt(40 / (place.size / 10))  # the same energy, all the time
-    for extra, expected in ((0.0, False), (burst, False), (lasting + 0.5, True)):
-        (found,) = whiteness_tests(noise + extra, place)
-        assert found.structured is expected
-    (found,) = whiteness_tests(noise + burst, place)
+    for extra, expected, anywhere in (
+        (0.0, False, False), (burst, False, True), (lasting + 0.5, True, True)
+    ):  # fmt: skip
+        for at, structured in ((tips, expected), (place, anywhere)):
+            (found,) = whiteness_tests(noise + extra, at)
+            assert found.structured is structured
+    (found,) = whiteness_tests(noise + burst, tips)
     assert found.rms > 2.0 and found.lasting < CALIBRATED
