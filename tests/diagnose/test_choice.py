@@ -322,7 +322,7 @@ def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others
         data = (slow + random.standard_normal(times.size))[:, None]
         runs.append(SimpleNamespace(name=name, times=times, data=data))
     problem: Any = SimpleNamespace(
-        channels=[SimpleNamespace(name="y")], runs=runs, unstable=unstable
+        channels=[SimpleNamespace(name="y")], runs=runs, unstable=unstable, late=unstable
     )
     layout = SampleStack(problem, runs)
     vector = layout.vector([run.data for run in runs])
