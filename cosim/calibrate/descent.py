@@ -74,6 +74,7 @@ class Descent:
         self.theta = np.clip(theta, problem.lower, problem.upper)
         self.loss: Loss = Squares()
         self.uneven = False
+        self.open: list[Vector] = []  # directions that long steps have found open, in spans
         self.promised = math.inf
         self.unkept, self.valley = 0.0, False
         self.damping = FIRM

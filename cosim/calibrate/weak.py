@@ -39,43 +39,83 @@ def confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Ve
         one per direction, infinite where none was measured; and the directions, turned back to
         where the others undo nothing.
     """
-    p = run.problem
-    common = np.array([not item.run for item in p.parameters])
+    common = np.array([not item.run for item in run.problem.parameters])
     found, turned = np.full(values.size, np.inf), vectors.copy()
-    base = run.residuals
+    for i in np.flatnonzero((values >= 1.0 / KNOWN**2) & (values < WEAK * values.max())):
+        if float(np.sum(vectors[common, i] ** 2)) < 0.5:
+            continue
+        seen = _seen(run, vectors[:, i], values, vectors, values > CLEAR * values[i])
+        if seen is not None:
+            found[i], turned[:, i] = seen
+            if found[i] < 1.0 / KNOWN**2:
+                run.open.append(turned[:, i])
+    return found, turned
+
+
+def opened(run: Descent, matrix: Vector) -> Vector:
+    """Normal equations without what they claim along directions that long steps find open.
+
+    Directions that were open where the fit was before are asked again: derivatives that jump mix
+    them with others here, and no direction of these is open then.
+
+    Args:
+        run: its residuals are those at theta.
+        matrix: of the normal equations.
+    """
+    for direction in run.open:
+        values, vectors = np.linalg.eigh(matrix)
+        values = np.maximum(values, 0.0)
+        claimed = float(direction @ matrix @ direction) / float(direction @ direction)
+        if claimed < 1.0 / KNOWN**2:
+            continue
+        seen = _seen(run, direction, values, vectors, values > CLEAR * claimed)
+        if seen is not None and seen[0] < 1.0 / KNOWN**2:
+            along = matrix @ seen[1]
+            matrix = matrix - np.outer(along, along) / float(seen[1] @ along)
+    return matrix
+
+
+def _seen(
+    run: Descent, direction: Vector, values: Vector, vectors: Vector, better: NDArray[np.bool_]
+) -> tuple[float, Vector] | None:
+    """Information along a direction from long steps, and the direction, turned back.
+
+    Args:
+        run: its residuals are those at theta.
+        direction: in spans.
+        values, vectors: of the normal matrix.
+        better: which of these directions are known too well to be mixed with this one.
+
+    Returns:
+        None where bounds leave no room, or nothing can be simulated.
+    """
+    p = run.problem
 
     def along(residuals: list[tuple[str, Vector]]) -> Vector:
         return np.asarray(vectors.T @ gradient(p, run.theta, run.jacobian, residuals))
 
-    here = along(base)
-    for i in np.flatnonzero((values >= 1.0 / KNOWN**2) & (values < WEAK * values.max())):
-        direction = vectors[:, i]
-        if float(np.sum(direction[common] ** 2)) < 0.5:
+    here = along(run.residuals)
+    seen: list[tuple[float, Vector]] = []
+    for sign in (1.0, -1.0):
+        way = sign * direction * p.scale
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(way > 0, p.upper - run.theta, p.lower - run.theta) / way
+        length = min(LONG, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
+        if length < SHORT:
             continue
-        better = values > CLEAR * values[i]
-        seen: list[tuple[float, Vector]] = []
-        for sign in (1.0, -1.0):
-            way = sign * direction * p.scale
-            with np.errstate(divide="ignore", invalid="ignore"):
-                room = np.where(way > 0, p.upper - run.theta, p.lower - run.theta) / way
-            length = min(LONG, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
-            if length < SHORT:
-                continue
-            try:
-                there = np.clip(run.theta + length * way, p.lower, p.upper)
-                moved = run.simulator.residuals(there, run.purpose)
-            except FmuCallError:
-                continue
-            pairs = zip(moved, base, strict=True)
-            square = sum(float(np.nansum((a - b) ** 2)) for (_, a), (_, b) in pairs)
-            undone = along(moved) - here
-            square -= float(np.sum(undone[better] ** 2 / values[better]))
-            drawn = sum(
-                (length * way[k] / item.prior) ** 2
-                for k, item in enumerate(p.parameters) if item.prior
-            )  # fmt: skip
-            back = vectors[:, better] @ (undone[better] / values[better]) / (sign * length)
-            seen.append(((max(square, 0.0) + drawn) / length**2, direction + back))
-        if seen:
-            found[i], turned[:, i] = min(seen, key=lambda item: item[0])
-    return found, turned
+        try:
+            there = np.clip(run.theta + length * way, p.lower, p.upper)
+            moved = run.simulator.residuals(there, run.purpose)
+        except FmuCallError:
+            continue
+        pairs = zip(moved, run.residuals, strict=True)
+        square = sum(float(np.nansum((a - b) ** 2)) for (_, a), (_, b) in pairs)
+        undone = along(moved) - here
+        square -= float(np.sum(undone[better] ** 2 / values[better]))
+        drawn = sum(
+            (length * way[k] / item.prior) ** 2
+            for k, item in enumerate(p.parameters) if item.prior
+        )  # fmt: skip
+        back = vectors[:, better] @ (undone[better] / values[better]) / (sign * length)
+        seen.append(((max(square, 0.0) + drawn) / length**2, direction + back))
+    return min(seen, key=lambda item: item[0]) if seen else None

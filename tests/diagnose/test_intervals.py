@@ -48,7 +48,7 @@ def test_a_factor_on_all_torques_stays_open(tmp_path: Path) -> None:
 
 def test_a_valley_beside_limits_stays_open(tmp_path: Path) -> None:
     """Efficiency, damping and inertia by nearly one factor, beside limits that are met by ticks."""
-    bench = benches(3, 11, 121)[37]
+    bench = benches(3, 11, 121)[35]
     assert bench.effect == "saturation"
     (place,) = write_sets(tmp_path, [bench], SHEET, 121, 3.0)
     estimate = calibrated(
