@@ -192,7 +192,7 @@ def calibrated(simulator: Simulator, theta: Vector | None = None) -> tuple[Estim
     with threadpool_limits(1, user_api="blas"):
         estimate = fit(simulator, theta)
         if problem.tick is not None:
-            text = f"{problem.step:g} s is fine enough for the rig's ticks of {problem.tick:g} s"
+            text = f"{problem.step:g} s is taken as exact for the rig's ticks of {problem.tick:g} s"
             return estimate, StepError(problem.step, problem.step, text=text)
         try:
             return _corrected(simulator, estimate)
