@@ -10,9 +10,6 @@ from ..errors import ScenarioError
 from ..files import flatten
 from .parts import Coarse
 
-ROUNDING = 1e-9
-"""Relative: two numbers written in decimals are multiples of each other to this."""
-
 
 def steps(table: Mapping[str, Any], where: str) -> tuple[Coarse, float | None]:
     """How a mapping's system is run in a search, and the tick of its rig.
@@ -28,7 +25,7 @@ def steps(table: Mapping[str, Any], where: str) -> tuple[Coarse, float | None]:
     step, tick = float(table["step"]), table.get("tick")
     if tick is not None:
         parts = float(tick) / step
-        if round(parts) < 1 or not math.isclose(parts, round(parts), rel_tol=ROUNDING):
+        if round(parts) < 1 or not math.isclose(parts, round(parts)):
             raise ScenarioError(
                 f"{where}: tick = {tick} s is no whole number of steps of {table['step']} s; the "
                 "step must divide the rig's tick"

@@ -69,9 +69,12 @@ def opened(run: Descent, matrix: Vector) -> Vector:
         if claimed < 1.0 / KNOWN**2:
             continue
         seen = _seen(run, direction, values, vectors, values > CLEAR * claimed)
-        if seen is not None and seen[0] < 1.0 / KNOWN**2:
-            along = matrix @ seen[1]
-            matrix = matrix - np.outer(along, along) / float(seen[1] @ along)
+        if seen is None or seen[0] >= 1.0 / KNOWN**2:
+            continue
+        along = matrix @ seen[1]
+        claimed = float(seen[1] @ along)
+        if claimed > 1.0 / KNOWN**2:  # else turned back to where nothing is claimed
+            matrix = matrix - np.outer(along, along) / claimed
     return matrix
 
 
