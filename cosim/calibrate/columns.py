@@ -357,9 +357,11 @@ def spikes(values: Vector, noise: float = 0.0) -> NDArray[np.bool_]:
 
         d_k = x_k - (x_k-1 + x_k+1) / 2,    s = median |d_k| / 0.6745
 
-    (and of sqrt(3/2) times the noise), and if the neighbours differ by less than a quarter of that.
-    Of white Gaussian noise, d has the deviation s, so that one sample in 1e9 (SPIKE = 6) passes the
-    first test; steps and ramps do not, whose neighbours differ.
+    (and of sqrt(3/2) times the noise), if the neighbours differ by less than a quarter of that, and
+    if neither of them stands out from its own by half as much: samples that go up and down in turn
+    are a vibration near half the sampling rate. Of white Gaussian noise, d has the deviation s, so
+    that one sample in 1e9 (SPIKE = 6) passes the first test; steps and ramps do not, whose
+    neighbours differ.
     """
     found = np.zeros(values.shape, dtype=bool)
     good = np.flatnonzero(np.isfinite(values))
@@ -370,8 +372,11 @@ def spikes(values: Vector, noise: float = 0.0) -> NDArray[np.bool_]:
     bend = 0.5 * (before + after)
     size = max(float(np.median(np.abs(bend))) / 0.6745, noise * np.sqrt(1.5))
     least = np.minimum(np.abs(before), np.abs(after))
-    out = (before * after > 0.0) & (least > SPIKE * size)
-    out &= np.abs(after - before) < 0.25 * least
+    stands = (before * after > 0.0) & (least > SPIKE * size)
+    out = stands & (np.abs(after - before) < 0.25 * least)
+    swing = np.where(stands, least, 0.0)
+    out[1:] &= swing[:-1] < 0.5 * least[1:]
+    out[:-1] &= swing[1:] < 0.5 * least[:-1]
     found[good[1:-1][out]] = True
     return found
 

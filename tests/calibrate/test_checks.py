@@ -291,6 +291,19 @@ def test_a_jolt_moves_something(noisy) -> None:
     assert not of_kind(changed(jolted, "speed", pushed), "spikes")
 
 
+def test_a_vibration_near_half_the_sampling_rate_is_no_spike(noisy) -> None:
+    """A ripple of the torque at high speed is one: it beats, and stands out where it beats most."""
+    problem = noisy(0)
+
+    def shaken(x: np.ndarray) -> np.ndarray:
+        at = np.arange(x.size)
+        return x + np.where((at > 400) & (at < 800), 5.0 * np.cos(2.0 * np.pi * 0.525 * at), 0.0)
+
+    assert not of_kind(changed(problem, "current", shaken), "spikes")
+    found = of_kind(changed(changed(problem, "current", shaken), "current", struck), "spikes")
+    assert "the largest 1e+09 A at 1.5 s" in found[0].text
+
+
 def test_a_row_that_is_wrong_in_all_columns(noisy) -> None:
     struck_twice = changed(changed(noisy(0), "current", struck), "speed", struck)
     found = of_kind(struck_twice, "spikes")
