@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 WORSE = 10.0
 """Times as large as in the other one's place is the mean square misfit of an exchanged column."""
+CHANCE = 0.01
+"""Share of logs without exchanged runs in which two may look exchanged."""
 UNLIKE = 0.01
 """Share of the misfit that columns of different units must keep when exchanged: their numbers are
 alike by chance only."""
@@ -80,9 +82,13 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
 
     As for two channels, over all samples, but for each of the two runs; no other column of them
     does. Of many short runs some are alike by chance, and a model that is off is so in most of
-    them: both fit their own signal as much worse, too, than the other runs do (median).
+    them: both fit their own signal as much worse, too, than the other runs do (median), and the
+    better fit counts more nats (of a noise of unknown size) than that of the best pair does by
+    chance once in a hundred logs. So runs with a single sample can tell nothing.
     """
     every = range(len(problem.channels))
+    pairs = max(0.5 * len(problem.runs) * (len(problem.runs) - 1) * len(every), 1.0)
+    sizes = np.array([np.count_nonzero(np.isfinite(r.data), axis=0) for r in problem.runs])
     own = np.array([_mean_squares(r.data, models[r.name], problem.sigma) for r in problem.runs])
     # no median of all runs but two is less; it is 0 of none
     least = np.sort(np.nan_to_num(own), axis=0)[(len(own) - 3) // 2] if len(own) > 2 else 0.0
@@ -91,12 +97,18 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
         for b in suspect[place + 1 :]:
             first, second = problem.runs[a], problem.runs[b]
             usual = _medians(np.delete(own, (a, b), axis=0))
+            apart = np.minimum(own[a], own[b]) > WORSE * usual
+            if not np.any(apart):
+                continue
+            # a fit that is better than the noise is so by chance
+            better = own[a] / np.maximum(_crossed(problem, models, first, second), 1.0)
+            best = own[b] / np.maximum(_crossed(problem, models, second, first), 1.0)
             crossed = [
-                min(own[a, i], own[b, i]) > WORSE * usual[i]
-                and _crossed(problem, models, first, second)[i] < own[a, i] / WORSE
-                and _crossed(problem, models, second, first)[i] < own[b, i] / WORSE
+                apart[i] and min(better[i], best[i]) > WORSE
+                and sizes[a, i] * np.log(better[i]) + sizes[b, i] * np.log(best[i])
+                > 2.0 * np.log(pairs / CHANCE)
                 for i in every
-            ]
+            ]  # fmt: skip
             if sum(crossed) != 1 or len(crossed) < 2:
                 continue  # none, or whole runs
             channel = problem.channels[crossed.index(True)]
