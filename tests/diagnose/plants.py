@@ -23,9 +23,9 @@ from cosim.calibrate.parts import Parameter
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.judge import Judge
-from cosim.diagnose.linear import ScoreTest
-from cosim.diagnose.models import Fitted
-from cosim.diagnose.probes import Probe
+from cosim.diagnose.linear import MATERIAL, ScoreTest
+from cosim.diagnose.models import Fitted, Gate
+from cosim.diagnose.probes import Probe, single
 from cosim.diagnose.signature import Signature, unscored
 from tests.diagnose import disc
 from tests.problems import simulator
@@ -65,6 +65,8 @@ targets = "gearbox.b"
 """
 STARTS = (0.8, 0.2, 0.7, 0.4, 0.75)
 """Angles at which the runs of `swinging` begin, the weight's own included [rad]."""
+WANTED = Gate(10.0, 9.0)
+"""What unused runs say of a law."""
 
 
 def alone(instance: str, variant: str) -> str:
@@ -74,7 +76,7 @@ def alone(instance: str, variant: str) -> str:
 
 def gear(folder: Path, size: float) -> Problem:
     """A gear with so much dry friction [N.m], its load and direction always the same."""
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(3)
     text = GEAR
     for place, purpose in enumerate(("identification", "identification", "validation")):
@@ -95,12 +97,8 @@ def base_on_casters(folder: Path) -> Problem:
     disc.write(folder, lambda w, theta, t: 0.0, seconds=2.0)
     text = (folder / "dataset.toml").read_text("utf-8")
     head, _, rest = text.partition("[[parameter]]")
-    for old, new in (
-        ("load.tau", "base.tau_l"),
-        ("load.w", "base.w_l"),
-        ("load.phi", "base.phi_l"),
-    ):
-        head = head.replace(f'"{old}"', f'"{new}"')
+    for name in ("tau", "w", "phi"):
+        head = head.replace(f'"load.{name}"', f'"base.{name}_l"')
     runs = rest[rest.index("[[run]]") :]
     (folder / "dataset.toml").write_text(head + runs, encoding="utf-8")
     (folder / "system.toml").write_text(alone("base", "mobile_base/six_dof"), encoding="utf-8")
@@ -161,4 +159,18 @@ def gaining(judge: Judge, candidate: Candidate, gain: float, z: float = 9.0) -> 
     return replace(
         item, rest=np.ones(judge.fit_data.size, dtype=np.float32),
         score=ScoreTest(1.0, gain, z, 1.0, 1.0, 1.0),
+    )  # fmt: skip
+
+
+def fitted(judge: Judge, base: Fitted, candidate: Candidate, gain: float) -> Fitted:
+    """A quick fit of a candidate that gains so much on all runs; unused ones want it."""
+    (probe,) = single(base.problem, [candidate])
+    problem = probe.problem.hold({p.name: p.nominal for p in probe.others})
+    estimate = replace(
+        base.estimate, simulator=simulator(problem), theta=problem.nominal,
+        robust=base.estimate.robust - 1.0 - (gain - WANTED.gain),
+    )  # fmt: skip
+    # by as much as a law must change a channel at least
+    return Fitted(
+        (candidate,), estimate, base.fit + MATERIAL + 1e-3, base.check, unscored(probe), WANTED
     )  # fmt: skip
