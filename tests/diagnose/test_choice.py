@@ -1,332 +1,419 @@
-"""Which scored candidates are refitted."""
+"""Which scored candidates are refitted, on plants of a few lines."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from cosim.calibrate.estimate import Estimate
+from cosim.calibrate.fit import CORRECTION, fit
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.nuisance import late_values
+from cosim.calibrate.parts import MeasuredRun
+from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
+from cosim.diagnose.candidates import candidates
 from cosim.diagnose.established import examined
-from cosim.diagnose.linear import SampleStack
-from cosim.diagnose.search import Search
+from cosim.diagnose.fitter import QUICKLY
+from cosim.diagnose.judge import Judge
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import CHECK, Search
 from cosim.diagnose.secant import PATIENCE, SOLVED
 from cosim.diagnose.shortlist import REFITS, kin, promising
-from cosim.errors import CosimError
+from cosim.diagnose.unstable import ended
+from cosim.errors import FmuCallError
+from tests.diagnose import disc, plants
+from tests.problems import simulator
 
-MEMBERS = {("base", f"caster_{place}.swivel") for place in ("fl", "fr", "rl", "rr")}
+Vector = NDArray[np.float64]
+PLACES = [f"base.caster_{place}.swivel" for place in ("fl", "fr", "rl", "rr")]
+GROUP = "coulomb at base.caster.swivel"
 
 
-def near(mean_square: float = 1.0) -> Any:
-    """A model with this mean square over the noise's."""
-    return SimpleNamespace(
-        problem=0,
-        estimate=SimpleNamespace(
-            cost=0.5 * mean_square * 1e4, robust=0.5 * mean_square * 1e4, count=10000
-        ),
-    )
+def nothing(w: float, theta: float, t: float) -> float:
+    return 0.0
+
+
+@pytest.fixture(scope="module")
+def casters(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A base on casters."""
+    return plants.base_on_casters(tmp_path_factory.mktemp("base"))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A disc."""
+    return read_problem(disc.write(tmp_path_factory.mktemp("disc"), nothing))
+
+
+def refitted(
+    problem: Problem,
+    promised: Mapping[str, tuple[float, float, float]],
+    mean_square: float,
+) -> list[str]:
+    """Labels of what is refitted, of label -> gain, z and p value, the others promise nothing."""
+    judge = Judge(problem, CHECK)
+    known = {c.label: c for c in candidates(problem)}
+    found = [plants.gaining(judge, known[n], gain, z) for n, (gain, z, _) in promised.items()]
+    found.sort(key=lambda s: -s.score.gain)
+    p_values = {name: p for name, (_, _, p) in promised.items()}
+    stage = Round(plants.leaving(judge, mean_square), found, p_values)
+    return [s.candidate.label for s in promising(judge, stage)]
 
 
 def chosen(
-    gains: dict[str, float], monkeypatch: pytest.MonkeyPatch, doubtful: tuple[str, ...] = (),
-    *, unstable: bool = False,
-) -> list[str]:  # fmt: skip
-    """Labels that are refitted, of `effect at instance.port` -> gain, all significant but some."""
-    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: MEMBERS)
-    signatures = []
-    for label, gain in sorted(gains.items(), key=lambda item: -item[1]):
-        instance, port = label.partition(" at ")[2].split(".", 1)
-        effect = label.partition(" at ")[0]
-        candidate = SimpleNamespace(label=label, effect=effect, instance=instance, port=port)
-        score = SimpleNamespace(gain=gain, z=9.0)
-        signatures.append(
-            SimpleNamespace(candidate=candidate, score=score, unseen=False, asked=None)
-        )
-    round_: Any = SimpleNamespace(
-        signatures=signatures,
-        corrected={label: float(label in doubtful) for label in gains},
-        base=near(),
-    )
-    search: Any = SimpleNamespace(
-        fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: True,
-        raw=SimpleNamespace(unstable=unstable),
-    )  # fmt: skip
-    return [s.candidate.label for s in promising(search, round_)]
+    problem: Problem,
+    gains: Mapping[str, float],
+    doubtful: tuple[str, ...] = (),
+    mean_square: float = 1.5,
+) -> list[str]:
+    """The same, all significant but some; a channel exceeds its noise if not said otherwise."""
+    promised = {name: (gain, 9.0, float(name in doubtful)) for name, gain in gains.items()}
+    return refitted(problem, promised, mean_square)
 
 
+@pytest.mark.parametrize("mean_square", [1.0, 1.5])
 def test_members_that_look_alike_do_not_crowd_out_their_group(
-    monkeypatch: pytest.MonkeyPatch,
+    casters: Problem, mean_square: float
 ) -> None:
     gains = {
-        f"{effect} at {instance}.{port}": 100.0 + len(port) + len(effect)
+        f"{effect} at {place}": 100.0 + len(effect)
         for effect in ("coulomb", "bristle", "stribeck", "viscous")
-        for instance, port in MEMBERS
+        for place in PLACES
     }
-    found = chosen({**gains, "coulomb at base.caster.swivel": 80.0}, monkeypatch)
+    found = chosen(casters, {**gains, GROUP: 80.0}, mean_square=mean_square)
     assert len(found) == REFITS + 1
-    assert found[-1] == "coulomb at base.caster.swivel"
+    assert found[-1] == GROUP
 
 
-def test_two_members_of_a_group_are_enough_for_one_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    gains = {f"coulomb at {i}.{port}": 100.0 + len(port) for i, port in MEMBERS}
-    gains |= {"coulomb at arm.joint_1": 99.0, "coulomb at arm.joint_2": 98.0}
-    gains |= {"coulomb at arm.joint_3": 97.0, "coulomb at base.caster.swivel": 90.0}
-    assert [label.partition(" at ")[2] for label in chosen(gains, monkeypatch)][2:] == [
-        "arm.joint_1", "arm.joint_2", "arm.joint_3", "base.caster.swivel"
-    ]  # fmt: skip
+def test_two_members_of_a_group_are_enough_for_one_effect(casters: Problem) -> None:
+    gains = {f"coulomb at {place}": 100.0 for place in PLACES}
+    others = ["delay at log.w", "delay at log.theta", "body_drag at base.body", GROUP]
+    gains |= dict(zip(others, (99.0, 98.0, 97.0, 90.0), strict=True))
+    assert chosen(casters, gains)[2:] == others
 
 
-def test_a_group_of_which_members_are_refitted_needs_no_significance(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    groups = tuple(f"{effect} at base.caster.swivel" for effect in ("coulomb", "stribeck"))
-    gains = {f"coulomb at {i}.{port}": 100.0 for i, port in MEMBERS}
+def test_a_group_of_which_members_are_refitted_needs_no_significance(casters: Problem) -> None:
+    groups = (GROUP, GROUP.replace("coulomb", "stribeck"))
+    gains = {f"coulomb at {place}": 100.0 for place in PLACES}
     gains |= dict.fromkeys(groups, 80.0)
-    assert chosen(gains, monkeypatch, groups)[2:] == [groups[0]]
-    assert groups[0] in chosen({**gains, groups[0]: 30.0}, monkeypatch, groups)
-    assert groups[0] not in chosen({**gains, groups[0]: 10.0}, monkeypatch, groups)
+    assert chosen(casters, gains, groups)[2:] == [GROUP]
+    assert GROUP in chosen(casters, {**gains, GROUP: 30.0}, groups)
+    assert GROUP not in chosen(casters, {**gains, GROUP: 10.0}, groups)
 
 
-def test_a_group_that_gains_little_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
-    gains = {f"coulomb at {i}.{port}": 100.0 for i, port in MEMBERS}
-    gains |= {f"bristle at {i}.{port}": 90.0 for i, port in MEMBERS}
-    gains |= {f"stribeck at {i}.{port}": 80.0 for i, port in MEMBERS}
-    gains["coulomb at base.caster.swivel"] = 15.0
-    found = chosen(gains, monkeypatch)
+def test_a_group_that_gains_little_is_no_rival(casters: Problem) -> None:
+    gains = {
+        f"{effect} at {place}": gain
+        for effect, gain in (("coulomb", 100.0), ("bristle", 90.0), ("stribeck", 80.0))
+        for place in PLACES
+    }
+    gains[GROUP] = 15.0
+    found = chosen(casters, gains)
     assert len(found) == REFITS
-    assert "coulomb at base.caster.swivel" not in found
+    assert GROUP not in found
     # where casters may turn over, its first order says nothing
-    assert "coulomb at base.caster.swivel" in chosen(gains, monkeypatch, unstable=True)
-
-
-def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too() -> None:
-    def signature(effect: str, place: str, tuned: int, *twins: Any) -> Any:
-        candidate = SimpleNamespace(effect=effect, place=place)
-        return SimpleNamespace(candidate=candidate, tuned=tuned, twins=twins)
-
-    def model(item: Any) -> Any:
-        return SimpleNamespace(effects=(item.candidate,), signature=item)
-
-    simpler = signature("coulomb", "load.flange", 0)
-    general = signature("asymmetric_coulomb", "load.flange", 1)
-    same = signature("asymmetric_coulomb", "gearbox.flange_b", 1)
-    law = signature("hose", "load.flange", 1)
-    others = [signature("stribeck", "gearbox.flange_b", 0), law]
-    winner = model(signature("asymmetric_coulomb", "load.flange", 1, same, *others))
-    elsewhere = model(signature("coulomb", "gearbox.flange_a", 0, simpler, general))
-    found: Any = SimpleNamespace(winner=winner, fitted=[winner, elsewhere])
-    search: Any = SimpleNamespace(total=lambda *_: 1e6)  # nats, of which the data see 1e-5
-    assert kin(search, winner, found) == [same, simpler, general, law]
-    search.total = lambda *_: 1e5  # of these they do not, but another law is another answer
-    assert kin(search, winner, found) == [law]
-    search.total, found.winner = lambda *_: 1e6, elsewhere
-    assert kin(search, winner, found) == [simpler]
-
-
-def test_start_values_that_cannot_be_estimated_leave_the_winner(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def fail(*_: Any) -> None:
-        raise CosimError("unstable")
-
-    simulator: Any = SimpleNamespace(costs={}, limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late_values.released", fail)
-    estimate = SimpleNamespace(theta=None, robust=9.0, count=2)
-    problem = SimpleNamespace(runs=(), late=())
-    winner: Any = SimpleNamespace(problem=problem, simulator=simulator, estimate=estimate)
-    said: list[str] = []
-    search: Any = SimpleNamespace(
-        raw=SimpleNamespace(late=(1,)), lacking=lambda _: True, say=said.append, _settled=None
-    )
-    assert Search.released(search, winner, winner) is winner
-    assert said == ["start values of the runs could not be estimated: unstable"]
-    search.raw.late = ()
-    assert Search.released(search, winner, winner) is winner and len(said) == 1
-
-
-@pytest.mark.parametrize(("alone", "kept"), [(3.0, True), (12.0, False)])
-def test_start_values_stay_where_a_joint_fit_loses_them(
-    alone: float, kept: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """And what has been tried in vain is not tried again."""
-
-    def model(cost: float) -> Any:
-        estimate = SimpleNamespace(theta=None, robust=cost, count=2)
-        return SimpleNamespace(problem=None, simulator=simulator, estimate=estimate)
-
-    simulator: Any = SimpleNamespace(limited=lambda limits: simulator)
-    monkeypatch.setattr("cosim.diagnose.late_values.corrected", lambda *_: simulator)
-    monkeypatch.setattr("cosim.diagnose.late_values.released", lambda *_: (simulator, None, 5.0))
-    monkeypatch.setattr("cosim.diagnose.late_values.late_estimated", lambda _: True)
-    monkeypatch.setattr("cosim.diagnose.late_values.patience", lambda _: {})
-    said: list[str] = []
-    search: Any = SimpleNamespace(
-        raw=SimpleNamespace(late=(1,)), lacking=lambda f: f.estimate.robust > 4.0, say=said.append,
-        gain=lambda first, second: first.estimate.robust - second.estimate.robust, _settled=None,
-        _with_late=lambda *_: model(11.0), fitted=lambda *_: model(alone),
-        again=lambda found, *_: found,
-    )  # fmt: skip
-    winner = model(9.0)
-    found = Search.released(search, winner, winner)
-    assert (found is not winner) == kept
-    assert said == ["start values of the runs estimated: 5 nats"] + kept * [
-        "with them and hardly another change: 6 nats"
-    ]
-    assert Search.released(search, found, winner) is found
-    assert len(said) == 1 + kept
+    assert GROUP in chosen(plants.turning_over(casters), gains)
 
 
 def test_without_significance_unused_runs_decide_where_something_is_evidently_missing(
-    monkeypatch: pytest.MonkeyPatch,
+    plain: Problem,
 ) -> None:
-    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: set())
+    def few(mean_square: float, z: float) -> int:
+        return len(refitted(plain, {"coulomb at load.flange": (100.0, z, 0.8)}, mean_square))
 
-    def refitted(lacking: bool, z: float) -> int:
-        candidate = SimpleNamespace(label="a", effect="a", instance="motor", port="winding")
-        item = SimpleNamespace(
-            candidate=candidate, score=SimpleNamespace(gain=100.0, z=z), unseen=False, asked=None
-        )
-        search: Any = SimpleNamespace(
-            fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking,
-            raw=SimpleNamespace(unstable=False),
-        )  # fmt: skip
-        found: Any = SimpleNamespace(signatures=[item], corrected={"a": 0.8}, base=near())
-        return len(promising(search, found))
-
-    assert refitted(True, 2.5) == 1
-    assert refitted(False, 2.5) == 0  # at the noise: nothing to look for
-    assert refitted(True, 1.5) == 0
-
-
-def test_an_effect_without_which_nothing_runs_is_not_dropped() -> None:
-    needed, last = SimpleNamespace(label="delay at motor.command"), SimpleNamespace(label="b")
-
-    def without(*_: Any) -> None:
-        raise CosimError("unstable")
-
-    said: list[str] = []
-    memo = SimpleNamespace(failed=set())
-    search: Any = SimpleNamespace(without=without, say=said.append, memo=memo)
-    model: Any = SimpleNamespace(
-        effects=(needed, last), labels=frozenset((needed.label, last.label))
-    )
-    assert examined(search, model, 80) is model
-    assert memo.failed == {frozenset({needed.label}), frozenset({last.label})}
-    assert said == ["without delay at motor.command: unstable", "without b: unstable"]
-
-
-def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def fail(*_: Any) -> None:
-        raise CosimError("unstable")
-
-    monkeypatch.setattr("cosim.diagnose.fitter.corrected", fail)
-    said: list[str] = []
-    effect = SimpleNamespace(label="delay at motor.command")
-    quick: Any = SimpleNamespace(
-        effects=(effect,), simulator=None, estimate=SimpleNamespace(theta=None)
-    )
-    search: Any = SimpleNamespace(raw=None, say=said.append)
-    assert Search.sharpened(search, quick, quick) is quick
-    assert said == ["delay at motor.command could not be fitted thoroughly: unstable"]
+    assert few(1.5, 2.5) == 1
+    assert few(1.0, 2.5) == 0  # at the noise: nothing to look for
+    assert few(1.5, 1.5) == 0
 
 
 @pytest.mark.parametrize(
-    "mean_square, lacking, gain, z, expected",
+    "mean_square, gain, z, expected",
     [
-        (1e3, True, 4.4e7, 4.0, ["lag", "delay"]),
-        (1.0, True, 4.4e7, 4.0, ["lag"]),
-        (1.0, True, 8e7, 4.0, ["delay", "lag"]),  # more than any significant one
-        (1.0, True, 8e7, 1.7, ["delay", "lag"]),  # whatever its significance
-        (1.0, False, 8e7, 4.0, ["lag"]),
+        (1e3, 4.4e7, 4.0, ["viscous", "coulomb"]),
+        (1.5, 4.4e7, 4.0, ["viscous"]),
+        (1.5, 8e7, 4.0, ["coulomb", "viscous"]),  # more than any significant one
+        (1.5, 8e7, 1.7, ["coulomb", "viscous"]),  # whatever its significance
+        (1.0, 8e7, 4.0, ["viscous"]),
     ],
 )
 def test_where_something_is_missing_a_few_that_are_not_significant_are_refitted_too(
-    mean_square: float,
-    lacking: bool,
-    gain: float,
-    z: float,
-    expected: list[str],
-    monkeypatch: pytest.MonkeyPatch,
+    plain: Problem, mean_square: float, gain: float, z: float, expected: list[str]
 ) -> None:
-    monkeypatch.setattr("cosim.diagnose.shortlist.balances", lambda problem: set())
-    signatures = [
-        SimpleNamespace(
-            candidate=SimpleNamespace(label=label, effect=label, instance="motor", port="command"),
-            score=SimpleNamespace(gain=gain, z=z), unseen=False, asked=None,
-        )
-        for label, gain, z in sorted(
-            (("lag", 6.8e7, 10.7), ("delay", gain, z), ("ripple", 4e7, 1.9), ("sag", 3e7, 4.0)),
-            key=lambda item: -item[1],
-        )
-    ]  # fmt: skip
-    search: Any = SimpleNamespace(
-        fitting=SimpleNamespace(largest=lambda change: 1.0), lacking=lambda base: lacking,
-        raw=SimpleNamespace(unstable=False),
-    )  # fmt: skip
-    found: Any = SimpleNamespace(
-        signatures=signatures, base=near(mean_square),
-        corrected={"lag": 1e-10, "delay": 0.019, "ripple": 1.0, "sag": 0.02},
-    )  # fmt: skip
-    assert [s.candidate.label for s in promising(search, found)] == expected
+    promised = {
+        "viscous": (6.8e7, 10.7, 1e-10), "coulomb": (gain, z, 0.019), "cogging": (4e7, 1.9, 1.0),
+        "unbalance": (3e7, 4.0, 0.02),
+    }  # fmt: skip
+    places = {f"{effect} at load.flange": numbers for effect, numbers in promised.items()}
+    found = refitted(plain, places, mean_square)
+    assert [label.partition(" at ")[0] for label in found] == expected
+
+
+@pytest.fixture(scope="module")
+def search(plain: Problem) -> Iterator[tuple[Search, Fitted]]:
+    """A calibrated disc that lacks nothing."""
+    found = Search(simulator(plain), only=[])
+    base = found.calibrated()
+    found.note(base)
+    yield found, base
+    found.close()
+
+
+LABELS = {
+    f"{effect} at gearbox.{place}" for effect in ("coulomb", "asymmetric_coulomb", "load_friction")
+    for place in ("flange_a", "flange_b")
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[0.1, 0.01])
+def geared(
+    tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Iterator[tuple[Search, Round, float]]:
+    """Scored and quickly fitted laws of a gear with so much friction, all twins to first order."""
+    problem = plants.gear(tmp_path_factory.mktemp("gear"), request.param)
+    found = Search(simulator(problem), only=[c for c in candidates(problem) if c.label in LABELS])
+    base = found.calibrated()
+    found.note(base)
+    stage = found.scored(base)
+    (item,) = stage.signatures
+    assert item.candidate.label == "coulomb at gearbox.flange_b"
+    for each in (item, *item.twins):
+        found.tried(base, stage, each, again=False)
+    yield found, stage, request.param
+    found.close()
 
 
 @pytest.mark.parametrize(
-    "close, limit",
+    ("winner", "told", "another"),
     [
-        (None, None),
-        (30000, PATIENCE * 30000),
-        # next to no solver in 1000 communication steps: an effect may bring the first one
-        (1000, PATIENCE * SOLVED * 1000),
+        # where so much is explained that the sixth digit tells them its other place, and always
+        # another law that does the same by as many parameters
+        ("coulomb at gearbox.flange_b", ["coulomb at gearbox.flange_a"],
+         ["load_friction at gearbox.flange_b", "load_friction at gearbox.flange_a"]),
+        # with one parameter more, its other place and simpler laws at its own
+        ("asymmetric_coulomb at gearbox.flange_a",
+         ["coulomb at gearbox.flange_a", "load_friction at gearbox.flange_a",
+          "asymmetric_coulomb at gearbox.flange_b"], []),
     ],
-    ids=["nothing known", "a multiple", "no state"],
-)
-def test_quick_fits_have_a_limit_on_work(
-    close: int | None, limit: float | None, monkeypatch: pytest.MonkeyPatch
+)  # fmt: skip
+def test_twins_of_the_winner_and_simpler_ones_at_its_place_are_fitted_too(
+    geared: tuple[Search, Round, float], winner: str, told: list[str], another: list[str]
 ) -> None:
-    search: Any = Search.__new__(Search)
-    search.judged = lambda estimate: estimate
-    monkeypatch.setattr("cosim.diagnose.fitter.fit", lambda simulator, *_, **__: simulator.limits)
-    run = SimpleNamespace(times=np.arange(11.0), lead=0.0)
-    problem: Any = SimpleNamespace(step=0.01, run=lambda name: run)
-    known: Any = None if close is None else SimpleNamespace(
-        simulator=SimpleNamespace(problem=problem, costs={"A": close}), known=None
-    )  # fmt: skip
-    limits = search.fitted(Simulator(problem), np.zeros(1), known)
-    assert limits == ({} if limit is None else {"A": pytest.approx(limit)})
+    search, stage, size = geared
+    stage.winner = next(f for f in stage.fitted if f.labels == {winner})
+    found = [s.candidate.label for s in kin(search, stage.base, stage)]
+    assert [label for label in found if label != winner] == told * (size > 0.05) + another
+
+
+@pytest.mark.parametrize("work", [None, 1000.0, 30000.0], ids=["nothing known", "none", "much"])
+def test_quick_fits_have_a_limit_on_work(search: tuple[Search, Fitted], work: float | None) -> None:
+    """A multiple of what a fit close by took; where that is next to none, an effect may bring the
+    first solver.
+    """
+    judge, base = search
+    near = base.simulator.limited({})
+    near.costs = {run.name: work or 0.0 for run in judge.raw.runs}
+    close = replace(base.estimate, simulator=near)
+    found = judge.fitted(near, base.estimate.theta, close if work else None)
+    times = judge.raw.runs[0].times
+    least = SOLVED * (times[-1] - times[0]) / judge.raw.step
+    limits = dict.fromkeys(near.costs, PATIENCE * max(work or 0.0, least))
+    assert found.simulator.limits == pytest.approx(limits if work else {})
+    assert 1000.0 < least < 30000.0
 
 
 @pytest.mark.parametrize(
     "sizes, unstable, expected",
     [
-        ({"calm": 2.5, "long": 2.0, "far": 30.0}, True, ["long"]),  # most excess, of what is near
-        ({"calm": 2.5, "long": 2.0, "far": 30.0}, False, ["far"]),  # no run can be so by itself
-        ({"calm": 1.0, "long": 1.0, "far": 30.0}, True, ["far"]),  # the others are at the noise
-        ({"calm": 5.0, "long": 2.0, "far": 1.0}, True, ["calm"]),
-        ({"calm": 1.0, "long": 1.0, "far": 1.0}, True, ["calm", "long", "far"]),
+        ({"slow": 6.0, "steps": 4.0, "sweep": 900.0}, True, ["steps"]),  # most, of what is near
+        ({"slow": 6.0, "steps": 4.0, "sweep": 900.0}, False, ["sweep"]),  # no run is so by itself
+        ({"slow": 1.0, "steps": 1.0, "sweep": 900.0}, True, ["sweep"]),  # others are at the noise
+        ({"slow": 25.0, "steps": 4.0, "sweep": 1.0}, True, ["slow"]),
+        ({"slow": 1.0, "steps": 1.0, "sweep": 1.0}, True, ["sweep", "steps", "slow"]),
     ],
 )
 def test_candidates_are_chosen_by_a_run_that_is_not_much_farther_off_than_others(
-    sizes: dict[str, float], unstable: bool, expected: list[str]
+    plain: Problem, sizes: dict[str, float], unstable: bool, expected: list[str]
 ) -> None:
-    random = np.random.default_rng(8)
-    runs: list[Any] = []
-    for name, size in sizes.items():
-        times = np.arange(4000 if name == "long" else 1000) / 100
-        # noise of the given size with slow parts, as what a model lacks has
-        slow = np.sin(2.0 * np.pi * 0.3 * times) * np.sqrt(2.0 * (size**2 - 1.0))
-        data = (slow + random.standard_normal(times.size))[:, None]
-        runs.append(SimpleNamespace(name=name, times=times, data=data))
-    problem: Any = SimpleNamespace(
-        channels=[SimpleNamespace(name="y")], runs=runs, unstable=unstable, late=unstable
-    )
-    layout = SampleStack(problem, runs)
-    vector = layout.vector([run.data for run in runs])
-    search: Any = SimpleNamespace(raw=problem, fitting=layout, fit_data=vector)
-    search.lacking = lambda base: Search.lacking(search, base)
-    base: Any = SimpleNamespace(fit=np.zeros_like(vector))
-    assert Search.telling(search, base).names == expected
+    """The steps last four times as long as the others."""
+    size = plain.runs[0].times.size // 4
+    problem = ended(plain, dict.fromkeys(("sweep", "slow"), size))
+    problem = plants.turning_over(problem) if unstable else problem
+    found = Search(simulator(problem), only=[])
+    assert found.telling(plants.leaving(found, sizes)).names == expected
+    found.close()
+
+
+SWUNG = "unbalance at load.flange"
+
+
+@pytest.fixture(scope="module")
+def swung(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A disc with a weight that begins at angles which are not known."""
+    return plants.swinging(tmp_path_factory.mktemp("weight"), 0.02)
+
+
+def started(search: Search) -> tuple[Fitted, Fitted]:
+    """The declared model and one with the weight, fitted from wrong angles."""
+    base = search.calibrated()
+    stage = search.scored(base)
+    search.tried(base, stage, stage.signatures[0], again=False)
+    (fitted,) = stage.fitted
+    assert search.lacking(fitted)
+    return base, fitted
+
+
+class Astray(Search):
+    """Whose joint fits, and perhaps all others, end where a run has turned over."""
+
+    joint = alone = False
+
+    @staticmethod
+    def lost(fitted: Fitted) -> Fitted:
+        worse = replace(fitted.estimate, robust=fitted.estimate.robust + 1e4)
+        return replace(fitted, estimate=worse)
+
+    def _with_late(self, simulator: Simulator, theta: Vector) -> Fitted:
+        found = super()._with_late(simulator, theta)
+        return self.lost(found) if self.joint else found
+
+    def fitted(
+        self,
+        simulator: Simulator,
+        theta: Vector,
+        close: Estimate | None = None,
+        *,
+        share: float = QUICKLY,
+    ) -> Fitted:
+        found = super().fitted(simulator, theta, close, share=share)
+        return self.lost(found) if self.alone else found
+
+
+@pytest.mark.parametrize(
+    ("joint", "alone", "last"),
+    [(False, False, "fitted with them"), (True, False, "with them and hardly another change"),
+     (True, True, "")],
+)  # fmt: skip
+def test_start_values_stay_where_a_joint_fit_loses_them(
+    swung: Problem, joint: bool, alone: bool, last: str
+) -> None:
+    """And what has been tried in vain is not tried again."""
+    said: list[str] = []
+    known = [c for c in candidates(swung) if c.label == SWUNG]
+    search = Astray(simulator(swung), said.append, only=known)
+    base, winner = started(search)
+    search.joint, search.alone = joint, alone
+    del said[:]
+    found = search.released(winner, base)
+    steps = ["start values of the runs estimated", *([last] if last else [])]
+    assert [text.partition(":")[0] for text in said] == steps
+    assert (found is winner) == (not last)
+    if last:
+        assert not search.lacking(found)
+        begun = [each["start"] for each in late_values(found.problem).values()]
+        psi = found.estimate.values["load.flange.unbalance.psi"]
+        # by half a turn, as far as a negative weight goes
+        away = np.sin(np.add(begun, psi) - plants.STARTS)
+        assert away == pytest.approx(np.zeros(len(begun)), abs=0.1)
+    count = len(said)
+    assert search.released(found, base) is found
+    assert len(said) == count
+    search.close()
+
+
+def test_start_values_that_cannot_be_estimated_leave_the_winner(swung: Problem) -> None:
+    """They are those of a shaft that the model lacks."""
+    said: list[str] = []
+    known = [c for c in candidates(swung) if c.label == SWUNG]
+    problem = plants.turning_over(swung, "load.gear.angle")
+    search = Search(simulator(problem), said.append, only=known)
+    base, winner = started(search)
+    del said[:]
+    assert search.released(winner, base) is winner
+    (text,) = said
+    assert text.startswith("start values of the runs could not be estimated: ")
+    assert "has no variable 'gear.angle'" in text
+    # without such values nothing is simulated for them
+    search.taken(search.raw.changed(late=()))
+    anew, spent = replace(winner, estimate=replace(winner.estimate)), search.simulator.budget.spent
+    assert search.released(anew, base) is anew
+    assert search.simulator.budget.spent == spent and len(said) == 1
+    search.close()
+
+
+RUB, DRAG = "coulomb at load.flange", "quadratic_drag at load.flange"
+
+
+@pytest.fixture(scope="module")
+def rubbing(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A disc with dry friction, and no drag."""
+    folder = tmp_path_factory.mktemp("friction")
+    return read_problem(disc.write(folder, lambda w, theta, t: 0.08 * math.tanh(w / 0.02)))
+
+
+def added(search: Search, *labels: str) -> Fitted:
+    """The model with some effects, thoroughly fitted."""
+    effects = [c for c in search.known if c.label in labels]
+    problem = search.raw
+    for effect in effects:
+        problem = effect.added_to(problem)
+    theta = problem.nominal
+    theta[problem.index("load.flange.coulomb.tau_c")] = 0.05
+    found = search.judged(fit(search.simulator.of(problem), theta, effort=CORRECTION))
+    found.effects = tuple(effects)
+    search.note(found)
+    return found
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_effect_without_which_nothing_runs_is_not_dropped(
+    rubbing: Problem, monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    """Only the call of the FMU is a stand-in: none of the small ones fails without an effect."""
+    said: list[str] = []
+    known = [c for c in candidates(rubbing) if c.label in (RUB, DRAG)]
+    search = Search(simulator(rubbing), said.append, only=known)
+    search.note(search.calibrated())
+    model = added(search, RUB, DRAG)
+    simulate = Simulator.simulate
+
+    def called(self: Simulator, theta: Vector, run: MeasuredRun | str) -> Vector:
+        if self.problem.values(theta, run)["load.flange.quadratic_drag.c"] == 0.0:
+            raise FmuCallError("it runs away")
+        return simulate(self, theta, run)
+
+    if fails:
+        monkeypatch.setattr(Simulator, "simulate", called)
+    del said[:]
+    found = examined(search, model, 80)
+    if fails:
+        assert found is model
+        assert search.memo.failed == {frozenset({RUB})}
+        assert said == [f"without {DRAG}: it runs away"]
+    else:  # else it would be
+        assert found.labels == {RUB}
+        assert not search.memo.failed
+        assert said == [f"dropped again: {DRAG}"]
+    search.close()
+
+
+def test_a_model_that_cannot_be_fitted_thoroughly_stays_as_it_is(rubbing: Problem) -> None:
+    said: list[str] = []
+    known = [c for c in candidates(rubbing) if c.label == RUB]
+    search = Search(simulator(rubbing), said.append, only=known)
+    base = search.calibrated()
+    model = added(search, RUB)
+    theta = model.estimate.theta.copy()
+    theta[model.problem.index("J")] = -0.02  # its FMU refuses that
+    quick = replace(model, estimate=replace(model.estimate, theta=theta))
+    assert search.sharpened(quick, base) is quick
+    assert said[-1].startswith(f"{RUB} could not be fitted thoroughly: load.J: J = -0.02 kg.m2 is")
+    sharp = search.sharpened(model, base)
+    assert sharp is not model and sharp.labels == model.labels
+    search.close()
