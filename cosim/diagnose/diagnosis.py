@@ -17,39 +17,30 @@ from ..calibrate.input_noise import propagated
 from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
-from ..errors import CosimError, UnbuiltError
+from ..errors import CosimError
 from .adding import made_of
-from .answer import Verdict, percent
+from .answer import Verdict
 from .bursts import bursts, times
 from .candidates import candidates
 from .carriers import leave_fmus
+from .course import Course, asked_everywhere, asked_single
 from .established import examined
 from .experiment import propose
 from .facts import Table
-from .fitter import BRINGS
 from .foreign import Adapter, attached
 from .foreign_file import leave_system
 from .foreign_words import placed
 from .further import Further, looked
-from .grey_box import Site, single, site, unnamed
+from .grey_box import Site, site, unnamed
 from .left_over import left_over
-from .localise import everywhere, localise
-from .models import Fitted, is_open
-from .power import power
-from .result import PURPOSES, Diagnosis
-from .rivals import elsewhere, reconsidered, simplified
-from .rounds import Round
+from .localise import localise
+from .models import Fitted
+from .result import Diagnosis
+from .rivals import elsewhere, simplified
 from .search import ROUNDS, Search
-from .second_look import around_nominal, tests_of, without_slow_parts
 from .table import candidates_of, table_of
-from .together import ahead, together
-from .unstable import ends
-from .verdict import HALF, above, decide, proposal, unasked
-from .whiteness import CALIBRATED
+from .verdict import above, decide, proposal, unasked
 
-ALL = 0.9
-"""Share of the worst run that a free curve at one place must explain for one law there to be asked
-before further rounds: nine knots follow a law no better."""
 TURNS = 4
 """Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
 free force would still explain, and may give way to another one once."""
@@ -218,17 +209,18 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
     result.asked, why = asked is not None, ""
+    rounds = ROUNDS if asked is None else 0
     try:
-        current = _found(result, search, base, asked)
+        current = Course(result, search, base, rounds).followed()
         if search.narrow and search.lacking(current):
             search.widened()
-            current = _found(result, search, current, asked)
+            current = Course(result, search, current, rounds).followed()
         _judged(result, search, current)
         assert result.after is not None
         if asked or (task.law and result.verdict == "unexplained"):
             if asked is None and not search.raw.late:
-                _placed(result)
-                _single(result)
+                asked_everywhere(result)
+                asked_single(result)
             lacking = search.cut(result.after) if result.ended else result.after
             result.law = unnamed(search, lacking, result.located, asked, result.single)
     except StoppedError as stopped:
@@ -259,101 +251,6 @@ def _written(result: Diagnosis, task: _Task) -> Diagnosis:
     return result
 
 
-def _found(result: Diagnosis, search: Search, base: Fitted, asked: Site | None) -> Fitted:
-    """The best model that rounds, and sets of effects along the log's motion, lead to."""
-    say = search.say
-    current = base
-    winners: list[Round] = []
-    proposed, whole = asked is not None, None
-    anew: Round | None = None  # around nominal values, asked once
-    waiting: Round | None = None
-    for number in range(ROUNDS if asked is None else 0):
-        say(f"round {number + 1}: {len(search.known)} candidates")
-        try:
-            if waiting is not None:
-                stage, winners, waiting = waiting, [], None
-                search.rounds.append(stage)
-            else:
-                stage = search.round(current)
-        except CosimError as error:  # what earlier rounds have found is kept
-            if not winners:
-                raise
-            result.warnings.append(f"no further effect was looked for: {error}")
-            say(result.warnings[-1])
-            break
-        if number == 0 and base is result.before:
-            result.power = power(stage, search.fitting)
-            result.warnings += [stage.unasked] if stage.failed else []
-            if stage.winner is not None or any(
-                s.structured for p in PURPOSES for s in tests_of(search, base, p)
-            ):
-                say("where does it enter?")
-                ranked = [s.candidate for s in stage.signatures]
-                result.located = localise(search, base, ranked, say)
-        if stage.winner is not None and winners and _slight(search, stage, say):
-            stage.winner = None
-        if stage.winner is None:
-            current = stage.base
-            found = reconsidered(search, current, winners)
-            if found is not current:
-                current = found
-                continue
-            if anew is None and (anew := around_nominal(search, current)) is not None:
-                waiting = anew
-                continue
-            break
-        say(f"added: {stage.winner.effects[-1].label}")
-        winners.append(stage)
-        current = stage.winner
-        one_place = bool(result.located) and result.located[0].curves[0].explained > ALL
-        if stage.open and not proposed and one_place and not search.raw.late:
-            _placed(result)
-            _single(result)
-        one = result.single
-        if stage.open and not proposed and (ahead(search) or (one is not None and one.enough)):
-            proposed, found = True, _together(result, current)
-            if found is not current and not search.lacking(found):
-                whole = found
-        if whole is not None and len(whole.effects) <= len(current.effects) + 1:
-            break  # else rounds may do with fewer laws
-        one = result.single
-        if one is not None and one.enough and search.lacking(current):
-            break  # named laws elsewhere could only describe it worse
-        shortened = _shortened(result, winners, current)
-        if not any(s.structured for p in PURPOSES for s in tests_of(search, shortened, p)):
-            current = without_slow_parts(search, reconsidered(search, shortened, winners))
-            if anew is None and (anew := around_nominal(search, current)) is not None:
-                waiting = anew
-                continue
-            break
-        current = shortened
-    else:
-        current = reconsidered(search, current, winners)
-    if whole is not None and (search.lacking(current) or search.gains(current, whole)[0] > 0.0):
-        current = whole
-    if not proposed and any(s.structured for p in PURPOSES for s in tests_of(search, current, p)):
-        current = _together(result, current)
-    if winners and winners[-1].open and is_open(current.estimate):  # only drafted so far
-        current = search.sharpened(current, winners[-1].base)
-    return current
-
-
-def _slight(search: Search, stage: Round, say: Callable[[str], None]) -> bool:
-    """Whether a further law takes next to nothing of what is evidently still missing.
-
-    It is not what is missing then, and further ones on top of it would mislead.
-    """
-    base, winner = stage.base, stage.winner
-    assert winner is not None
-    noise = 0.5 * base.estimate.count
-    beyond, gained = base.estimate.robust - noise, search.gain(base, winner)
-    if search.raw.unstable or beyond < (CALIBRATED**2 - 1.0) * noise or gained > BRINGS * beyond:
-        return False
-    share = percent(max(gained, 0.0) / beyond)
-    say(f"not added: {winner.effects[-1].label}, {share} of what is left")
-    return True
-
-
 def _stopped(result: Diagnosis, search: Search, why: str) -> None:
     """The verdict on the fits that there are; one that was reached before stays."""
     search.say(f"stopped {why}")
@@ -363,49 +260,6 @@ def _stopped(result: Diagnosis, search: Search, why: str) -> None:
     forces = {frozenset[str](): result.located} if result.located else {}
     result.table = table_of(search, search.rounds, forces, result.ended, why)
     result.answer, result.after = decide(result.table), result.before
-
-
-def _placed(result: Diagnosis) -> None:
-    """Where what the declared model lacks may enter, asked at all places, once."""
-    search, base = result.search, result.before
-    assert search is not None and base is not None
-    if not result.everywhere:
-        search.say("where does it enter? Asked at all places")
-        result.located, result.everywhere = everywhere(search, base, search.say), True
-
-
-def _single(result: Diagnosis) -> None:
-    """The best law of signals of one place, asked once."""
-    search, base = result.search, result.before
-    assert search is not None and base is not None
-    if result.single is None:
-        result.single = one = single(search, base, result.located)
-        beyond = base.estimate.robust - 0.5 * base.estimate.count
-        gained = search.gain(base, one.law.fitted) if one is not None and one.law else 0.0
-        if one is not None and gained > HALF * beyond:
-            result.located.sort(key=lambda place: place.label != one.label)
-
-
-def _together(result: Diagnosis, current: Fitted) -> Fitted:
-    """The best set of effects by evidence along the log's motion, or the given model.
-
-    Of those at one place alone, and where one law does as well, if one law there would do.
-    """
-    search = result.search
-    assert search is not None
-    if search.raw.late:  # start values that decide when casters turn over hide first orders
-        return current
-    _placed(result)
-    _single(result)
-    one = result.single
-    enough = one is not None and one.enough
-    only = [site.shaft for site in (one.site, *one.alike)] if one is not None and enough else []
-    try:
-        return together(search, current, result.located, only)
-    except UnbuiltError as error:
-        result.warnings.append(f"sets of effects were not compared along the log: {error}")
-        search.say(result.warnings[-1])
-        return current
 
 
 def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
@@ -455,30 +309,6 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
         rival = search.memo.get(names)
         assert rival is not None
         result.experiment = propose(current, rival)
-
-
-def _shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitted:
-    """The model judged by runs that end where it has left them by an instability."""
-    search = result.search
-    assert search is not None
-    if not search.raw.late or winners[-1].open or not search.lacking(current):
-        return current
-    names = [*search.fitting.names, *search.checking.names]
-    try:
-        sizes = ends(current.simulator, current.estimate.theta, list(dict.fromkeys(names)))
-    except CosimError as error:  # it runs so well that a small change is too much
-        search.say(f"where runs turn unstable is not known: {error}")
-        return current
-    if not sizes:
-        return current
-    for name, size in sizes.items():
-        result.ended[name] = float(current.problem.run(name).logged[size])
-    until = ", ".join(f"{name} to {result.ended[name]:.2f} s" for name in sizes)
-    search.say(f"unstable from there on, so runs count up to where the model leaves them: {until}")
-    current = reconsidered(search, current, winners)
-    for stage in winners:
-        stage.open = False  # their rivals have had their turn
-    return search.shortened(current, sizes)
 
 
 def _look_further(result: Diagnosis) -> None:

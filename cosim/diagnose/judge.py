@@ -196,7 +196,7 @@ class Judge:
 
     def total(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on all runs."""
-        return self.gain(base, other) + (other.gate.gain if other.gate is not None else 0.0)
+        return self.gains(base, other)[0]
 
     def apart(self, first: Fitted, second: Fitted) -> bool:
         """Whether the runs tell two models apart."""

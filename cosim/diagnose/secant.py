@@ -153,6 +153,8 @@ class Bench:
         while trials.best is None and trials.open:
             self.more(trials)
         found = trials.best
+        if found is not None and found.unseen:
+            self._weaker(trials)
         if found is None or not trials.open:
             return
         if not np.any(found.change):
@@ -163,6 +165,18 @@ class Bench:
                 break
             trials.tried, trials.open = trials.tried[-1:], True
             trials.value = trials.tried[-1] * float(np.sqrt(max(abs(trials.wish), 1.0 / RUNAWAY)))
+            self.more(trials)
+
+    def _weaker(self, trials: Trials) -> None:
+        """Once more with less of what calibration absorbs in whole where it changes very much.
+
+        A spring that holds a shaft is as good as a larger inertia.
+        """
+        found = trials.best
+        assert found is not None
+        size = self.stack.largest(found.change.astype(np.float64))
+        if size > BEYOND:
+            trials.value, trials.open, trials.tried = found.value * BEYOND / size, True, []
             self.more(trials)
 
     def _scanned(self, trials: Trials) -> None:
@@ -469,9 +483,12 @@ def _shared(trials: list[Trials]) -> list[Trials]:
     return [t for t in trials if t.rough]
 
 
-def _mismatch(item: Signature) -> float:
-    """How far the strength of the trial is from the one that the residual asks for."""
-    return abs(float(np.log(max(item.score.amplitude, 1e-6))))
+def _mismatch(item: Signature) -> tuple[bool, float]:
+    """How far the strength of the trial is from the one that the residual asks for.
+
+    Farther than any, if calibration absorbs all that the strength does.
+    """
+    return item.unseen, abs(float(np.log(max(item.score.amplitude, 1e-6))))
 
 
 def patience(base: Simulator) -> dict[str, float]:

@@ -163,12 +163,12 @@ def gaining(judge: Judge, candidate: Candidate, gain: float, z: float = 9.0) -> 
 
 
 def fitted(judge: Judge, base: Fitted, candidate: Candidate, gain: float) -> Fitted:
-    """A quick fit of a candidate that gains so much on all runs; unused ones want it."""
+    """A quick fit of a candidate that gains so much on fitted runs; unused ones want it."""
     (probe,) = single(base.problem, [candidate])
     problem = probe.problem.hold({p.name: p.nominal for p in probe.others})
     estimate = replace(
         base.estimate, simulator=simulator(problem), theta=problem.nominal,
-        robust=base.estimate.robust - 1.0 - (gain - WANTED.gain),
+        robust=base.estimate.robust - 1.0 - gain,
     )  # fmt: skip
     # by as much as a law must change a channel at least
     return Fitted(

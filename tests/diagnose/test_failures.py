@@ -93,7 +93,7 @@ def test_a_round_that_fails_leaves_what_others_have_found(
 
     monkeypatch.setattr(Search, "scored", once)
     # sets along the log would find both at once
-    monkeypatch.setattr("cosim.diagnose.diagnosis._together", lambda result, current: current)
+    monkeypatch.setattr("cosim.diagnose.course.proposed_set", lambda result, current: current)
     result = diagnose(problem, workers=1, law=False)
     assert "no further effect was looked for: a step failed" in result.warnings
     assert any(model.laws and not model.rough for model in result.table.models)

@@ -16,7 +16,7 @@ from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import Diagnosis
 from cosim.diagnose.answer import Verdict
-from cosim.diagnose.diagnosis import _shortened
+from cosim.diagnose.course import shortened
 from cosim.diagnose.left_over import left_over
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
@@ -131,7 +131,7 @@ def test_further_effects_are_looked_for_before_that(
     first = problem.chosen("identification")[0]
     result, search, model, stage = found_in(problem)
     assert search.lacking(model) == gone
-    found = _shortened(result, [stage], model)
+    found = shortened(result, [stage], model)
     assert not search.lacking(found)
     assert (found is not model) == (search.fit_data.size < model.fit.size) == gone
     middle = float(first.times[first.times.size // 2])
@@ -152,6 +152,6 @@ def test_where_a_changed_value_cannot_be_simulated_runs_count_in_full(
     def fails(*_: Any) -> dict[str, int]:
         raise FmuCallError("it runs away")
 
-    monkeypatch.setattr("cosim.diagnose.diagnosis.ends", fails)
-    assert _shortened(result, [stage], model) is model
+    monkeypatch.setattr("cosim.diagnose.course.ends", fails)
+    assert shortened(result, [stage], model) is model
     assert said[-1] == "where runs turn unstable is not known: it runs away"
