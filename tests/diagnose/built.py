@@ -38,6 +38,7 @@ late = true
 """
 """Where the disc stands when a run begins: not looked at before an effect explains the data."""
 Laws = Mapping[str, disc.Law]
+NOTHING: Mapping[str, float] = {}
 
 
 def problem(
@@ -47,6 +48,7 @@ def problem(
     *,
     unstable: bool = False,
     angle: float = 0.0,
+    late: Mapping[str, float] = NOTHING,
 ) -> Problem:
     """A disc in three runs, one of them unused.
 
@@ -56,6 +58,7 @@ def problem(
         seconds: that each run lasts.
         unstable: whether start angles may decide what comes of a run.
         angle: at which the disc stands when runs begin, which no mapping says [rad].
+        late: `delay` [s] or `clock_skew` of the clock by which runs were logged, small ones.
     """
     laws = law if isinstance(law, Mapping) else dict.fromkeys(FEW, law)
     disc.write(folder, lambda w, theta, t: 0.0, seconds=seconds, names=FEW)
@@ -63,6 +66,9 @@ def problem(
         disc.write(folder / name, laws[name], seed=seed, seconds=seconds, names=[name])
         table = np.loadtxt(folder / name / f"{name}.csv", delimiter=",", skiprows=1)
         table[:, 3] += angle
+        t, _, w, theta = disc.run(name, laws[name], seconds)
+        shift = late.get("delay", 0.0) + late.get("clock_skew", 0.0) * t
+        table[:, 2:] -= np.gradient(np.array([w, theta]), t, axis=1).T * shift[:, None]
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
     if unstable:
@@ -143,10 +149,11 @@ def rig(
     *,
     unstable: bool = False,
     angle: float = 0.0,
+    late: Mapping[str, float] = NOTHING,
 ) -> Iterator[Rig]:
     """See `problem`; the search ends with the context."""
     said: list[str] = []
-    plant = problem(folder, law, seconds, unstable=unstable, angle=angle)
+    plant = problem(folder, law, seconds, unstable=unstable, angle=angle, late=late)
     search = Search(simulator(plant), said.append, only=[])
     base = search.calibrated()
     search.note(base)
