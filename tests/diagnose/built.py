@@ -6,7 +6,7 @@ their judgement.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,8 +49,9 @@ def problem(
     unstable: bool = False,
     angle: float = 0.0,
     late: Mapping[str, float] = NOTHING,
+    names: Sequence[str] = FEW,
 ) -> Problem:
-    """A disc in three runs, one of them unused.
+    """A disc in a few runs, one of them unused.
 
     Args:
         folder: to write to.
@@ -58,17 +59,18 @@ def problem(
         seconds: that each run lasts.
         unstable: whether start angles may decide what comes of a run.
         angle: at which the disc stands when runs begin, which no mapping says [rad].
-        late: `delay` [s] or `clock_skew` of the clock by which runs were logged, small ones.
+        late: `delay` [s] or `clock_skew` of the clock by which runs were logged.
+        names: of the runs.
     """
-    laws = law if isinstance(law, Mapping) else dict.fromkeys(FEW, law)
-    disc.write(folder, lambda w, theta, t: 0.0, seconds=seconds, names=FEW)
-    for seed, name in enumerate(FEW):
+    laws = law if isinstance(law, Mapping) else dict.fromkeys(names, law)
+    disc.write(folder, lambda w, theta, t: 0.0, seconds=seconds, names=names)
+    for seed, name in enumerate(names):
         disc.write(folder / name, laws[name], seed=seed, seconds=seconds, names=[name])
         table = np.loadtxt(folder / name / f"{name}.csv", delimiter=",", skiprows=1)
         table[:, 3] += angle
-        t, _, w, theta = disc.run(name, laws[name], seconds)
-        shift = late.get("delay", 0.0) + late.get("clock_skew", 0.0) * t
-        table[:, 2:] -= np.gradient(np.array([w, theta]), t, axis=1).T * shift[:, None]
+        t, _, *logged = disc.run(name, laws[name], seconds)
+        seen = t - late.get("delay", 0.0) - late.get("clock_skew", 0.0) * t
+        table[:, 2:] += np.array([np.interp(seen, t, values) - values for values in logged]).T
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
     if unstable:
