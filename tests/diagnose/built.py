@@ -98,7 +98,9 @@ class Rig:
         known = candidates(self.search.raw)
         return next(c for c in known if (c.effect, c.place) == (effect, place))
 
-    def trace(self, base: Fitted, effect: str, *, place: str = FLANGE, **fixed: float) -> Signature:
+    def trace(
+        self, base: Fitted, effect: str, place: str = FLANGE, fixed: Mapping[str, float] = NOTHING
+    ) -> Signature:
         """An effect of which only fits are judged, with some of its parameters at other values."""
         (probe,) = single(base.problem, [self.candidate(effect, place)])
         found = unscored(probe)
@@ -109,23 +111,24 @@ class Rig:
         self,
         base: Fitted,
         effect: str,
+        values: Mapping[str, float],
         *,
         place: str = FLANGE,
-        held: Mapping[str, float] | None = None,
+        held: Mapping[str, float] = NOTHING,
         fit: bool = True,
-        **values: float,
     ) -> Fitted:
         """A model with a further effect.
 
         Args:
             base: the model without.
             effect, place: what is added.
-            held: its parameters that have other values than usual and stay there.
-            fit: whether parameters are fitted until that brings nothing more.
             values: its parameters that are fitted, with the values to begin with; all others are
                 held where they are usual.
+            held: its parameters that were tried at other values than usual, where they stay unless
+                they are fitted.
+            fit: whether parameters are fitted until that brings nothing more, or by one step.
         """
-        item = self.trace(base, effect, place=place, **(held or {}))
+        item = self.trace(base, effect, place, held)
         prefix = item.candidate.prefix
         whole = item.candidate.added_to(base.problem)
         fixed = {
@@ -157,7 +160,9 @@ def rig(
     said: list[str] = []
     plant = problem(folder, law, seconds, unstable=unstable, angle=angle, late=late)
     search = Search(simulator(plant), said.append, only=[])
-    base = search.calibrated()
-    search.note(base)
-    yield Rig(search, base, said)
-    search.close()
+    try:
+        base = search.calibrated()
+        search.note(base)
+        yield Rig(search, base, said)
+    finally:
+        search.close()

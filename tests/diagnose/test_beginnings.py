@@ -72,7 +72,7 @@ def test_a_strength_is_doubled_as_long_as_that_is_better(
         rig: a disc with friction.
         start, most, found: where it begins, its bound, and where it ends, over what is right.
     """
-    model = rig.added(rig.base, "coulomb", tau_c=SIZE, fit=False)
+    model = rig.added(rig.base, "coulomb", {"tau_c": SIZE}, fit=False)
     problem = model.problem.with_parameters(
         [replace(p, maximum=most * SIZE) if p.strength else p for p in model.problem.parameters]
     )
@@ -133,7 +133,7 @@ def near(rig: Rig, smoothing: float) -> tuple[Fitted, Fitted]:
     """
     rig.search.count_in_full(False)
     base = rig.search.recounted(rig.base)
-    return base, rig.added(base, "coulomb", held={"w_0": smoothing}, tau_c=SIZE, fit=False)
+    return base, rig.added(base, "coulomb", {"tau_c": SIZE}, held={"w_0": smoothing}, fit=False)
 
 
 def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(rig: Rig) -> None:

@@ -52,8 +52,8 @@ def dry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 def friction_laws(rig: Rig, asymmetry: float) -> tuple[Fitted, Fitted]:
     """Friction that may differ between the directions, by so much to begin with, and plain one."""
-    either = rig.added(rig.base, "asymmetric_coulomb", tau_c=DRY, a=asymmetry)
-    return either, rig.added(rig.base, "coulomb", tau_c=DRY)
+    either = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY, "a": asymmetry})
+    return either, rig.added(rig.base, "coulomb", {"tau_c": DRY})
 
 
 def test_a_bristle_of_which_only_friction_shows_is_that(tmp_path: Path) -> None:
@@ -63,9 +63,9 @@ def test_a_bristle_of_which_only_friction_shows_is_that(tmp_path: Path) -> None:
         return friction(w, theta, t) + 0.006 * math.sin(theta)
 
     with built.rig(tmp_path, law) as rig:
-        bristle = rig.added(rig.base, "bristle", held={"r": 0.0}, tau_c=DRY, x_0=5e-4)
-        coulomb = rig.added(rig.base, "coulomb", tau_c=DRY, w_0=USUAL)
-        other = rig.added(rig.base, "unbalance", m_u=0.006)
+        bristle = rig.added(rig.base, "bristle", {"tau_c": DRY, "x_0": 5e-4}, held={"r": 0.0})
+        coulomb = rig.added(rig.base, "coulomb", {"tau_c": DRY, "w_0": USUAL})
+        other = rig.added(rig.base, "unbalance", {"m_u": 0.006})
         near = frozenset({other.effects[-1]})
         fits = [bristle, coulomb, other]
         stage = Round(rig.base, [], {}, fitted=fits, winner=bristle, near=near)
@@ -104,8 +104,10 @@ def test_a_law_that_does_better_than_the_simpler_one_stays(tmp_path: Path) -> No
 
 def test_a_law_with_more_parameters_that_were_held_is_no_simpler_one(dry: Rig) -> None:
     """Friction with its smoothing free is not one of either direction, taken as the same."""
-    coulomb = dry.search.sharpened(dry.added(dry.base, "coulomb", tau_c=DRY, w_0=USUAL), dry.base)
-    either = dry.added(dry.base, "asymmetric_coulomb", tau_c=DRY)
+    coulomb = dry.search.sharpened(
+        dry.added(dry.base, "coulomb", {"tau_c": DRY, "w_0": USUAL}), dry.base
+    )
+    either = dry.added(dry.base, "asymmetric_coulomb", {"tau_c": DRY})
     assert not coulomb.estimate.identifiable[-1] and either.complexity < coulomb.complexity
     stage = Round(dry.base, [], {}, fitted=[coulomb, either], winner=coulomb)
     settle(dry.search, dry.base, stage)
@@ -126,9 +128,9 @@ def both(w: float, theta: float, t: float) -> float:
 
 def further(rig: Rig, effect: str, **values: float) -> tuple[Fitted, Fitted]:
     """A model with an unbalance, and with a further effect."""
-    quick = rig.added(rig.base, "unbalance", m_u=WEIGHT, psi=0.4)
+    quick = rig.added(rig.base, "unbalance", {"m_u": WEIGHT, "psi": 0.4})
     base = replace(rig.search.sharpened(quick, rig.base), p_value=0.003)
-    return base, rig.added(base, effect, **values)
+    return base, rig.added(base, effect, values)
 
 
 def asked(rig: Rig, base: Fitted, winner: Fitted) -> Round:
@@ -200,9 +202,9 @@ def test_one_without_which_nothing_can_be_simulated_stays(two: Rig) -> None:
 
 def test_first_effects_and_calm_systems_are_not_asked(two: Rig, dry: Rig) -> None:
     """Neither is a wrong one taken back, nor is anything simulated."""
-    wrong = two.added(two.base, "quadratic_drag", c=1e-4, fit=False)
-    first = dry.added(dry.base, "coulomb", tau_c=DRY)
-    beside = dry.added(first, "quadratic_drag", c=1e-4, fit=False)
+    wrong = two.added(two.base, "quadratic_drag", {"c": 1e-4}, fit=False)
+    first = dry.added(dry.base, "coulomb", {"tau_c": DRY})
+    beside = dry.added(first, "quadratic_drag", {"c": 1e-4}, fit=False)
     for rig, base, winner in ((two, two.base, wrong), (dry, first, beside)):
         before = rig.search.evaluations
         assert asked(rig, base, winner).winner is winner
@@ -214,8 +216,8 @@ def test_first_effects_and_calm_systems_are_not_asked(two: Rig, dry: Rig) -> Non
 
 def parted(rig: Rig, effect: str, **values: float) -> tuple[Fitted, Fitted]:
     """A model with friction one way and a further effect, and without the second one."""
-    first = rig.added(rig.base, "asymmetric_coulomb", tau_c=DRY)
-    whole = rig.added(first, effect, **values)
+    first = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY})
+    whole = rig.added(first, effect, values)
     return rig.search.without(whole, whole.effects[-1]), whole
 
 
@@ -244,8 +246,8 @@ def test_parameters_that_bring_nothing_stay_held(tmp_path: Path) -> None:
 
 
 def test_a_law_without_such_parameters_is_not_fitted_again(dry: Rig) -> None:
-    less = dry.added(dry.base, "quadratic_drag", c=1e-4, fit=False)
-    whole = dry.added(less, "coulomb", tau_c=DRY)
+    less = dry.added(dry.base, "quadratic_drag", {"c": 1e-4}, fit=False)
+    whole = dry.added(less, "coulomb", {"tau_c": DRY})
     before = dry.search.evaluations
     assert freed(dry.search, less, whole) is less and dry.search.evaluations == before
 

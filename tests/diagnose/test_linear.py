@@ -104,7 +104,7 @@ def test_a_shift_below_the_tick_of_the_rig_has_no_name(
     """Though the data show it well."""
     with built.rig(tmp_path, lambda w, theta, t: 0.0, late={effect: size}) as rig:
         quantity = {"delay": "t_d", "clock_skew": "skew"}[effect]
-        found = rig.added(rig.base, effect, place="log.load.outputs", **{quantity: size})
+        found = rig.added(rig.base, effect, {quantity: size}, place="log.load.outputs")
         assert found.estimate.theta[-1] == pytest.approx(size, rel=0.3)
         assert rig.search.accepted(rig.base, found)
         rig.search.taken(rig.search.raw.changed(tick=TICK))
@@ -137,8 +137,8 @@ def moved(fitted: Fitted) -> Fitted:
 @pytest.mark.parametrize("asymmetry", [0.0, 0.3])
 def test_the_simpler_law_wins_a_tie(tmp_path: Path, asymmetry: float) -> None:
     with built.rig(tmp_path, friction(asymmetry)) as rig:
-        best = rig.added(rig.base, "asymmetric_coulomb", tau_c=0.03, a=asymmetry)
-        simple = rig.added(rig.base, "coulomb", tau_c=0.03)
+        best = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": 0.03, "a": asymmetry})
+        simple = rig.added(rig.base, "coulomb", {"tau_c": 0.03})
         assert rig.search.apart(simple, best) == (asymmetry > 0.0)
         chosen = rig.search.simplest(rig.base, best, [best, simple])
     assert chosen is (best if asymmetry else simple)
@@ -149,9 +149,9 @@ def test_the_same_law_elsewhere_must_do_as_well_to_a_hair(tmp_path: Path) -> Non
     """With fewer parameters; a parameter more may make up for another place."""
     with built.rig(tmp_path, friction(0.0)) as rig:
         search, base = rig.search, rig.base
-        best = rig.added(base, "coulomb", tau_c=0.03, w_0=2e-3)
+        best = rig.added(base, "coulomb", {"tau_c": 0.03, "w_0": 2e-3})
         other = replace(best, signature=rig.trace(base, "stribeck"))  # of another quantity
-        twin = rig.added(base, "coulomb", tau_c=0.03)
+        twin = rig.added(base, "coulomb", {"tau_c": 0.03})
         assert twin.gate is not None
         for share, wanted in ((5e-6, True), (2e-5, False)):
             more = search.total(base, best) * (1.0 - share) - search.total(base, twin)
@@ -266,9 +266,9 @@ def test_one_stretch_that_is_far_off_does_not_decide_where_runs_turn_unstable(
 def test_a_value_that_was_tried_from_a_list_counts(tmp_path: Path) -> None:
     """Cogging with one cycle per turn is an unbalance that had its number of cycles chosen."""
     with built.rig(tmp_path, lambda w, theta, t: 0.01 * math.sin(theta + 0.5)) as rig:
-        unbalance = rig.added(rig.base, "unbalance", m_u=0.01, psi=0.5)
-        cogging = rig.added(rig.base, "cogging", held={"n": 1.0}, tau_c=0.01, psi=0.5)
-        free = rig.added(rig.base, "cogging", tau_c=0.01, psi=0.5, n=1.0)
+        unbalance = rig.added(rig.base, "unbalance", {"m_u": 0.01, "psi": 0.5})
+        cogging = rig.added(rig.base, "cogging", {"tau_c": 0.01, "psi": 0.5}, held={"n": 1.0})
+        free = rig.added(rig.base, "cogging", {"tau_c": 0.01, "psi": 0.5, "n": 1.0})
         assert not rig.search.apart(unbalance, cogging)
         assert rig.search.simplest(rig.base, cogging, [cogging, unbalance]) is unbalance
     assert cogging.free == unbalance.free and cogging.complexity == unbalance.complexity + 1

@@ -111,7 +111,7 @@ def test_an_effect_among_others_does_what_it_does_alone(
                 values.append(model_values(simulator(one.problem), theta, layout))
                 simulator(one.problem).close()
             # effects of strength 0 are absent exactly, so nothing but bits may be compared
-            assert np.array_equal(*values)
+            assert np.array_equal(values[0], values[1])
 
 
 def effects_of(batch: Batch) -> set[str]:

@@ -34,7 +34,9 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 def model(rig: Rig, usual: float) -> Fitted:
     """The law with both parameters free, one of which was tried at a usual value before."""
-    return rig.added(rig.base, "bearing_drag", held={"w_ref": usual}, tau_ref=DRAG, w_ref=AT)
+    return rig.added(
+        rig.base, "bearing_drag", {"tau_ref": DRAG, "w_ref": AT}, held={"w_ref": usual}
+    )
 
 
 def held(rig: Rig, fitted: Fitted) -> Fitted:
@@ -72,6 +74,6 @@ def test_it_stays_free_where_declared_parameters_undo_the_strength(rig: Rig) -> 
 def test_it_stays_free_where_the_strength_is_known(tmp_path: Path) -> None:
     """What else is open, another law undoes, which is one too many."""
     with built.rig(tmp_path, lambda w, theta, t: 0.01 * math.tanh(w / 2e-3)) as rig:
-        before = rig.added(rig.base, "coulomb", tau_c=0.01, w_0=2e-3)
+        before = rig.added(rig.base, "coulomb", {"tau_c": 0.01, "w_0": 2e-3})
         assert before.estimate.identifiable.tolist() == [True, True, True, False]
         assert held(rig, before) is before

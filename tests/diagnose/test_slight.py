@@ -41,7 +41,7 @@ def further(rig: Rig, base: Fitted, effect: str) -> Fitted:
     values = {"unbalance": ("m_u", WEIGHT), "coulomb": ("tau_c", FRICTION),
               "quadratic_drag": ("c", DRAG)}  # fmt: skip
     name, value = values[effect]
-    return rig.search.sharpened(rig.added(base, effect, **{name: value}), base)
+    return rig.search.sharpened(rig.added(base, effect, {name: value}), base)
 
 
 def beyond(fitted: Fitted) -> float:
