@@ -119,7 +119,7 @@ def test_a_law_with_more_parameters_that_were_held_is_no_simpler_one(dry: Rig) -
 
 def little(w: float, theta: float, t: float) -> float:
     """Some friction beside what no law explains."""
-    return weight(w, theta, t) + 0.002 * math.tanh(w / 0.01) + 0.006 * math.sin(9.0 * t)
+    return weight(w, theta, t) + 0.002 * math.tanh(w / 0.01) + 0.005 * math.sin(9.0 * t)
 
 
 def both(w: float, theta: float, t: float) -> float:
