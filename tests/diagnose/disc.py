@@ -69,6 +69,8 @@ RUNS = {
     "sweep": "identification", "steps": "identification", "slow": "identification",
     "check": "validation", "again": "validation",
 }  # fmt: skip
+SWING = 14.0
+"""Of a run `swing` that a test may ask for, which has one frequency [rad/s]."""
 
 
 def torque(name: str, t: Vector) -> Vector:
@@ -79,6 +81,8 @@ def torque(name: str, t: Vector) -> Vector:
         return np.asarray(0.4 * np.sign(np.sin(1.7 * t + 0.4)))
     if name == "slow":
         return np.asarray(0.3 * np.sin(1.1 * t) + 0.1)
+    if name == "swing":
+        return np.asarray(0.4 * np.sin(SWING * t))
     if name == "check":
         return np.asarray(0.35 * np.sin(2.3 * t) + 0.25 * np.sin(5.1 * t + 1.0))
     return np.asarray(0.3 * np.sign(np.sin(1.2 * t)) + 0.2 * np.sin(3.0 * t))
@@ -121,7 +125,8 @@ def write(
                    theta + SIGMA["theta"] * random.standard_normal(w.size)]  # fmt: skip
         np.savetxt(folder / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
-        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{RUNS[name]}"\n'
+        purpose = RUNS.get(name, "identification")
+        text += f'\n[[run]]\nname = "{name}"\nfile = "{name}.csv"\npurpose = "{purpose}"\n'
     (folder / "dataset.toml").write_text(text, encoding="utf-8")
     (folder / "system.toml").write_text(SYSTEM, encoding="utf-8")
     return folder

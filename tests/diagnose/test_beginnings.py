@@ -2,130 +2,171 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cosim.calibrate.parts import Parameter
-from cosim.diagnose import rivals
-from cosim.diagnose.fitter import Fitter
-from cosim.diagnose.secant import Bench
-from cosim.errors import FmuCallError
-from cosim.spec.hints import SearchHints
+from cosim.calibrate.mapping import read_problem
+from cosim.diagnose.candidates import delays
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.rivals import _sharpest
+from cosim.diagnose.search import Search
+from tests.diagnose import built, disc
+from tests.diagnose.built import Rig
+from tests.problems import simulator
+
+USUAL, SIZE = 2e-3, 0.1
+"""Speed over which a sign is smoothed [rad/s], and friction [N.m]."""
+STRENGTH, SMOOTHING = "load.flange.coulomb.tau_c", "load.flange.coulomb.w_0"
+LATE = 0.7 * 2.0 * math.pi / disc.SWING
+"""Of a clock [s]: it seems to be early by three tenths of a period."""
 
 
-def search(best: float, place: int = 0) -> Any:
-    """Costs that are least at one value, as of play or of a smoothed sign."""
-    cost = lambda _, theta: 1e3 * abs(np.log(theta[place] / best))  # noqa: E731
-    return SimpleNamespace(cost=cost, simulator=SimpleNamespace(of=lambda problem: problem))
+def dry(w: float, theta: float, t: float) -> float:
+    return SIZE * math.tanh(w / USUAL)
 
 
-@pytest.mark.parametrize(("best", "found"), [(9.0, 8.0), (0.5, 1.0), (1e9, 16.0)])
-def test_a_strength_is_doubled_as_long_as_that_is_better(best: float, found: float) -> None:
-    """And never past its bound; not at all where the first order was right or asked for more."""
-    problem: Any = SimpleNamespace(index=lambda _: 0, lower=np.array([0.0]), upper=np.array([16.0]))
-    start, it = np.array([1.0]), search(best)
-    end = Fitter._doubled(it, SimpleNamespace(problem=problem), start, it.cost(None, start), "gap")
-    assert end[0] == found and start[0] == 1.0
+def creeping(w: float, theta: float, t: float) -> float:
+    return SIZE * math.tanh(w / (100.0 * USUAL))
 
 
-def test_up_to_the_usual_strength_all_are_tried() -> None:
-    """Play far below the right one shifts an oscillation the wrong way, and does harm."""
-    costs = {1e-4: 50.0, 2e-4: 90.0, 4e-4: 120.0, 8e-4: 99.0, 1.6e-3: 10.0, 3.2e-3: 80.0}
-    asked: list[float] = []
-
-    def cost(_: Any, theta: Any) -> float:
-        asked.append(theta[0])
-        return costs[min(costs, key=lambda gap: abs(gap - theta[0]))]
-
-    problem: Any = SimpleNamespace(index=lambda _: 0, lower=np.array([0.0]), upper=np.array([1.0]))
-    it, start = SimpleNamespace(cost=cost), np.array([1e-4])
-    simulator: Any = SimpleNamespace(problem=problem)
-    end = Fitter._doubled(it, simulator, start, 50.0, "gap", 1e-3)  # type: ignore[arg-type]
-    assert end[0] == pytest.approx(1.6e-3) and len(asked) == 5
-    # not where the first order holds
-    asked.clear()
-    end = Fitter._doubled(it, simulator, start, 50.0, "gap")  # type: ignore[arg-type]
-    assert end[0] == 1e-4 and len(asked) == 1
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A disc with dry friction."""
+    with built.rig(tmp_path_factory.mktemp("dry"), dry, unstable=True) as found:
+        yield found
 
 
-@pytest.mark.parametrize(("best", "power"), [(2e-3, 0), (1e-5, 2), (1e-9, 3)])
-def test_a_law_begins_as_sharp_as_the_data_want_it(
-    monkeypatch: pytest.MonkeyPatch, best: float, power: int
-) -> None:
-    w_0 = Parameter("w_0", "rad/s", 2e-3, 1e-6, 1.0, ())
-    angle = Parameter("angle", "rad", 0.1, -1.0, 1.0, ())  # smooths nothing: its bound is not 0
-    whole: Any = SimpleNamespace(parameters=[w_0, angle])
-    monkeypatch.setattr(rivals, "_begun", lambda _, values, fixed: (None, np.array([fixed["w_0"]])))
-    fixed = {"w_0": 2e-3, "angle": 0.1}
-    found = rivals._sharpest(search(best), whole, {}, fixed)
-    assert found == {"w_0": pytest.approx(2e-3 * 0.1**power), "angle": 0.1}
+@pytest.fixture(scope="module")
+def late(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Search]:
+    """A disc that swings at one frequency, whose speed has been logged late."""
+    folder = disc.write(
+        tmp_path_factory.mktemp("late"), lambda w, theta, t: 0.0, seconds=2.4, names=["swing"]
+    )
+    table = np.loadtxt(folder / "swing.csv", delimiter=",", skiprows=1)
+    shift = round(LATE / disc.INTERVAL)
+    table[shift:, 2] = table[:-shift, 2]
+    table[:shift, 2] = 0.0
+    np.savetxt(folder / "swing.csv", table, delimiter=",", header="time,tau,w,theta", comments="")
+    search = Search(simulator(read_problem(folder)), only=[])
+    yield search
+    search.close()
 
 
-def test_of_usual_strengths_the_best_is_kept_though_none_leads_there() -> None:
-    """A residual that swings at one frequency says nothing at another."""
-    gains = {1.0: 0.1, 2.0: 50.0, 4.0: 0.2}
-
-    def measured(_: Any, value: float, change: float) -> Any:
-        return SimpleNamespace(value=value, score=SimpleNamespace(gain=gains[value]))
-
-    def simulated(_: Any, values: dict[str, float]) -> float:
-        if values["c"] == 8.0:
-            raise FmuCallError("it took too long")
-        return 0.0
-
-    probe = SimpleNamespace(
-        strength=SimpleNamespace(hints=SearchHints(tries=(1.0, 2.0, 4.0, 8.0))), problem=None,
-        values=lambda value, *_: {"c": value},
-    )  # fmt: skip
-    trials: Any = SimpleNamespace(probe=probe, second=0.0, fixed={}, best=None, open=True)
-    bench: Any = SimpleNamespace(_measure=measured, at=simulated, model=0.0)
-    Bench._scanned(bench, trials)
-    assert trials.best.value == 2.0 and not trials.open
+# -- larger strengths ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("unstable", "cost", "sharp"),
-    [(True, 5.0, True), (True, 99.0, False), (False, 5.0, False), (True, None, False)],
+    ("start", "most", "found"), [(0.13, 1.0, 1.0), (0.5, 1.0, 1.0), (0.13, 0.4, 0.4), (1.3, 2, 1.3)]
 )
-def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(
-    monkeypatch: pytest.MonkeyPatch, unstable: bool, cost: float | None, sharp: bool
+def test_a_strength_is_doubled_as_long_as_that_is_better(
+    rig: Rig, start: float, most: float, found: float
 ) -> None:
-    """And kept so only if it is better; one that cannot be simulated changes nothing."""
-    tau_c = Parameter("law.tau_c", "N.m", 0.0, 0.0, 10.0, (), strength=True, span=0.3)
-    w_0 = Parameter("law.w_0", "rad/s", 2e-3, 1e-6, 1.0, ())
-    held: list[dict[str, float]] = []
+    """To a power of two, never past its bound; not at all where it is right or too large.
 
-    whole = SimpleNamespace(names=["law.tau_c"], parameters=[], runs=())
-    whole.with_parameters = lambda _: whole
-    whole.changed = lambda **_: whole
-    whole.hold = lambda values: held.append(values) or whole
-
-    def fitted(problem: Any, theta: Any, close: Any) -> Any:
-        assert theta.tolist() == [0.5]
-        if cost is None:
-            raise FmuCallError("it took too long")
-        return SimpleNamespace(estimate=SimpleNamespace(robust=cost))
-
-    monkeypatch.setattr("cosim.diagnose.fitter.new_parameters", lambda *_: ([tau_c], [w_0]))
-    monkeypatch.setattr("cosim.diagnose.fitter.replace", lambda item, **new: (item, new))
-    candidate = SimpleNamespace(label="law", added_to=lambda _: whole)
-    item = SimpleNamespace(candidate=candidate, fixed={})
-    estimate = SimpleNamespace(values={"law.tau_c": 0.5}, robust=90.0, count=2)
-    problem = SimpleNamespace(parameters=[], runs=())
-    model: Any = SimpleNamespace(
-        signature=item, estimate=estimate, effects=[candidate], problem=problem
+    Args:
+        rig: a disc with friction.
+        start, most, found: where it begins, its bound, and where it ends, over what is right.
+    """
+    model = rig.added(rig.base, "coulomb", {"tau_c": SIZE}, fit=False)
+    problem = model.problem.with_parameters(
+        [replace(p, maximum=most * SIZE) if p.strength else p for p in model.problem.parameters]
     )
-    it: Any = SimpleNamespace(
-        raw=SimpleNamespace(unstable=unstable), say=lambda _: None, fitted=fitted,
-        simulator=SimpleNamespace(of=lambda problem: problem),
-        again=lambda found, *_: found,
-    )  # fmt: skip
-    found = Fitter.sharper(it, model, SimpleNamespace(problem=None))  # type: ignore[arg-type]
-    assert (found is not model) is sharp
-    if unstable:
-        assert held == [{"law.w_0": pytest.approx(2e-5)}]
-    if sharp:
-        assert found.signature == (item, {"fixed": {"law.w_0": pytest.approx(2e-5)}})
+    of, theta = rig.search.simulator.of(problem), np.array([disc.J, disc.B, start * SIZE])
+    end = rig.search._doubled(of, theta, rig.search.cost(of, theta), STRENGTH)
+    assert end[2] == pytest.approx(found * SIZE, rel=0.05) and theta[2] == start * SIZE
+
+
+@pytest.mark.parametrize(
+    ("start", "usual", "found"), [(0.02, 0.3, 0.32), (0.0, 0.3, 0.3), (0.02, 0.0, 0.02)]
+)
+def test_up_to_the_usual_strength_all_are_tried(
+    late: Search, start: float, usual: float, found: float
+) -> None:
+    """A delay far below the right one shifts a swing the wrong way, and does harm.
+
+    Not where first orders hold (no usual strength is given).
+    """
+    (clock,) = [c for c in delays(late.raw) if c.label == "delay at log.w"]
+    of = late.simulator.of(clock.added_to(late.raw))
+    theta = np.array([disc.J, disc.B, start])
+    cost = late.cost(of, theta)
+    assert late.cost(of, np.array([disc.J, disc.B, start + 0.02])) > cost
+    end = late._doubled(of, theta, cost, f"{clock.prefix}t_d", usual)
+    assert end[2] == pytest.approx(found)
+
+
+def test_of_usual_strengths_the_best_is_kept_though_none_leads_there(late: Search) -> None:
+    """A residual that swings at one frequency says nothing of what is off by most of a period."""
+    (clock,) = [c for c in delays(late.raw) if c.label == "delay at log.w"]
+    base = late.calibrated()
+    bench = late.bench(base, late.fitting)
+    (alone,), (trials,) = bench.begun([clock]), bench.begun([clock], thorough=True)
+    assert trials.best is not None and alone.best is not None and not trials.open
+    tries = trials.probe.strength.hints.tries
+    assert trials.best.value == min(tries, key=lambda value: abs(value - LATE))
+    assert trials.best.score.gain > 2.0 * alone.best.score.gain
+
+
+# -- sharper laws ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("begun", "power"), [(USUAL, 0), (0.02, 1), (0.2, 2)])
+def test_a_law_begins_as_sharp_as_the_data_want_it(rig: Rig, begun: float, power: int) -> None:
+    """What smooths nothing (how uneven it is may be negative) stays."""
+    whole = rig.candidate("asymmetric_coulomb").added_to(rig.base.problem)
+    prefix = "load.flange.asymmetric_coulomb."
+    values = {"J": disc.J, "b": disc.B, prefix + "tau_c": SIZE}
+    fixed = {prefix + "w_0": begun, prefix + "a": -0.002}
+    found = _sharpest(rig.search, whole, values, fixed)
+    assert found == {prefix + "w_0": pytest.approx(begun * 0.1**power), prefix + "a": -0.002}
+
+
+def near(rig: Rig, smoothing: float) -> tuple[Fitted, Fitted]:
+    """A model with friction that creeps so fast, and without it, where runs may turn unstable.
+
+    Residuals count in full while all of them are large, and by their logarithm from then on.
+    """
+    rig.search.count_in_full(False)
+    base = rig.search.recounted(rig.base)
+    return base, rig.added(base, "coulomb", {"tau_c": SIZE}, held={"w_0": smoothing}, fit=False)
+
+
+def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(rig: Rig) -> None:
+    base, model = near(rig, 0.2)
+    found = rig.search.sharper(model, base)
+    assert found.estimate.robust < 0.5 * model.estimate.robust
+    assert found.problem.constants[SMOOTHING] == pytest.approx(USUAL)
+    assert found.signature is not None and found.labels == model.labels
+    assert found.signature.fixed == {SMOOTHING: pytest.approx(USUAL)}
+    assert rig.said[-1] == "coulomb at load.flange: sticks more nearly than usual"
+
+
+def test_it_is_kept_so_only_if_that_is_better(tmp_path: Path) -> None:
+    with built.rig(tmp_path, creeping, unstable=True) as rig:
+        base, model = near(rig, USUAL)
+        before = rig.search.evaluations
+        assert rig.search.sharper(model, base) is model
+        assert rig.search.evaluations > before
+
+
+def test_one_that_cannot_be_simulated_so_stays(rig: Rig) -> None:
+    base, model = near(rig, 0.2)
+    usual = rig.search.simulator
+    rig.search.simulator = usual.limited({run.name: 1.0 for run in rig.search.raw.runs})
+    try:
+        assert rig.search.sharper(model, base) is model
+    finally:
+        rig.search.simulator = usual
+    assert rig.said[-1].startswith("coulomb at load.flange with {")
+
+
+def test_calm_systems_are_not_asked(rig: Rig) -> None:
+    base, model = near(rig, 0.2)
+    rig.search.count_in_full()
+    before = rig.search.evaluations
+    assert rig.search.sharper(model, base) is model and rig.search.evaluations == before

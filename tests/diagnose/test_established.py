@@ -1,203 +1,260 @@
-"""A law is named if the data determine it, a further effect if the model needs it."""
+"""A law is named if the data determine it, a further effect if the model needs it.
+
+On discs whose laws are written out; the models are those that the diagnosis makes of them.
+"""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
-import numpy as np
 import pytest
 
-from cosim.calibrate.parts import Parameter
-from cosim.diagnose import established
-from cosim.diagnose.models import Gate
+from cosim.diagnose.candidates import Candidate
+from cosim.diagnose.established import freed, needed, settle
+from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
-from cosim.errors import CosimError
+from tests.diagnose import built
+from tests.diagnose.built import Rig
 
-TOTALS = {"bristle": 1e5, "coulomb": 1e5 - 300.0, "cogging": 5e4}
-
-
-def law(effect: str, own: int, *, known: bool = False, held: int = 0) -> Any:
-    """A fitted law at one place; what it has beyond its strength may be determined, or held."""
-    prefix = f"axle.{effect}."
-    names = ["tau_c", "x_0", "r"][:own]
-    parameters = [
-        Parameter(prefix + n, "1", 1.0, 0.0, 9.0, (), strength=n == "tau_c") for n in names
-    ]
-    low = np.array([0.9, *([0.5 if known else 0.0] * (own - 1))])
-    return SimpleNamespace(
-        effects=(SimpleNamespace(effect=effect, place="axle", prefix=prefix, label=effect),),
-        problem=SimpleNamespace(parameters=parameters),
-        estimate=SimpleNamespace(low=low, high=low + 1.0, identifiable=np.ones(own, dtype=bool)),
-        signature=SimpleNamespace(
-            strength=parameters[0], probe=SimpleNamespace(own=own + held)
-        ),
-        quantity="tau_c", complexity=own,
-    )  # fmt: skip
+USUAL = 2e-3
+"""Speed over which the laws of the catalogue smooth a sign [rad/s]."""
+DRY = 0.01
+"""Friction [N.m]: what it does is ten times the noise."""
+WEIGHT = 0.02
+"""Of an unbalance [N.m] so small that the declared model is not far off."""
 
 
-def judge(**more: Any) -> Any:
-    """What a search is asked for."""
-    return SimpleNamespace(
-        total=lambda base, fitted: TOTALS[fitted.effects[-1].effect],
-        accepted=lambda base, fitted: True, sharpened=lambda fitted, base: fitted,
-        say=lambda text: None, raw=SimpleNamespace(unstable=True), **more,
-    )  # fmt: skip
+def friction(w: float, theta: float, t: float) -> float:
+    return DRY * math.tanh(w / USUAL)
 
 
-@pytest.mark.parametrize(
-    ("others", "known", "named"),
-    [
-        (("coulomb", "cogging"), False, "coulomb"),
-        (("coulomb", "cogging"), True, "bristle"),  # it is seen to give way
-        (("cogging",), False, "bristle"),  # the simpler law does much worse
-    ],
-)
-def test_a_law_of_which_only_a_simpler_one_shows_is_that(
-    others: tuple[str, ...], known: bool, named: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """And its places are compared: other ones were fitted with the other law."""
-    compared: list[str] = []
-    monkeypatch.setattr(
-        established, "challenged",
-        lambda search, base, stage: compared.append(stage.winner.effects[-1].effect),
-    )  # fmt: skip
-    winner = law("bristle", 3, known=known)
-    fits = [winner, *(law(n, 1) for n in others)]
-    stage = Round(winner, [], {}, fitted=fits, winner=winner)
-    established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
-    assert stage.winner is not None and stage.winner.effects[-1].effect == named
-    assert compared == [named] * (named == "coulomb")
+def one_way(w: float, theta: float, t: float) -> float:
+    """Friction in forward motion only, as `asymmetric_coulomb` usually is."""
+    return 2.0 * friction(max(w, 0.0), theta, t)
 
 
-def test_a_law_with_more_parameters_that_were_held_is_no_simpler_one() -> None:
-    """Coulomb's law with its smoothing free is not a bristle whose deflection was not fitted."""
-    winner = law("coulomb", 2)
-    stage: Any = SimpleNamespace(winner=winner, fitted=[winner, law("bristle", 1, held=2)])
-    established.settle(judge(), SimpleNamespace(effects=()), stage)  # type: ignore[arg-type]
-    assert stage.winner is winner
+def weight(w: float, theta: float, t: float) -> float:
+    return WEIGHT * math.sin(theta + 0.5)
 
 
-def without(gain: float, left: float, unused: float, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A round after a further effect, of which the model without it has been fitted again.
+@pytest.fixture(scope="module")
+def dry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A disc with dry friction and nothing else."""
+    with built.rig(tmp_path_factory.mktemp("dry"), friction) as rig:
+        yield rig
 
-    Args:
-        gain: by which it is better [nats].
-        left: what the model without it leaves beyond noise [nats].
-        unused: gain on unused runs [nats].
-        monkeypatch: of pytest.
-    """
-    winner, base = (
-        law("coulomb", 1),
-        SimpleNamespace(effects=("first",), signature=1, gate=2, p_value=3),
+
+# -- laws of which only a simpler one shows --------------------------------------------------------
+
+
+def friction_laws(rig: Rig, asymmetry: float) -> tuple[Fitted, Fitted]:
+    """Friction that may differ between the directions, by so much to begin with, and plain one."""
+    either = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY, "a": asymmetry})
+    return either, rig.added(rig.base, "coulomb", {"tau_c": DRY})
+
+
+def test_a_bristle_of_which_only_friction_shows_is_that(tmp_path: Path) -> None:
+    """And its rivals are compared: they were fitted while the other law had won."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return friction(w, theta, t) + 0.006 * math.sin(theta)
+
+    with built.rig(tmp_path, law) as rig:
+        bristle = rig.added(rig.base, "bristle", {"tau_c": DRY, "x_0": 5e-4}, held={"r": 0.0})
+        coulomb = rig.added(rig.base, "coulomb", {"tau_c": DRY, "w_0": USUAL})
+        other = rig.added(rig.base, "unbalance", {"m_u": 0.006})
+        near = frozenset({other.effects[-1]})
+        fits = [bristle, coulomb, other]
+        stage = Round(rig.base, [], {}, fitted=fits, winner=bristle, near=near)
+        settle(rig.search, rig.base, stage)
+    assert stage.winner is not None and stage.winner.labels == {"coulomb at load.flange"}
+    assert any(f is stage.winner for f in stage.fitted)
+    said, compared = rig.said[-2:]
+    assert said == "bristle at load.flange: nothing of it but coulomb shows"
+    assert compared.startswith("unbalance at load.flange instead: -")
+
+
+def test_a_law_that_the_data_determine_stays(dry: Rig) -> None:
+    """That friction is the same in both directions is known, not open."""
+    either, coulomb = friction_laws(dry, 0.5)
+    asymmetry = either.estimate.values["load.flange.asymmetric_coulomb.a"]
+    assert asymmetry == pytest.approx(0.0, abs=0.2)  # three of its standard deviations
+    assert dry.search.total(dry.base, coulomb) > 0.999 * dry.search.total(dry.base, either)
+    stage = Round(dry.base, [], {}, fitted=[either, coulomb], winner=either)
+    settle(dry.search, dry.base, stage)
+    assert stage.winner is either
+
+
+def test_a_law_that_does_better_than_the_simpler_one_stays(tmp_path: Path) -> None:
+    def strong(w: float, theta: float, t: float) -> float:
+        return 8.0 * one_way(w, theta, t)
+
+    with built.rig(tmp_path, strong) as rig:
+        either, coulomb = friction_laws(rig, 1.0)
+        place = either.problem.index("load.flange.asymmetric_coulomb.a")
+        assert either.estimate.high[place] == either.problem.upper[place]  # how uneven is open
+        assert rig.search.accepted(rig.base, coulomb)
+        stage = Round(rig.base, [], {}, fitted=[either, coulomb], winner=either)
+        settle(rig.search, rig.base, stage)
+    assert stage.winner is either
+
+
+def test_a_law_with_more_parameters_that_were_held_is_no_simpler_one(dry: Rig) -> None:
+    """Friction with its smoothing free is not one of either direction, taken as the same."""
+    coulomb = dry.search.sharpened(
+        dry.added(dry.base, "coulomb", {"tau_c": DRY, "w_0": USUAL}), dry.base
     )
-    estimate = SimpleNamespace(robust=500.0 + left, count=1000)
-    less = SimpleNamespace(check=0, estimate=estimate)
-    winner.check = 1
-    monkeypatch.setattr(established, "compare", lambda *_: Gate(unused, 9.0 if unused > 0 else 0.0))
-    search = judge(
-        without=lambda fitted, effect: less, approached=lambda trial, goal, base: trial,
-        gain=lambda first, second: gain if first is less else 5000.0, check_data=0, checking=0,
-    )  # fmt: skip
-    stage: Any = SimpleNamespace(winner=winner, fitted=[winner], base=base)
-    established.needed(search, base, stage)  # type: ignore[arg-type]
-    return stage, winner, base, less
+    either = dry.added(dry.base, "asymmetric_coulomb", {"tau_c": DRY})
+    assert not coulomb.estimate.identifiable[-1] and either.complexity < coulomb.complexity
+    stage = Round(dry.base, [], {}, fitted=[coulomb, either], winner=coulomb)
+    settle(dry.search, dry.base, stage)
+    assert stage.winner is coulomb
 
 
-def test_a_further_effect_that_the_model_needs_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    stage, winner, base, _ = without(900.0, 1000.0, 50.0, monkeypatch)
+# -- further effects where runs may turn unstable --------------------------------------------------
+
+
+def little(w: float, theta: float, t: float) -> float:
+    """Some friction beside what no law explains."""
+    return weight(w, theta, t) + 0.002 * math.tanh(w / 0.01) + 0.005 * math.sin(9.0 * t)
+
+
+def both(w: float, theta: float, t: float) -> float:
+    return weight(w, theta, t) + 0.004 * math.tanh(w / 0.01)
+
+
+def further(rig: Rig, effect: str, **values: float) -> tuple[Fitted, Fitted]:
+    """A model with an unbalance, and with a further effect."""
+    quick = rig.added(rig.base, "unbalance", {"m_u": WEIGHT, "psi": 0.4})
+    base = replace(rig.search.sharpened(quick, rig.base), p_value=0.003)
+    return base, rig.added(base, effect, values)
+
+
+def asked(rig: Rig, base: Fitted, winner: Fitted) -> Round:
+    """A round that found a further effect, which has been asked."""
+    stage = Round(base, [], {}, fitted=[winner], winner=winner)
+    needed(rig.search, base, stage)
+    return stage
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A disc with an unbalance and friction, whose start angles may decide."""
+    with built.rig(tmp_path_factory.mktemp("two"), both, unstable=True) as rig:
+        yield rig
+
+
+def test_a_further_effect_that_the_model_needs_stays(two: Rig) -> None:
+    base, winner = further(two, "coulomb", tau_c=0.01)
+    stage = asked(two, base, winner)
     assert stage.winner is winner and stage.base is base
 
 
-@pytest.mark.parametrize(("gain", "left", "unused"), [(150.0, 1000.0, 50.0), (900.0, 1000.0, -1.0)])
-def test_one_that_came_with_better_start_values_does_not(
-    monkeypatch: pytest.MonkeyPatch, gain: float, left: float, unused: float
-) -> None:
-    """It leaves the model without it, which is better than the one that the round began with."""
-    stage, _, base, less = without(gain, left, unused, monkeypatch)
-    assert stage.winner is None and stage.base is less
-    assert (less.effects, less.signature, less.gate, less.p_value) == (base.effects, 1, 2, 3)
+def test_one_that_explains_little_of_what_is_left_does_not(tmp_path: Path) -> None:
+    with built.rig(tmp_path, little, unstable=True) as rig:
+        base, winner = further(rig, "coulomb", tau_c=0.002)
+        assert winner.gate is not None and winner.gate.passed
+        assert rig.search.gain(base, winner) > 20.0
+        stage = asked(rig, base, winner)
+    assert stage.winner is None and stage.base is base
+    assert rig.said[-1].startswith("coulomb at load.flange is not needed: ")
 
 
-def test_one_without_which_nothing_can_be_simulated_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: Any) -> None:
-        raise CosimError("it runs away")
-
-    winner = law("coulomb", 1)
-    stage: Any = SimpleNamespace(winner=winner, fitted=[winner])
-    search = judge(without=fails, approached=None)
-    established.needed(search, SimpleNamespace(effects=("first",)), stage)  # type: ignore[arg-type]
-    assert stage.winner is winner
-
-
-@pytest.mark.parametrize(("effects", "unstable"), [((), True), (("first",), False)])
-def test_first_effects_and_calm_systems_are_not_asked(
-    effects: tuple[str, ...], unstable: bool
-) -> None:
-    stage: Any = SimpleNamespace(winner=law("coulomb", 1))
-    search = SimpleNamespace(raw=SimpleNamespace(unstable=unstable))  # fits nothing
-    established.needed(search, SimpleNamespace(effects=effects), stage)  # type: ignore[arg-type]
-    assert stage.winner is not None
+def test_one_that_unused_runs_do_not_want_does_not(tmp_path: Path) -> None:
+    laws = {"sweep": both, "steps": both, "check": weight}
+    with built.rig(tmp_path, laws, unstable=True) as rig:
+        base, winner = further(rig, "coulomb", tau_c=0.01)
+        beyond = base.estimate.robust - 0.5 * base.estimate.count
+        assert rig.search.gain(base, winner) > 0.5 * beyond
+        stage = asked(rig, base, winner)
+    assert stage.winner is None and stage.base is base
 
 
-@pytest.mark.parametrize(
-    ("held", "gain", "instead"),
-    [((), 900.0, False), (("x", "y"), 900.0, True), (("x", "y"), 0.1, False)],
-    ids=["nothing is held", "it does the work", "it does not"],
-)
-def test_a_law_beside_another_gives_way_to_all_parameters_of_that_one(
-    monkeypatch: pytest.MonkeyPatch, held: tuple[str, ...], gain: float, instead: bool
-) -> None:
-    """A payload in the middle and a shift of the load are a payload that stands aside."""
-    mass = Parameter("payload.m", "kg", 0.0, 0.0, 99.0, (), strength=True, span=5.0)
-    places = [Parameter(f"payload.{n}", "m", 0.0, -1.0, 1.0, ()) for n in held]
-
-    def problem(parameters: list[Parameter]) -> Any:
-        return SimpleNamespace(
-            parameters=parameters, names=[p.name for p in parameters], constants={},
-            with_parameters=problem,
-        )  # fmt: skip
-
-    payload: Any = SimpleNamespace(label="payload", added_to=lambda _: problem([mass, *places]))
-    monkeypatch.setattr(
-        established, "composed", lambda raw, fitted, effects: problem([mass] if effects else [])
-    )
-    monkeypatch.setattr(established, "at_usual", lambda search, found, usual: found)
-    begun: list[list[float]] = []
-
-    def fitted(whole: Any, theta: Any, close: Any) -> Any:
-        begun.append(theta.tolist())
-        return SimpleNamespace(
-            estimate=SimpleNamespace(values=dict.fromkeys(whole.names, 1.0)), gain=gain
-        )
-
-    noted: list[Any] = []
-    search: Any = SimpleNamespace(
-        raw=None, simulator=SimpleNamespace(of=lambda p: p), fitted=fitted, note=noted.append,
-        approached=lambda found, goal, base: found, gain=lambda less, found: found.gain,
-        say=lambda text: None,
-    )  # fmt: skip
-    less: Any = SimpleNamespace(effects=(payload,), signature=3)
-    both: Any = SimpleNamespace(estimate=SimpleNamespace(values={"payload.m": 25.0}))
-    found: Any = established.freed(search, less, both)
-    assert begun == ([[25.0, 0.0, 0.0]] if held else [])  # from where both laws ended
-    assert (found is less) is not instead
-    assert noted == ([found] if instead else [])
-    if instead:
-        assert (found.effects, found.signature) == ((payload,), 3)
+def test_one_that_came_with_better_start_values_leaves_them(tmp_path: Path) -> None:
+    """The model without it is better than the one that the round began with."""
+    with built.rig(tmp_path, weight, unstable=True, angle=0.03) as rig:
+        base, winner = further(rig, "quadratic_drag", c=1e-4)
+        winner = rig.search.released(winner, base)
+        gain = rig.search.gain(base, winner)
+        stage = asked(rig, base, winner)
+        assert rig.search.gain(base, stage.base) == pytest.approx(gain, abs=5.0) and gain > 100.0
+    assert stage.winner is None and stage.base.labels == base.labels
+    starts = [run.starts["load.angle"] for run in stage.base.problem.runs]
+    assert starts == [pytest.approx(0.03, abs=2e-3)] * 3
+    assert stage.base.signature is base.signature
+    assert (stage.base.gate, stage.base.p_value) == (base.gate, 0.003)
 
 
-def test_a_law_that_stands_on_another_is_not_asked_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stiffening spring acts on a gear that yields; a rigid one has no spring."""
+def test_one_without_which_nothing_can_be_simulated_stays(two: Rig) -> None:
+    base, winner = further(two, "coulomb", tau_c=0.01)
+    usual = two.search.simulator
+    two.search.simulator = usual.limited({run.name: 1.0 for run in two.search.raw.runs})
+    try:
+        stage = asked(two, base, winner)
+    finally:
+        two.search.simulator = usual
+    assert stage.winner is winner and stage.base is base
+    assert two.said[-1].startswith("without coulomb at load.flange: ")
 
-    def refused(*_: Any) -> None:
-        raise CosimError("effect 'cubic_stiffness@spring' fits no balance")
 
-    monkeypatch.setattr(established, "composed", refused)
-    said: list[str] = []
-    search: Any = SimpleNamespace(raw=None, say=said.append)
-    spring: Any = SimpleNamespace(effects=("cubic_stiffness",), labels={"cubic_stiffness at gear"})
-    assert established.freed(search, spring, spring) is spring
-    assert said == [
-        "cubic_stiffness at gear alone: effect 'cubic_stiffness@spring' fits no balance"
-    ]
+def test_first_effects_and_calm_systems_are_not_asked(two: Rig, dry: Rig) -> None:
+    """Neither is a wrong one taken back, nor is anything simulated."""
+    wrong = two.added(two.base, "quadratic_drag", {"c": 1e-4}, fit=False)
+    first = dry.added(dry.base, "coulomb", {"tau_c": DRY})
+    beside = dry.added(first, "quadratic_drag", {"c": 1e-4}, fit=False)
+    for rig, base, winner in ((two, two.base, wrong), (dry, first, beside)):
+        before = rig.search.evaluations
+        assert asked(rig, base, winner).winner is winner
+        assert rig.search.evaluations == before
+
+
+# -- parameters that do the work of a further effect -----------------------------------------------
+
+
+def parted(rig: Rig, effect: str, **values: float) -> tuple[Fitted, Fitted]:
+    """A model with friction one way and a further effect, and without the second one."""
+    first = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY})
+    whole = rig.added(first, effect, values)
+    return rig.search.without(whole, whole.effects[-1]), whole
+
+
+def test_a_law_beside_another_gives_way_to_all_parameters_of_that_one(tmp_path: Path) -> None:
+    """Friction one way and friction both ways are friction that differs between the two."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return one_way(w, theta, t) + friction(w, theta, t)
+
+    with built.rig(tmp_path, law) as rig:
+        less, whole = parted(rig, "coulomb", tau_c=DRY)
+        assert rig.search.gain(less, whole) > 100.0
+        found = freed(rig.search, less, whole)
+        assert rig.search.gain(whole, found) == pytest.approx(0.0, abs=2.0)
+    assert found.effects == less.effects and found.signature is less.signature
+    values = {n.rpartition(".")[2]: v for n, v in found.estimate.values.items()}
+    assert values["a"] == pytest.approx(0.5, abs=0.2)
+    assert values["tau_c"] == pytest.approx(2.0 * DRY, rel=0.1)
+    assert rig.said[-1].endswith(" instead of a further effect")
+
+
+def test_parameters_that_bring_nothing_stay_held(tmp_path: Path) -> None:
+    with built.rig(tmp_path, one_way) as rig:
+        less, whole = parted(rig, "unbalance", m_u=WEIGHT)
+        assert freed(rig.search, less, whole) is less
+
+
+def test_a_law_without_such_parameters_is_not_fitted_again(dry: Rig) -> None:
+    less = dry.added(dry.base, "quadratic_drag", {"c": 1e-4}, fit=False)
+    whole = dry.added(less, "coulomb", {"tau_c": DRY})
+    before = dry.search.evaluations
+    assert freed(dry.search, less, whole) is less and dry.search.evaluations == before
+
+
+def test_a_law_that_stands_on_another_is_not_asked_alone(dry: Rig) -> None:
+    """A stiffening spring acts on a shaft that yields; a disc alone has no spring."""
+    spring = Candidate("load", "disc", "cubic_stiffness", "spring")
+    less = replace(dry.base, effects=(spring,))
+    assert freed(dry.search, less, less) is less
+    assert dry.said[-1].startswith("cubic_stiffness at load.spring alone: ")

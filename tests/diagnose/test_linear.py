@@ -2,35 +2,54 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.calibrate.loss import DOUBTFUL, WINDOW, Huber, Squares, Windowed, mean_squares
+from cosim.calibrate.parts import Channel, MeasuredRun, Parameter
+from cosim.calibrate.problem import Problem
 from cosim.diagnose.linear import Absorber, SampleStack, holm, score
 from cosim.diagnose.models import GATE, Fitted, compare, more_general
-from cosim.diagnose.search import Search
 from cosim.diagnose.whiteness import CALIBRATED, whiteness_tests
 from cosim.errors import CosimError
+from tests.diagnose import built, disc
 
-RATE, SECONDS = 100, 40
+RATE, SECONDS, TICK = 100, 40, 2e-3
+Layout = Callable[..., SampleStack]
 
 
-def layout(unstable: bool = False, *, tips: bool = False) -> SampleStack:
+@pytest.fixture(scope="module")
+def disc_alone(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A disc, of which a test takes what it needs."""
+    return built.problem(tmp_path_factory.mktemp("disc"), lambda w, theta, t: 0.0)
+
+
+@pytest.fixture(scope="module")
+def layout(disc_alone: Problem) -> Layout:
     """One run of one channel, sampled at `RATE`."""
     times = np.arange(RATE * SECONDS) / RATE
-    run: Any = SimpleNamespace(name="A", times=times, data=np.zeros((times.size, 1)))
-    problem: Any = SimpleNamespace(
-        channels=[SimpleNamespace(name="y")], unstable=unstable, late=tips
-    )
-    return SampleStack(problem, [run])
+    run = MeasuredRun("A", "identification", times, np.zeros((times.size, 1)), {})
+    angle = Parameter("angle", "rad", 0.0, -1.0, 1.0, (("load.angle", 1.0),), run="A", late=True)
+
+    def stacked(unstable: bool = False, *, tips: bool = False) -> SampleStack:
+        problem = disc_alone.changed(
+            channels=[Channel("y", "1", 1.0, "load.w")], runs=[run],
+            late=[angle] if unstable or tips else [], far=tips,
+        )  # fmt: skip
+        return SampleStack(problem, [run])
+
+    return stacked
 
 
-def p_values(correlated: bool, trials: int = 400) -> np.ndarray:
+def p_values(place: SampleStack, correlated: bool, trials: int = 400) -> np.ndarray:
     """Of scores of noise alone against a sine."""
-    random, place = np.random.default_rng(0), layout()
+    random = np.random.default_rng(0)
     direction = np.sin(2 * np.pi * 3.0 * place.runs[0].times)
     values = []
     for _ in range(trials):
@@ -42,12 +61,12 @@ def p_values(correlated: bool, trials: int = 400) -> np.ndarray:
 
 
 @pytest.mark.parametrize("correlated", [False, True])
-def test_false_alarms_are_as_rare_as_promised(correlated: bool) -> None:
+def test_false_alarms_are_as_rare_as_promised(layout: Layout, correlated: bool) -> None:
     # 400 trials at 5 %: 20 expected, 36 is 3.7 standard deviations above
-    assert np.sum(p_values(correlated) < 0.05) <= 36
+    assert np.sum(p_values(layout(), correlated) < 0.05) <= 36
 
 
-def test_a_direction_that_is_there_is_found() -> None:
+def test_a_direction_that_is_there_is_found(layout: Layout) -> None:
     place = layout()
     direction = np.sin(2 * np.pi * 3.0 * place.runs[0].times)
     noise = np.random.default_rng(1).standard_normal(place.size)
@@ -61,7 +80,7 @@ def test_holm_corrects_for_the_number_of_tests() -> None:
     assert holm([0.01, 0.04, 0.03]).tolist() == pytest.approx([0.03, 0.06, 0.06])
 
 
-def test_the_gate_opens_for_the_better_model_only() -> None:
+def test_the_gate_opens_for_the_better_model_only(layout: Layout) -> None:
     place = layout()
     truth = np.sin(2 * np.pi * 0.5 * place.runs[0].times)
     data = truth + np.random.default_rng(2).standard_normal(place.size)
@@ -73,70 +92,90 @@ def test_the_gate_opens_for_the_better_model_only() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "unit", "strength", "named"),
+    ("effect", "size", "named"),
     [
-        ("delay", "s", 3e-4, False), ("delay", "s", 6e-4, True),
-        ("clock_skew", "1", 3e-5, False), ("clock_skew", "1", 6e-5, True),  # in 10 s
+        ("delay", 1.6e-3, False), ("delay", 2.4e-3, True),
+        ("clock_skew", 1.0e-3, False), ("clock_skew", 1.5e-3, True),  # in 1.6 s
     ],
 )  # fmt: skip
 def test_a_shift_below_the_tick_of_the_rig_has_no_name(
-    effect: str, unit: str, strength: float, named: bool
+    tmp_path: Path, effect: str, size: float, named: bool
 ) -> None:
-    place = layout()
-    run = SimpleNamespace(times=np.array([0.0, 10.0]))
-    rig: Any = SimpleNamespace(
-        raw=SimpleNamespace(tick=5e-4, step=5e-4, runs=[run]), fitting=place, checking=place
+    """Though the data show it well."""
+    with built.rig(tmp_path, lambda w, theta, t: 0.0, late={effect: size}) as rig:
+        quantity = {"delay": "t_d", "clock_skew": "skew"}[effect]
+        found = rig.added(rig.base, effect, {quantity: size}, place="log.load.outputs")
+        assert found.estimate.theta[-1] == pytest.approx(size, rel=0.3)
+        assert rig.search.accepted(rig.base, found)
+        rig.search.taken(rig.search.raw.changed(tick=TICK))
+        assert rig.search.material(rig.base, found) is named
+
+
+def friction(asymmetry: float) -> disc.Law:
+    """Dry friction that differs between the directions by so much."""
+    return lambda w, theta, t: 0.03 * (1.0 + math.copysign(asymmetry, w)) * math.tanh(w / 2e-3)
+
+
+def moved(fitted: Fitted) -> Fitted:
+    """A model as if its law acted at another place."""
+    law, item, model = fitted.effects[-1], fitted.signature, fitted.simulator
+    assert item is not None
+    there = replace(law, port="other")
+    parameters = [
+        replace(p, name=p.name.replace(law.prefix, there.prefix)) for p in model.problem.parameters
+    ]
+    strength = next(p for p in parameters if p.strength)
+    probe = replace(item.probe, candidate=there, strength=strength)
+    estimate = replace(
+        fitted.estimate, simulator=model.of(model.problem.with_parameters(parameters))
     )
-    model = np.zeros(place.size)
-    base: Any = SimpleNamespace(fit=model, check=model)
-    quantity = SimpleNamespace(name="law.strength", unit=unit)
-    other: Any = SimpleNamespace(
-        fit=model + 1.0, check=model + 1.0, signature=SimpleNamespace(strength=quantity),
-        estimate=SimpleNamespace(values={"law.strength": strength}),
-        effects=[SimpleNamespace(effect=effect)],
-    )  # fmt: skip
-    assert Search.material(rig, base, other) is named
-
-
-@pytest.mark.parametrize("told_apart", [False, True])
-def test_the_simpler_law_wins_a_tie(told_apart: bool) -> None:
-    def law(
-        free: int, place: str = "load.flange", same: tuple[str, ...] = (), quantity: str = "tau_c",
-        gain: float = 1e7,
-    ) -> Any:  # fmt: skip
-        gate, item = SimpleNamespace(passed=True), SimpleNamespace(same=same)
-        effects = [SimpleNamespace(place=place)]
-        return SimpleNamespace(
-            complexity=free, effects=effects, gate=gate, signature=item, quantity=quantity,
-            gain=gain,
-        )  # fmt: skip
-
-    rig: Any = SimpleNamespace(
-        accepted=lambda *_: True, apart=lambda *_: told_apart, total=lambda _, f: f.gain
+    return replace(
+        fitted, effects=(there,), signature=replace(item, probe=probe), estimate=estimate
     )
-    best, simple, elsewhere = law(12), law(11, gain=1e7 - 1e3), law(10, "gearbox.flange_a")
-    elsewhere.quantity = "b"
-    chosen = Search.simplest(rig, law(10), best, [best, simple, elsewhere])
-    assert chosen is (best if told_apart else simple)
-    # the same quantity at another place with fewer parameters: only if it does as well to a hair
-    for less, wanted in ((50.0, True), (500.0, False)):
-        twin = law(11, "gearbox.flange_a", gain=1e7 - less)
-        chosen = Search.simplest(rig, law(10), best, [best, twin])
-        assert chosen is (twin if wanted else best)
-    assert more_general(best, simple)
-    assert not more_general(simple, best)
-    assert not more_general(best, elsewhere)
-    assert more_general(best, law(10, "gearbox.flange_a", ("coulomb at load.flange",)))
 
 
-def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
+@pytest.mark.parametrize("asymmetry", [0.0, 0.3])
+def test_the_simpler_law_wins_a_tie(tmp_path: Path, asymmetry: float) -> None:
+    with built.rig(tmp_path, friction(asymmetry)) as rig:
+        best = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": 0.03, "a": asymmetry})
+        simple = rig.added(rig.base, "coulomb", {"tau_c": 0.03})
+        assert rig.search.apart(simple, best) == (asymmetry > 0.0)
+        chosen = rig.search.simplest(rig.base, best, [best, simple])
+    assert chosen is (best if asymmetry else simple)
+    assert more_general(best, simple) and not more_general(simple, best)
+
+
+def test_the_same_law_elsewhere_must_do_as_well_to_a_hair(tmp_path: Path) -> None:
+    """With fewer parameters; a parameter more may make up for another place."""
+    with built.rig(tmp_path, friction(0.0)) as rig:
+        search, base = rig.search, rig.base
+        best = rig.added(base, "coulomb", {"tau_c": 0.03, "w_0": 2e-3})
+        other = replace(best, signature=rig.trace(base, "stribeck"))  # of another quantity
+        twin = rig.added(base, "coulomb", {"tau_c": 0.03})
+        assert twin.gate is not None
+        for share, wanted in ((5e-6, True), (2e-5, False)):
+            more = search.total(base, best) * (1.0 - share) - search.total(base, twin)
+            there = replace(moved(twin), gate=replace(twin.gate, gain=twin.gate.gain + more))
+            assert search.simplest(base, best, [best, there]) is (there if wanted else best)
+            assert search.simplest(base, other, [there]) is other
+        same = rig.trace(base, "coulomb")
+    assert not more_general(best, there)
+    assert there.signature is not None
+    assert more_general(best, replace(there, signature=replace(there.signature, twins=(same,))))
+
+
+@pytest.fixture(scope="module")
+def two(disc_alone: Problem) -> Problem:
+    """A problem with two parameters of scale 1."""
+    return disc_alone.with_parameters([Parameter(n, "1", 0.0, 0.0, 1.0, ()) for n in "ab"])
+
+
+def test_a_parameter_at_its_bound_absorbs_nothing(two: Problem) -> None:
     random = np.random.default_rng(2)
     columns = 10.0 * random.standard_normal((50, 2))
-    parameters = [SimpleNamespace(name=n, prior=None) for n in "ab"]
-    problem: Any = SimpleNamespace(parameters=parameters, names=["a", "b"], scale=np.ones(2))
     first = columns[:, 0]
-    assert np.linalg.norm(Absorber(columns, problem).rest(first)) < 1e-5 * np.linalg.norm(first)
-    held = Absorber(columns, problem, ("a",))
+    assert np.linalg.norm(Absorber(columns, two).rest(first)) < 1e-5 * np.linalg.norm(first)
+    held = Absorber(columns, two, ("a",))
     across = first - columns[:, 1] * float(columns[:, 1] @ first) / float(
         columns[:, 1] @ columns[:, 1]
     )
@@ -145,10 +184,8 @@ def test_a_parameter_at_its_bound_absorbs_nothing() -> None:
     assert held.change(first)[0] == 0.0
 
 
-def test_values_that_are_not_finite_are_refused_when_something_is_absorbed() -> None:
-    columns = np.eye(4, 2) * 10.0
-    problem: Any = SimpleNamespace(names=("a", "b"), parameters=[SimpleNamespace(prior=0.0)] * 2)
-    absorber = Absorber(columns, problem)
+def test_values_that_are_not_finite_are_refused_when_something_is_absorbed(two: Problem) -> None:
+    absorber = Absorber(np.eye(4, 2) * 10.0, two)
     assert absorber.rest(np.ones(4)) == pytest.approx([0.0, 0.0, 1.0, 1.0])
     with pytest.raises(CosimError, match="not finite"):
         absorber.rest(np.array([np.nan, 0.0, 1.0, 1.0]))
@@ -188,13 +225,14 @@ def test_weights_give_the_gradient_of_a_loss(loss: Any) -> None:
         assert change == pytest.approx(slope[place], rel=1e-4, abs=1e-5)
 
 
-def test_windows_of_vectors_are_those_of_arrays() -> None:
+def test_windows_of_vectors_are_those_of_arrays(layout: Layout) -> None:
     random = np.random.default_rng(4)
     times = np.arange(3 * WINDOW + 7) / RATE
     rows = random.standard_normal((times.size, 2)) * 5.0
     rows[3:9, 1] = np.nan
-    runs: Any = [SimpleNamespace(name=n, times=times, data=rows) for n in "AB"]
-    problem: Any = SimpleNamespace(channels=[SimpleNamespace(name=n) for n in "yz"], unstable=True)
+    runs = [MeasuredRun(n, "identification", times, rows, {}) for n in "AB"]
+    channels = [Channel(n, "1", 1.0, "load.w") for n in "yz"]
+    problem = layout(unstable=True).problem.changed(channels=channels, runs=runs)
     place = SampleStack(problem, runs)
     vector = place.vector([rows, 3.0 * rows])
     both = place.vector([mean_squares(rows), mean_squares(3.0 * rows)])
@@ -205,13 +243,14 @@ def test_windows_of_vectors_are_those_of_arrays() -> None:
         place.vector([Windowed().weight(rows), Windowed().weight(3.0 * rows)]), rel=1e-12
     )
     # where no run turns unstable, what is far off counts in full
-    problem.unstable = False
-    place = SampleStack(problem, runs)
+    place = SampleStack(problem.changed(far=True), runs)
     assert place.cost(vector) == pytest.approx(0.5 * float(vector @ vector), rel=1e-12)
     assert np.all(place.root(vector) == 1.0)
 
 
-def test_one_stretch_that_is_far_off_does_not_decide_where_runs_turn_unstable() -> None:
+def test_one_stretch_that_is_far_off_does_not_decide_where_runs_turn_unstable(
+    layout: Layout,
+) -> None:
     place = layout(unstable=True)
     truth = np.sin(2 * np.pi * 0.5 * place.runs[0].times)
     data = truth + np.random.default_rng(6).standard_normal(place.size)
@@ -224,23 +263,20 @@ def test_one_stretch_that_is_far_off_does_not_decide_where_runs_turn_unstable() 
     assert compare(data, lucky, truth, layout()).gain < -GATE
 
 
-def test_a_value_that_was_tried_from_a_list_counts() -> None:
-    def law(fixed: dict[str, float], *names: str) -> Fitted:
-        estimate: Any = SimpleNamespace(
-            theta=np.zeros(len(names)), problem=SimpleNamespace(names=names)
-        )
-        item: Any = SimpleNamespace(fixed=fixed, same=())
-        effects: Any = (SimpleNamespace(place="load.flange"),)
-        return Fitted(effects, estimate, np.zeros(0), np.zeros(0), item)
-
-    unbalance = law({}, "m_u", "psi")
-    cogging = law({"n": 1.0}, "tau_c", "psi")
+def test_a_value_that_was_tried_from_a_list_counts(tmp_path: Path) -> None:
+    """Cogging with one cycle per turn is an unbalance that had its number of cycles chosen."""
+    with built.rig(tmp_path, lambda w, theta, t: 0.01 * math.sin(theta + 0.5)) as rig:
+        unbalance = rig.added(rig.base, "unbalance", {"m_u": 0.01, "psi": 0.5})
+        cogging = rig.added(rig.base, "cogging", {"tau_c": 0.01, "psi": 0.5}, held={"n": 1.0})
+        free = rig.added(rig.base, "cogging", {"tau_c": 0.01, "psi": 0.5, "n": 1.0})
+        assert not rig.search.apart(unbalance, cogging)
+        assert rig.search.simplest(rig.base, cogging, [cogging, unbalance]) is unbalance
     assert cogging.free == unbalance.free and cogging.complexity == unbalance.complexity + 1
     assert more_general(cogging, unbalance) and not more_general(unbalance, cogging)
-    assert law({"n": 1.0}, "tau_c", "psi", "n").complexity == cogging.complexity
+    assert free.complexity == cogging.complexity
 
 
-def test_a_burst_is_no_structure_where_something_may_turn_over() -> None:
+def test_a_burst_is_no_structure_where_something_may_turn_over(layout: Layout) -> None:
     place = layout()
     tips = layout(tips=True)
     noise = np.random.default_rng(4).standard_normal(place.size)

@@ -2,71 +2,85 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cosim.calibrate.model import Model
+from cosim.calibrate.parts import Channel, Coarse
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.candidates import Candidate, candidates
+from cosim.diagnose.candidates import Candidate, balances, candidates
 from cosim.diagnose.linear import Absorber, SampleStack
-from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches
-from cosim.diagnose.secant import Bench, _shared, model_values
+from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches, single
+from cosim.diagnose.secant import Bench, Trials, _shared, model_values
+from cosim.diagnose.signature import unscored
 from cosim.errors import CosimError
+from cosim.installation.builder import default_provider
+from cosim.system.toml import read_system
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
 
-
-def places(*ports: str) -> list[Candidate]:
-    """One effect at several places of an arm."""
-    return [Candidate("arm", "ur5_arm", "coulomb", port) for port in ports]
+SYSTEMS = Path(__file__).parents[2] / "scenarios/systems"
 
 
-def measured(*signals: str, kind: str = "rotation") -> Any:
-    """A problem of which only channels and balances matter; `tail` is a group of balances."""
-    names = ["wheel", "body", "joint", *(f"wheel_{k}" for k in range(2 * MOST))]
-    extra = {"balances": [{"name": name, "kind": kind} for name in [*names, "joint_1", "joint_2"]]}
-    arm = SimpleNamespace(description=SimpleNamespace(extra=extra))
-    return SimpleNamespace(
-        channels=[SimpleNamespace(signal=s) for s in signals],
-        system=lambda: SimpleNamespace(members={"arm": arm}),
-    )
+def declared(system: str, *signals: str) -> Problem:
+    """A system of the project with these signals as channels, without runs."""
+    model = Model.of(read_system(SYSTEMS / f"{system}.toml"), default_provider())
+    channels = [Channel(name, "", 1.0, name) for name in signals]
+    return Problem(system, model, (), channels, (), 1e-3, Coarse(1e-3))
+
+
+def chosen(problem: Problem, instance: str, effect: str) -> list[Candidate]:
+    """One effect at all its places of an instance."""
+    return [c for c in candidates(problem) if (c.instance, c.effect) == (instance, effect)]
 
 
 def test_elements_of_a_vector_share_a_simulation() -> None:
-    problem = measured("arm.q[1]", "arm.q[2]", "drive.i[1]", "drive.i[2]")
-    (batch,) = batches(places("joint", "joint_1", "joint_2"), problem)
+    signals = [f"{name}[{k}]" for name in ("arm.q", "drive.i") for k in range(1, 7)]
+    problem = declared("ur5_lab", *signals)
+    (batch,) = batches(chosen(problem, "arm", "coulomb"), problem)
     assert batch.apart
-    assert batch.change == {"arm": "+coulomb@joint_1+coulomb@joint_2"}
+    assert batch.change == {"arm": "".join(f"+coulomb@joint_{k}" for k in range(1, 7))}
     assert batch.whole is not None and batch.whole.port == "joint"
-    masks = {c.port: m.tolist() for c, m in batch.members if m is not None}
-    assert masks == {"joint_1": [True, False, True, False], "joint_2": [False, True, False, True]}
+    masks = {c.port: np.flatnonzero(m).tolist() for c, m in batch.members if m is not None}
+    assert masks == {f"joint_{k}": [k - 1, k + 5] for k in range(1, 7)}
 
 
 def test_without_channels_of_their_own_they_do_not() -> None:
-    (batch,) = batches(places("joint", "joint_1", "joint_2"), measured("arm.q[1]", "tool.x"))
-    assert not batch.apart
+    problem = declared("ur5_lab", *(f"arm.q[{k}]" for k in range(1, 6)), "arm.q")
+    (batch,) = batches(chosen(problem, "arm", "coulomb"), problem)
+    assert not batch.apart and [mask for _, mask in batch.members] == [None] * 6
 
 
 def test_no_candidate_is_lost() -> None:
-    known = places(*(f"wheel_{k}" for k in range(2 * MOST)), "wheel", "body", "tail")
-    found = batches(known, measured("body.x"))
+    """Nor do balances share an FMU with groups of them, which declare the same."""
+    problem = declared("base_lab", "mocap.x")
+    known, kinds = candidates(problem), balances(problem)
+    found = batches(known, problem)
     assert sorted(c.label for b in found for c in b.candidates) == sorted(c.label for c in known)
     assert max(len(b.members) for b in found) == MOST
-    (alone,) = [b for b in found if any(c.port == "tail" for c, _ in b.members)]
-    assert len(alone.members) == 1
+    groups = [{(c.instance, c.port) in kinds for c, _ in b.members} for b in found if b.change]
+    assert all(len(both) == 1 for both in groups)
+    fmus: dict[str, set[bool]] = {}
+    for batch, both in zip([b for b in found if b.change], groups, strict=True):
+        fmus.setdefault(str(batch.change), set()).update(both)
+    assert all(len(both) == 1 for both in fmus.values())
+    assert {False} in fmus.values()
 
 
 def test_where_places_are_split_the_whole_vector_is_by_itself() -> None:
     """With the last wheel's FMU as its own, it would be that wheel's effect by another name."""
-    known = places("wheel", "wheel_1", "wheel_2", "wheel_3")
-    found = batches(known, measured("body.x", kind="coefficient"))
+    problem = declared("omni_lab", "camera.x")
+    found = batches(chosen(problem, "base", "radius_offset"), problem)
     assert [[c.port for c in b.candidates] for b in found] == [
-        ["wheel_1", "wheel_2"], ["wheel_3"], ["wheel"],
+        ["radius_1", "radius_2"], ["radius_3"], ["radius"],
     ]  # fmt: skip
     assert all(b.whole is None for b in found)
+    assert found[1].change != found[2].change
 
 
 @pytest.mark.parametrize(
@@ -97,7 +111,7 @@ def test_an_effect_among_others_does_what_it_does_alone(
                 values.append(model_values(simulator(one.problem), theta, layout))
                 simulator(one.problem).close()
             # effects of strength 0 are absent exactly, so nothing but bits may be compared
-            assert np.array_equal(*values)
+            assert np.array_equal(values[0], values[1])
 
 
 def effects_of(batch: Batch) -> set[str]:
@@ -186,28 +200,31 @@ def test_cycles_per_revolution_are_tried(clean_bench: Problem) -> None:
     assert blind.score.gain < 0.1 * found.score.gain
 
 
-def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it() -> None:
-    def trials(gains: tuple[float, ...]) -> list[Any]:
-        parts = [
-            SimpleNamespace(rough=True, best=SimpleNamespace(score=SimpleNamespace(gain=g)))
-            for g in gains
-        ]
-        return [*parts, SimpleNamespace(rough=False, best=None)]
-
-    assert len(_shared(trials((200.0, 150.0, 90.0)))) == 4
-    assert len(_shared(trials((200.0, 150.0, 1.0)))) == 3
-
-
-def test_a_simulation_that_runs_away_is_refused(
-    clean_bench: Problem, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("gains", "whole"), [((200.0, 150.0, 90.0), True), ((200.0, 150.0, 1.0), False)]
+)
+def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it(
+    clean_bench: Problem, gains: Sequence[float], whole: bool
 ) -> None:
+    (wanted,) = [c for c in candidates(clean_bench) if c.label == "coulomb at load.flange"]
+    (probe,) = single(clean_bench, [wanted])
+
+    def tried(gain: float, rough: bool) -> Trials:
+        item = unscored(probe)
+        item.score = replace(item.score, gain=gain)
+        return Trials(probe, 1.0, best=item, rough=rough)
+
+    trials = [*(tried(gain, True) for gain in gains), tried(sum(gains), False)]
+    assert _shared(trials) == (trials if whole else trials[:-1])
+
+
+def test_a_simulation_that_runs_away_is_refused(clean_bench: Problem) -> None:
+    """Values that are no numbers an FMU refuses itself."""
     layout = SampleStack(clean_bench, clean_bench.chosen("identification"))
     nothing = np.zeros(layout.size)
     absorber = Absorber(np.zeros((layout.size, len(clean_bench.parameters))), clean_bench)
     place = Bench(simulator(clean_bench), clean_bench.nominal, layout, nothing, nothing, absorber)
-    for value in (1e30, np.nan):
-        monkeypatch.setattr(
-            "cosim.diagnose.secant.model_values", lambda *_, v=value: np.full(layout.size, v)
-        )
-        with pytest.raises(CosimError, match="runs away"):
-            place.at(clean_bench, {})
+    place.at(clean_bench, {})
+    away = clean_bench.changed(channels=[replace(c, gain=1e30) for c in clean_bench.channels])
+    with pytest.raises(CosimError, match="runs away"):
+        place.at(away, {})

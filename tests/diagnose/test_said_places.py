@@ -2,54 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 from cosim.cli.app import app
-from cosim.diagnose.facts import Table
-from cosim.diagnose.result import Diagnosis
-from cosim.diagnose.verdict import decide
-from tests.diagnose.test_verdict import FAR, law, model, table
+from tests.diagnose import built
 
-LEFT, RIGHT = "base.speed_left", "base.speed_right"
-LATE = law("delay", "log.outputs")
-SETS = FAR, model(law("gain", LEFT), LATE), model(law("gain", RIGHT), LATE, gain=-1.0)
+LATE, DRAG = 0.02, 1e-4
+"""Of the clock of a log [s], and of a disc [N.m.s2/rad2]."""
+AT_REST = ("sweep", "swing", "again")
+"""Runs in which the torque rises from 0, so that who is late, drive or sensors, shows nowhere."""
 
 
-def printed(monkeypatch: pytest.MonkeyPatch, folder: Path, known: Table) -> list[str]:
-    """Lines of the command for a diagnosis that ended with this table of models."""
-    problem = SimpleNamespace(
-        name="mine", file=SimpleNamespace(path=Path("robot.toml")), channels=(), instances={},
-        parameters=(), runs=(),
-    )  # fmt: skip
-    result = Diagnosis(problem, decide(known), known)  # type: ignore[arg-type]
-    monkeypatch.setattr("cosim.diagnose.result.made_of", lambda problem, after: {})
-    monkeypatch.setattr("cosim.calibrate.mapping.read_problem", lambda *_, **__: problem)
-    monkeypatch.setattr("cosim.diagnose.diagnose", lambda *_, **__: result)
-    monkeypatch.setattr("cosim.report.page.write_page", lambda *_: None)
+def drag(w: float, theta: float, t: float) -> float:
+    return DRAG * w * abs(w)
+
+
+def printed(folder: Path, names: Sequence[str]) -> list[str]:
+    """Lines of the verdict for a disc with drag that was logged late, in these runs."""
+    built.problem(folder, drag, late={"delay": LATE}, names=names)
     done = CliRunner().invoke(app, ["diagnose", str(folder), "--out", str(folder / "out")])
     assert done.exit_code == 0, done.output
-    return [line.strip() for line in done.output.splitlines()]
+    lines = [line.strip() for line in done.output.splitlines()]
+    return lines[next(i for i, line in enumerate(lines) if ": effect_found." in line) :]
 
 
-def test_a_law_of_a_set_is_said_with_the_places_where_it_does_the_same(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A gain of one wheel beside a late camera: the other wheel's gain does as well."""
-    lines = printed(monkeypatch, tmp_path, table(*SETS, alike=((1, 2),)))
-    place = next(i for i, line in enumerate(lines) if line.startswith(f"gain at {LEFT}:"))
-    assert lines[place + 1] == f"or at {RIGHT}: these runs do not tell which"
-    assert lines[place + 2].startswith("delay at log.outputs:")
-    assert sum("do not tell which" in line for line in lines) == 1  # the delay is where it is
+@pytest.mark.slow
+def test_a_law_of_a_set_is_said_with_the_places_where_it_does_the_same(tmp_path: Path) -> None:
+    """A drive that is late beside a drag: late sensors do as well."""
+    lines = printed(tmp_path, AT_REST)
+    place = next(i for i, line in enumerate(lines) if line.startswith("delay at "))
+    assert lines[place].startswith("delay at log.load.tau: t_d = 0.02")
+    assert lines[place + 1] == "or at log.load.outputs: these runs do not tell which"
+    assert any(line.startswith("quadratic_drag at load.flange: c = ") for line in lines)
+    assert sum("do not tell which" in line for line in lines) == 1  # the drag is where it is
 
 
-def test_a_place_that_the_data_tell_is_said_alone(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    far = model(law("gain", RIGHT), LATE, rms=1.3)
-    lines = printed(monkeypatch, tmp_path, table(*SETS[:2], far))
-    assert any(line.startswith(f"gain at {LEFT}:") for line in lines)
+@pytest.mark.slow
+def test_a_place_that_the_data_tell_is_said_alone(tmp_path: Path) -> None:
+    """A run that begins with a torque tells that it moves at once, and is seen late."""
+    lines = printed(tmp_path, built.FEW)
+    assert any(line.startswith("delay at log.load.outputs: t_d = 0.02") for line in lines)
     assert not any("do not tell which" in line for line in lines)
