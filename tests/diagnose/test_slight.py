@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.diagnose.diagnosis import _slight
+from cosim.diagnose.course import slight
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.together import Draft, _better
@@ -54,18 +54,20 @@ def asked(rig: Rig, base: Fitted, effect: str) -> tuple[bool, float, list[str]]:
     said: list[str] = []
     winner = further(rig, base, effect)
     stage = Round(base, [], {}, fitted=[winner], winner=winner)
-    slight = _slight(rig.search, stage, said.append)
-    return slight, rig.search.gain(base, winner) / beyond(base), said
+    rig.search.say, before = said.append, rig.search.say
+    found = slight(rig.search, stage)
+    rig.search.say = before
+    return found, rig.search.gain(base, winner) / beyond(base), said
 
 
 def test_a_further_law_must_take_a_tenth_of_what_is_evidently_missing(lacking: Rig) -> None:
     base = further(lacking, lacking.base, "unbalance")
-    slight, share, said = asked(lacking, base, "quadratic_drag")
-    assert slight and share < 0.05
+    little, share, said = asked(lacking, base, "quadratic_drag")
+    assert little and share < 0.05
     assert said[0].startswith("not added: quadratic_drag at load.flange, ")
     assert said[0].endswith(" % of what is left")
-    slight, share, said = asked(lacking, base, "coulomb")
-    assert not slight and share > 0.15 and not said
+    little, share, said = asked(lacking, base, "coulomb")
+    assert not little and share > 0.15 and not said
 
 
 def test_a_noise_that_is_off_by_a_few_per_cent_is_no_missing_law(tmp_path: Path) -> None:
@@ -74,16 +76,16 @@ def test_a_noise_that_is_off_by_a_few_per_cent_is_no_missing_law(tmp_path: Path)
 
     with built.rig(tmp_path, hidden) as rig:
         base = further(rig, further(rig, rig.base, "unbalance"), "coulomb")
-        slight, share, said = asked(rig, base, "quadratic_drag")
+        little, share, said = asked(rig, base, "quadratic_drag")
     assert 0.0 < beyond(base) < 0.1 * base.estimate.count and share < 0.1
-    assert not slight and not said
+    assert not little and not said
 
 
 def test_where_runs_turn_unstable_little_is_enough(tmp_path: Path) -> None:
     """Moments that come too early are most of what is left there."""
     with built.rig(tmp_path, evident, unstable=True) as rig:
-        slight, share, said = asked(rig, further(rig, rig.base, "unbalance"), "quadratic_drag")
-    assert share < 0.05 and not slight and not said
+        little, share, said = asked(rig, further(rig, rig.base, "unbalance"), "quadratic_drag")
+    assert share < 0.05 and not little and not said
 
 
 def test_a_larger_set_must_take_a_tenth_of_what_smaller_ones_leave(lacking: Rig) -> None:
