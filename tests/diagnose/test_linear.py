@@ -152,10 +152,10 @@ def test_the_same_law_elsewhere_must_do_as_well_to_a_hair(tmp_path: Path) -> Non
         best = rig.added(base, "coulomb", {"tau_c": 0.03, "w_0": 2e-3})
         other = replace(best, signature=rig.trace(base, "stribeck"))  # of another quantity
         twin = rig.added(base, "coulomb", {"tau_c": 0.03})
-        assert twin.gate is not None
         for share, wanted in ((5e-6, True), (2e-5, False)):
             more = search.total(base, best) * (1.0 - share) - search.total(base, twin)
-            there = replace(moved(twin), gate=replace(twin.gate, gain=twin.gate.gain + more))
+            there = moved(twin)
+            there.estimate = replace(there.estimate, robust=there.estimate.robust - more)
             assert search.simplest(base, best, [best, there]) is (there if wanted else best)
             assert search.simplest(base, other, [there]) is other
         same = rig.trace(base, "coulomb")
