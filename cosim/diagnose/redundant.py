@@ -41,7 +41,7 @@ def without_redundant(search: Fits, fitted: Fitted, others: Sequence[Parameter])
     if item is None:
         return fitted
     usual = {p.name: item.fixed.get(p.name, p.nominal) for p in others}
-    return at_usual(search, fitted, usual, lambda now: is_open(now, item.strength.name))
+    return at_usual(search, fitted, usual, lambda now: is_undetermined(now, item.strength.name))
 
 
 def at_usual(
@@ -61,7 +61,7 @@ def at_usual(
     for name, value in usual.items():
         if not wanted(fitted):
             break
-        if name not in fitted.estimate.values or not is_open(fitted, name):
+        if name not in fitted.estimate.values or not is_undetermined(fitted, name):
             continue
         less = search.held(fitted, name, value)
         if less is not None and search.gain(less, fitted) <= GATE:
@@ -71,6 +71,6 @@ def at_usual(
     return fitted
 
 
-def is_open(fitted: Fitted, name: str) -> bool:
+def is_undetermined(fitted: Fitted, name: str) -> bool:
     """Whether the data leave a parameter open."""
     return not fitted.estimate.identifiable[fitted.estimate.problem.index(name)]

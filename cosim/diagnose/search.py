@@ -50,7 +50,7 @@ UNWANTED, SLIGHT = 2, 0.1
 """So many where unused runs want none, if they gain this share of what the best one gains."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
-gains to first order are no rivals."""
+gains to first order are no rivals: around the declared model a first order may be off by half."""
 UNEVEN = 10.0
 """Runs that are farther off than this many times the mean square of the one that is least off do
 not choose candidates: linear signatures are wrong there, or an unstable moment decides."""
@@ -58,6 +58,7 @@ TELLING = 0.5
 """Share of what the model lacks that the runs must hold which choose candidates: what does nothing
 in them is not what is missing, or not most of it. One run, where it is in one."""
 ROUNDS = 4
+"""Laws that are added one by one: as many as there may be at once."""
 CHECK = "validation"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -21,8 +21,9 @@ from ..errors import CosimError
 from .candidates import Candidate
 from .choices import choices
 from .linear import MATERIAL, Absorber, SampleStack, score
-from .probes import Batch, Probe, batches
+from .probes import Batch, batches
 from .signature import EVIDENT, SHARE, Signature
+from .trials import Trials, by_problem, mismatch, shared
 
 Vector = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -136,7 +137,7 @@ class Bench:
                 self._together(trials, masks)
                 if thorough:
                     self._varied([t for t in trials if t.rough], masks)
-                    trials = _shared(trials)
+                    trials = shared(trials)
             else:
                 for one in trials:
                     if thorough and one.probe.scanned:
@@ -176,8 +177,11 @@ class Bench:
         assert found is not None
         size = self.stack.largest(found.change.astype(np.float64))
         if size > BEYOND:
+            before = trials.promise, trials.wish
             trials.value, trials.open, trials.tried = found.value * BEYOND / size, True, []
             self.more(trials)
+            if trials.best is None or trials.best.unseen:  # it is absorbed at any strength
+                trials.best, trials.open, (trials.promise, trials.wish) = found, False, before
 
     def _scanned(self, trials: Trials) -> None:
         """The best of its usual strengths: the residual leads from none of them to the right one.
@@ -289,7 +293,7 @@ class Bench:
                     self.more(trials)
             return group
 
-        self._spread(pursued, _by_problem(begun))
+        self._spread(pursued, by_problem(begun))
         return [t.best for t in begun if t.best is not None]
 
     def _hopeful(self, trials: Trials, least: float) -> bool:
@@ -321,7 +325,7 @@ class Bench:
             )
             for item in found
         ]  # fmt: skip
-        self._spread(simulated, _by_problem(again))
+        self._spread(simulated, by_problem(again))
         return self.followed(again)
 
     def more(self, trials: Trials) -> None:
@@ -349,7 +353,7 @@ class Bench:
             trials.value = value * 0.1  # too strong for the system to run
             return
         found = self._mixed(trials, value, changes)
-        if trials.best is None or _mismatch(found) < _mismatch(trials.best):
+        if trials.best is None or mismatch(found) < mismatch(trials.best):
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
             trials.open = False
@@ -409,86 +413,6 @@ class Bench:
             trials.probe, value, change.astype(np.float32), rest.astype(np.float32), result,
             absorbed, trials.second, dict(trials.fixed),
         )  # fmt: skip
-
-
-@dataclass
-class Trials:
-    """Simulations of one candidate so far.
-
-    Attributes:
-        probe: the candidate in its system.
-        value: strength to try next.
-        tried: strengths that were tried.
-        best: signature at the strength nearest to the one that the residual asks for.
-        second: value of its second parameter at which it is tried.
-        fixed: its parameters that have another value than its FMU's.
-        asked: strength that was tried -> share of it that the residual asked for.
-        promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
-        open: whether another may be tried.
-        rough: whether `best` was measured together with other elements of a vector.
-        known: whether its second parameter is known well enough to begin with.
-        error: of the last one that could not be simulated.
-    """
-
-    probe: Probe
-    value: float
-    tried: list[float] = field(default_factory=list)
-    best: Signature | None = None
-    second: float = 0.0
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    asked: dict[float, float] = field(default_factory=dict)
-    promise: float = 0.0
-    wish: float = 0.0
-    open: bool = True
-    rough: bool = False
-    known: bool = False
-    error: str = ""
-
-    def between(self) -> float | None:
-        """Where the residual would ask for the whole strength, if trials lie on both sides of it.
-
-        Limits and dead zones do nothing up to a strength and much beyond, so that shares lead from
-        one side to the other; their logarithm over that of the strength is straighter.
-        """
-        weak = max(((v, a) for v, a in self.asked.items() if a > 1.0 and v > 0.0), default=None)
-        strong = min(((v, a) for v, a in self.asked.items() if 0.0 < a < 1.0), default=None)
-        if weak is None or strong is None or weak[0] >= strong[0]:
-            return None
-        part = np.log(weak[1]) / np.log(weak[1] / strong[1])
-        return float(weak[0] * (strong[0] / weak[0]) ** part)
-
-    def clipped(self, value: float) -> float:
-        """A strength inside its bounds."""
-        strength = self.probe.strength
-        return float(np.clip(value, strength.minimum, strength.maximum))
-
-
-def _by_problem(trials: Sequence[Trials]) -> list[list[Trials]]:
-    """Trials in the same system, which share its sessions."""
-    groups: dict[int, list[Trials]] = {}
-    for one in trials:
-        groups.setdefault(id(one.probe.problem), []).append(one)
-    return list(groups.values())
-
-
-def _shared(trials: list[Trials]) -> list[Trials]:
-    """Trials without the effect on a whole vector, unless every element asks for it.
-
-    Else it would be taken for its gain at the elements that have it, and rounds would be spent on
-    taking it off the others.
-    """
-    gains = [t.best.score.gain for t in trials if t.rough and t.best is not None]
-    if min(gains, default=0.0) > SHARE * sum(gains):
-        return trials
-    return [t for t in trials if t.rough]
-
-
-def _mismatch(item: Signature) -> tuple[bool, float]:
-    """How far the strength of the trial is from the one that the residual asks for.
-
-    Farther than any, if calibration absorbs all that the strength does.
-    """
-    return item.unseen, abs(float(np.log(max(item.score.amplitude, 1e-6))))
 
 
 def patience(base: Simulator) -> dict[str, float]:

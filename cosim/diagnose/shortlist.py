@@ -14,9 +14,11 @@ from .signature import WHOLES, Signature, groups_of, kind
 NEARLY = 0.7
 """Share of `MATERIAL` from which a candidate is refitted: its linear size is an estimate."""
 REFITS = 6
+"""Candidates that are refitted at most, a limit on work: of the others only the first order speaks,
+unless they are rivals of the winner (`rivals.challenged`)."""
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
-refitted: it is no rival, and another round will ask again."""
+refitted: it is no rival, and if the winner leaves more than noise, another round asks again."""
 MEMBERS = 2
 """Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
 SHARED = 0.5

@@ -15,8 +15,9 @@ from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import Candidate, balances, candidates
 from cosim.diagnose.linear import Absorber, SampleStack
 from cosim.diagnose.probes import EFFECTS, MOST, PLACES, Batch, batches, single
-from cosim.diagnose.secant import Bench, Trials, _shared, model_values
+from cosim.diagnose.secant import Bench, model_values
 from cosim.diagnose.signature import unscored
+from cosim.diagnose.trials import Trials, shared
 from cosim.errors import CosimError
 from cosim.installation.builder import default_provider
 from cosim.system.toml import read_system
@@ -215,7 +216,7 @@ def test_a_whole_vector_is_blamed_only_if_every_element_asks_for_it(
         return Trials(probe, 1.0, best=item, rough=rough)
 
     trials = [*(tried(gain, True) for gain in gains), tried(sum(gains), False)]
-    assert _shared(trials) == (trials if whole else trials[:-1])
+    assert shared(trials) == (trials if whole else trials[:-1])
 
 
 def test_a_simulation_that_runs_away_is_refused(clean_bench: Problem) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.own_plant import catalogue, example, made
 from cosim.diagnose.search import Search
-from cosim.diagnose.secant import Trials
+from cosim.diagnose.trials import Trials
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
