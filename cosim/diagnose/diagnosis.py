@@ -37,6 +37,7 @@ from .localise import localise
 from .models import Fitted
 from .result import Diagnosis
 from .rivals import elsewhere, simplified
+from .rounds import Round
 from .search import ROUNDS, Search
 from .table import candidates_of, table_of
 from .verdict import above, decide, proposal, unasked
@@ -276,7 +277,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
             search.memo.keep(current)
             if current.labels not in simple:
                 simplified(search, current, offered)
-                elsewhere(search, current, rounds)
+                elsewhere(search, current, _beside(search, current))
                 simple.add(current.labels)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)
@@ -309,6 +310,18 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
         rival = search.memo.get(names)
         assert rival is not None
         result.experiment = propose(current, rival)
+
+
+def _beside(search: Search, fitted: Fitted) -> list[Round]:
+    """The rounds that asked beside laws of a set; if none did, one that asks for the same laws.
+
+    A set that was found along the log's motion has had no rounds.
+    """
+    laws = set(fitted.effects)
+    if len(laws) < 2 or any(laws & set(stage.base.effects) for stage in search.rounds):
+        return search.rounds
+    kinds = {effect.effect for effect in laws}
+    return [search.scored(fitted, {c.label for c in search.known if c.effect in kinds})]
 
 
 def _look_further(result: Diagnosis) -> None:

@@ -142,7 +142,7 @@ def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) 
     Args:
         search: fits and judges.
         fitted: the set, thoroughly fitted.
-        rounds: that found it.
+        rounds: that found it, or one that asks beside it; that one is of all places.
     """
     declared = search.memo.get(frozenset())
     assert declared is not None
@@ -152,7 +152,8 @@ def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) 
             s.candidate: s
             for stage in rounds if effect in stage.base.effects
             for s in stage.signatures
-            if s.candidate.effect == effect.effect and s.candidate.instance == effect.instance
+            if s.candidate.effect == effect.effect
+            and (s.candidate.instance == effect.instance or stage.base is fitted)
             and s.candidate not in fitted.effects
             and s.absorbed > HIDDEN and s.score.size > 0.0
         }  # fmt: skip
