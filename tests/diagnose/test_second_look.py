@@ -10,7 +10,10 @@ import pytest
 from benchmarks.bench import Bench
 from benchmarks.crawler_plant import EFFECTS, SECONDS, SHEET, write_sets
 from cosim.calibrate.mapping import read_problem
+from cosim.diagnose import Diagnosis
+from cosim.diagnose.answer import Verdict
 from cosim.diagnose.candidates import candidates
+from cosim.diagnose.course import Course
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import Search
 from tests.problems import simulator
@@ -63,3 +66,14 @@ def test_a_law_that_calibration_hides_is_found_around_nominal_values(search: Sea
 @pytest.mark.parametrize("search", ["camera_late"], indirect=True)
 def test_the_law_that_is_there_stays(search: Search) -> None:
     assert looked(search, LATE) is None
+
+
+@pytest.mark.parametrize("search", ["friction_anisotropy"], indirect=True)
+def test_what_the_last_round_asks_for_around_nominal_values_is_used(search: Search) -> None:
+    """The second round adds nothing, asks there, and there is no third one."""
+    base = search.calibrated()
+    search.note(base)
+    result = Diagnosis(search.raw, Verdict(""), search=search, before=base)
+    found = Course(result, search, base, rounds=2).followed()
+    assert found.labels == {ACROSS}
+    assert [stage.winner is None for stage in search.rounds] == [False, True, False]
