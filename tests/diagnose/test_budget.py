@@ -21,7 +21,7 @@ from cosim.errors import CosimError
 from tests.diagnose import disc
 
 FEW = ("sweep", "steps", "check")
-ENOUGH = 260
+ENOUGH = 400
 """Simulated runs in which the declared parameter and some laws are fitted; all of them take more
 than a thousand."""
 
