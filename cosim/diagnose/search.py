@@ -336,7 +336,8 @@ class Search(LateValueFitter):
         if current.winner is None and is_open(base.estimate):
             others = remaining(self, current, first)
             if others:
-                self.say(f"unused runs want none of them; the next {len(others)}:")
+                runs = "unused" if self.unused else "fitted"
+                self.say(f"{runs} runs want none of them; the next {len(others)}:")
                 base = self.attempted(start, current, others)
         if current.winner is None:
             return current
@@ -450,10 +451,9 @@ class Search(LateValueFitter):
         fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
         current.fitted.append(fitted)
         self.note(fitted)
-        self.say(
-            f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification, "
-            f"{fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
-        )
+        text = f"{item.candidate.label}: {self.gain(base, fitted):.0f} nats on identification"
+        unused = f", {fitted.gate.gain:.0f} on validation (z {fitted.gate.z:.1f})"
+        self.say(text + unused * self.unused)
 
     def finish(
         self, base: Fitted, current: Round, share: float, *, uncorrected: bool = False
