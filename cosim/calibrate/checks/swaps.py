@@ -84,7 +84,7 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
     does. Of many short runs some are alike by chance, and a model that is off is so in most of
     them: both fit their own signal as much worse, too, than the other runs do (median), and the
     better fit counts more nats (of a noise of unknown size) than that of the best pair does by
-    chance once in a hundred logs. So runs with a single sample can tell nothing.
+    chance once in a hundred logs. So runs with a single sample tell next to nothing.
     """
     every = range(len(problem.channels))
     pairs = max(0.5 * len(problem.runs) * (len(problem.runs) - 1) * len(every), 1.0)
@@ -101,11 +101,11 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
             if not np.any(apart):
                 continue
             # a fit that is better than the noise is so by chance
-            better = own[a] / np.maximum(_crossed(problem, models, first, second), 1.0)
-            best = own[b] / np.maximum(_crossed(problem, models, second, first), 1.0)
+            one = own[a] / np.maximum(_crossed(problem, models, first, second), 1.0)
+            other = own[b] / np.maximum(_crossed(problem, models, second, first), 1.0)
             crossed = [
-                apart[i] and min(better[i], best[i]) > WORSE
-                and sizes[a, i] * np.log(better[i]) + sizes[b, i] * np.log(best[i])
+                apart[i] and min(one[i], other[i]) > WORSE
+                and sizes[a, i] * np.log(one[i]) + sizes[b, i] * np.log(other[i])
                 > 2.0 * np.log(pairs / CHANCE)
                 for i in every
             ]  # fmt: skip
