@@ -350,7 +350,7 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         mean = settled + gap * (1 - fade) / share
         shown = settled + (shown - settled - lag * gap) * see + lag * gap * fade
         current = settled + gap * fade
-        heat = heat + TICK / slow * (rise * current**2 / 25.0 - heat)
+        heat = heat + TICK / slow * (rise * (1.0 + heat) * current**2 / 25.0 - heat)
         # torques at the joints
         given = RATIO * eta * k_t * mean
         sign = np.tanh(spin / 0.01)

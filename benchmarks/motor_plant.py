@@ -184,10 +184,12 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
             constant = constant * (1 + ripple * np.cos(n_ripple * RATIO * angle))
         return constant
 
+    def warm() -> Vector:
+        return resistance * (1 + 0.00393 * heating * heat) if has["heating"] else resistance
+
     def current_rate(i: Vector, w: Vector, constant: Vector) -> Vector:
-        hot = resistance * (1 + 0.00393 * heating * heat) if has["heating"] else resistance
         supply = u * (1 - sag * (u * i / 48.0) / 48.0) if has["sag"] else u
-        volts = supply - hot * i - constant * RATIO * w
+        volts = supply - warm() * i - constant * RATIO * w
         if has["drop"]:
             volts = volts - drop * np.tanh(i / 0.2)
         return cast(Vector, volts / L_A)
@@ -257,7 +259,7 @@ def simulate(benches: list[Bench], w_ref: Vector, start_angle: Vector) -> dict[s
             else:  # one shaft
                 w_out, angle_out = w, angle
             if has["heating"]:
-                heat = heat + PART * (resistance * i**2 - heat) / t_th
+                heat = heat + PART * (warm() * i**2 - heat) / t_th
     return {name: np.array(values) for name, values in rows.items()}
 
 

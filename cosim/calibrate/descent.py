@@ -2,8 +2,7 @@
 
 Parameters are scaled by their spans, so that combinations that the runs cannot tell apart stay
 where they began. Limits whose integrators stop tick by tick make the cost stepwise: the Jacobian is
-taken over wide steps first, and a search along its main directions, which needs no derivatives,
-ends the fit.
+taken over wide steps first, and along main directions at last (`felt`).
 """
 
 from __future__ import annotations
@@ -16,10 +15,11 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ..errors import FmuCallError
-from .differences import UNEVEN, directional, jacobian, smoothest, unevenness
+from .differences import UNEVEN, jacobian, unevenness
+from .felt import SHORTEST, felt
 from .known import STEP, Known
 from .loss import Loss, Squares
-from .normal import BOUNDS, KNOWN, Normal, cost_of, drawn, gradient
+from .normal import BOUNDS, Normal, cost_of, drawn, gradient
 from .simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -29,10 +29,8 @@ REUSED = 0.02
 """A Jacobian is used again after a step that lowered the cost by this fraction."""
 CORRECTIONS = 4
 """Steps at most with the Jacobian of a point that is close."""
-ROUGH = 0.1
-"""Unevenness of derivatives that go on being those of jumps: others are taken along directions."""
-CALM = 0.8
-"""Share of the information on a direction that runs without jumps give: then derivatives do."""
+TURNS = 3
+"""Times that derivatives are taken along main directions: jumps turn these less each time."""
 RENEWALS, DRAFTED = 5, 3
 """Jacobians that a fit from close by takes at most, and that a draft takes."""
 FIRM = 1e-9
@@ -45,9 +43,9 @@ SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
-SHRUNK, SHORTEST, VALLEY = 0.1, 1e-4, 15
-"""Factor on the steps of differences where a quadratic keeps nothing, the shortest, over the span
-(below, what a solver's tolerance leaves is in the differences), and the Jacobians from then on."""
+SHRUNK, VALLEY = 0.1, 15
+"""Factor on the steps of differences where a quadratic keeps nothing, down to the shortest, and the
+Jacobians from then on."""
 LOWER = 1.0
 """Fall of the cost [nats] from which a point that was met on another errand is worth going to: the
 data prefer it by a factor of e, and fits end that near to their minima."""
@@ -74,7 +72,6 @@ class Descent:
         self.theta = np.clip(theta, problem.lower, problem.upper)
         self.loss: Loss = Squares()
         self.uneven = False
-        self.open: list[Vector] = []  # directions that long steps have found open, in spans
         self.promised = math.inf
         self.unkept, self.valley = 0.0, False
         self.damping = FIRM
@@ -100,32 +97,25 @@ class Descent:
             self.simulator, self.theta, self.purpose, central=central, relative=relative
         )
         normal = Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
-        return self._directed(normal, set(normal.rough), relative) if normal.rough else normal
+        self.uneven = bool(normal.rough)
+        return self._felt(set(normal.rough)) if self.uneven else normal
 
-    def _directed(self, normal: Normal, rough: set[str], relative: float) -> Normal:
-        """Normal equations with the derivatives of runs that jump taken along main directions."""
-        for place, item in enumerate(self.jacobian):
-            if item.run in rough:
-                part = normal.calm[np.ix_(item.columns, item.columns)]
-                self.jacobian[place] = directional(
-                    self.simulator, self.theta, item.run, np.linalg.eigh(part)[1],
-                    relative=relative,
-                )  # fmt: skip
+    def _felt(self, rough: set[str]) -> Normal:
+        """Normal equations with the derivatives of runs that jump over steps that they feel."""
+        self.jacobian = felt(self.simulator, self.theta, self.jacobian, rough)
         return Normal(self.problem, self.theta, self.jacobian, self.residuals, self.loss)
 
     def smooth(self) -> None:
-        """Last steps, with derivatives that avoid jumps; long ones across them have led here."""
+        """Last steps, with derivatives in which jumps are little; long ones have led here."""
         p = self.problem
         if p.unstable:  # rough at any step
             return
-        self.uneven = any(unevenness(p, item) > UNEVEN for item in self.jacobian)
+        self.uneven |= any(unevenness(p, item) > UNEVEN for item in self.jacobian)
         if not self.uneven:
             return
-        self.jacobian = smoothest(self.simulator, self.theta, self.jacobian)
-        normal = Normal(p, self.theta, self.jacobian, self.residuals, self.loss)
-        jumps = {item.run for item in self.jacobian if unevenness(p, item) > ROUGH}
-        if rough := jumps & set(normal.rough):
-            normal = self._directed(normal, rough, STEPS[-1])
+        everything = {item.run for item in self.jacobian}  # jumps that few see count, too
+        for _ in range(TURNS):
+            normal = self._felt(everything)
         self.settle(normal, CORRECTIONS)
 
     def attempt(self, theta: Vector) -> bool:
@@ -312,23 +302,3 @@ class Descent:
             elif not left:
                 break
         return normal
-
-    def polish(self) -> None:
-        """Search along the main directions of the normal matrix, without derivatives."""
-        p = self.problem
-        normal = self.correct()
-        if not normal.rough:
-            return
-        values, vectors = np.linalg.eigh(normal.matrix)
-        for value, direction in zip(values[::-1], vectors.T[::-1], strict=True):
-            if value < 1.0 / KNOWN**2 or float(direction @ normal.calm @ direction) > CALM * value:
-                continue
-            size = 1.0 / math.sqrt(value)
-            for sign in (1.0, -1.0):
-                length = size
-                while self.attempt(
-                    np.clip(self.theta + sign * length * direction * p.scale, p.lower, p.upper)
-                ):
-                    length *= 2.0
-                if length > size:
-                    break

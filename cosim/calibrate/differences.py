@@ -15,12 +15,8 @@ from .simulator import Simulator
 Vector = NDArray[np.float64]
 STEP = 1e-3
 """Step of differences over the span of a parameter."""
-FINER = (1e-3, 1e-4)
-"""Steps that are tried where a model jumps within a longer one (a limit reached a tick earlier)."""
 UNEVEN = 0.01
 """Square of the disagreement of both sides, over that of the derivative, from which it is rough."""
-CALMER = 0.5
-"""Square of the derivative on one side over that on the other, from which only that has jumped."""
 TOLD = 16.0
 """Information on a parameter, per squared span, below which it does not matter."""
 
@@ -102,32 +98,6 @@ def jacobian(
     return output
 
 
-def smoothest(simulator: Simulator, theta: Vector, found: list[Sensitivity]) -> list[Sensitivity]:
-    """Derivatives of which both sides agree, from finer steps for the runs where they do not.
-
-    A jump within the step is no derivative: it looks like information on what changes nothing. All
-    of a run's derivatives come from one step: a jump on both sides alike is not seen. Where the
-    finest step still meets one on one side, the other side is right.
-
-    Args:
-        simulator: of the problem.
-        theta: where.
-        found: central differences.
-    """
-    problem, found = simulator.problem, list(found)
-    columns = sorted({int(i) for item in found for i in item.columns})
-    for step in FINER:
-        rough = [k for k, item in enumerate(found) if unevenness(problem, item) > UNEVEN]
-        if not rough:
-            break
-        names = [found[k].run for k in rough]
-        finer = jacobian(simulator, theta, names, columns=columns, relative=step)
-        for k, item in zip(rough, finer, strict=True):
-            if unevenness(problem, item) < unevenness(problem, found[k]):
-                found[k] = item
-    return [_one_sided(item) if unevenness(problem, item) > UNEVEN else item for item in found]
-
-
 def unevenness(problem: Problem, item: Sensitivity) -> float:
     """Square of the largest disagreement of both sides over a derivative that matters."""
     if item.roughness is None:
@@ -136,79 +106,6 @@ def unevenness(problem: Problem, item: Sensitivity) -> float:
     bends = np.nansum(item.roughness**2, axis=(0, 1))
     matters = told * problem.scale[item.columns] ** 2 > TOLD
     return float(np.max(bends[matters] / told[matters], initial=0.0))
-
-
-def _one_sided(item: Sensitivity) -> Sensitivity:
-    """Derivatives of the side without the jump, where only one of both has one."""
-    assert item.roughness is not None
-    values, rough = item.values.copy(), item.roughness.copy()
-    sides = values + rough, values - rough
-    sizes = np.array([np.nansum(side**2, axis=(0, 1)) for side in sides])
-    uneven = np.nansum(rough**2, axis=(0, 1)) > UNEVEN * np.nansum(values**2, axis=(0, 1))
-    for k in np.flatnonzero(uneven & (sizes.min(axis=0) < CALMER * sizes.max(axis=0))):
-        values[:, :, k] = sides[int(np.argmin(sizes[:, k]))][:, :, k]
-        rough[:, :, k] = 0.0
-    return Sensitivity(item.run, item.columns, values, rough)
-
-
-def directional(
-    simulator: Simulator,
-    theta: Vector,
-    run: MeasuredRun | str,
-    directions: Vector,
-    *,
-    relative: float = STEP,
-) -> Sensitivity:
-    """Derivatives of one run along directions, given back along the parameters.
-
-    Where the model jumps, differences along parameters do not cancel in a combination that has
-    no effect at all; differences along the combination do.
-
-    Args:
-        simulator: of the problem.
-        theta: where.
-        run: which.
-        directions: orthonormal columns over the run's parameters, in spans.
-        relative: step in spans.
-    """
-    problem = simulator.problem
-    run = problem.run(run) if isinstance(run, str) else run
-    columns = problem.columns(run.name)
-    scale = problem.scale[columns]
-
-    def simulate(change: Vector) -> Vector:
-        moved = theta.copy()
-        moved[columns] += change * scale
-        return simulator.simulate(np.clip(moved, problem.lower, problem.upper), run)
-
-    low, high = problem.lower[columns] - theta[columns], problem.upper[columns] - theta[columns]
-    steps: list[tuple[float, float]] = []
-    for direction in directions.T:
-        room = []
-        for sign in (1.0, -1.0):
-            way = sign * direction * scale
-            with np.errstate(divide="ignore", invalid="ignore"):
-                limits = np.where(way > 0, high / way, np.where(way < 0, low / way, np.inf))
-            room.append(float(np.min(limits)))
-        if min(room) >= 0.1 * relative:
-            size = min(relative, *room)
-            steps.append((-size, size))
-        else:
-            steps.append((0.0, relative) if room[0] > room[1] else (-relative, 0.0))
-    changes = [h * d for d, pair in zip(directions.T, steps, strict=True) for h in pair if h]
-    results = iter(simulator.spread(simulate, [np.zeros(columns.size), *changes]))
-    base = next(results)
-    gap = np.where(np.isfinite(run.data), 0.0, np.nan)
-    slopes = np.empty((*run.data.shape, columns.size))
-    bends = np.zeros_like(slopes)
-    for place, (first, second) in enumerate(steps):
-        below = next(results) if first else base
-        above = next(results) if second else base
-        slopes[:, :, place] = (above - below) / (second - first) / problem.sigma + gap
-        if first and second:
-            bends[:, :, place] = (above + below - 2 * base) / (second - first) / problem.sigma
-    back = directions.T / scale
-    return Sensitivity(run.name, columns, run.white(slopes @ back), run.white(bends @ back))
 
 
 def _sides(

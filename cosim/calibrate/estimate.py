@@ -18,7 +18,7 @@ from .parts import Sensitivity
 from .problem import Problem
 from .simulator import Simulator
 from .valley import profiled, stretch
-from .weak import WEAK, confirmed, opened
+from .weak import WEAK, confirmed
 
 Vector = NDArray[np.float64]
 
@@ -134,8 +134,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     normal = Normal(problem, run.theta, run.jacobian, run.residuals, run.loss)
     count = int(sum(np.isfinite(r).sum() for _, r in run.residuals))
     scale = problem.scale
-    matrix = opened(run, normal.matrix) if confirm else normal.matrix
-    values, vectors = np.linalg.eigh(matrix)
+    values, vectors = np.linalg.eigh(normal.matrix)
     values = np.maximum(values, 0.0)  # beside 1e17 of the best known one, rounding is below -12
     turned = vectors
     if confirm:

@@ -32,8 +32,8 @@ class Effort:
         begin: `far`: large residuals count linearly at first, the calmest runs lead; `near`: they
             count in full; `there`: but for small corrections, by steps with one Jacobian.
         end: `draft`: the minimum roughly, for comparison or another fit, no intervals; `intervals`:
-            derivatives good enough for these; `polished`: after a search without derivatives, too,
-            which `there` needs not.
+            derivatives good enough for these; `polished`: after steps with derivatives taken there,
+            too, which `there` begins with.
         iterations: at each size of difference steps at most, or with known derivatives.
         share: of the cost beyond the noise's, below which a fall ends a fit with known derivatives.
     """
@@ -49,7 +49,7 @@ THOROUGH = Effort()
 INTERVALS = Effort("near", "intervals", iterations=0)
 """Stays where it begins and says what the data know there."""
 POLISH = Effort("near", iterations=0)
-"""The last search and steps alone."""
+"""The last steps alone."""
 CORRECTION = Effort("there", "intervals")
 """Steps from close by, with intervals."""
 DRAFT = Effort("there", "draft")
@@ -104,7 +104,7 @@ def fit(
     run.descend(STEPS[1], effort.iterations, 5e-3 if draft else 1e-4)
     run.count(loss_for(problem.unstable, run.residuals))
     if effort.end == "polished":
-        run.polish()
+        run.correct()
     elif effort.end == "intervals":
         run.normal(STEPS[-1], central=True)
     return estimated(run) if draft else _confirmed(run, stays=effort.end == "intervals")

@@ -38,7 +38,6 @@ class Normal:
         matrix, gradient: J^T J and J^T r, with priors.
         scores: J^T r of each block (rows), for the sandwich.
         rough: runs that jump.
-        calm: the matrix of the others.
     """
 
     def __init__(
@@ -52,7 +51,6 @@ class Normal:
         size, scale = theta.size, problem.scale
         self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
         self.rough: list[str] = []
-        calm = np.zeros((size, size))
         scores = []
         residuals = list(residuals)
         block = block_length([problem.run(name).times for name, _ in residuals])
@@ -74,8 +72,6 @@ class Normal:
                 reliable, share = _reliable(matrix, (bend * factor.reshape(-1, 1)).T @ bend)
             if share is not None:
                 self.rough += [name] * bool(np.trace(reliable) < 0.99 * np.trace(matrix))
-            if name not in self.rough:
-                calm[np.ix_(columns, columns)] += matrix
             self.matrix[np.ix_(columns, columns)] += reliable
             per_sample = np.einsum("tcp,tc->tp", derivative, factor * errors)
             index = ((run.times - run.times[0]) / block).astype(np.intp)
@@ -86,7 +82,6 @@ class Normal:
                 sums[:, columns] = sums[:, columns] @ share.T
             scores.append(sums)
             self.gradient += sums.sum(axis=0)
-        self.calm = calm
         self.scores = np.concatenate(scores) if scores else np.zeros((0, size))
         for i, p in enumerate(problem.parameters):
             if p.prior:

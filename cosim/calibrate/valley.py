@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import FmuCallError
 from .descent import Descent
+from .felt import STUCK
 from .normal import KNOWN, Normal, gradient
 from .problem import Problem
 
@@ -27,8 +28,6 @@ it, and rises of the cost [nats] at which it has gone far enough, and at which i
 """
 SHARED = 0.1
 """Share of a step [spans] from which a parameter takes part in it."""
-STUCK = 0.05
-"""RMS over the noise of the differences between models that stick at other ticks."""
 LONGER, SHORTER = (1.0, 3.0, 9.0, 27.0), 0.3
 """Multiples of a step that are tried as long as it gets better, and the one if it has not."""
 

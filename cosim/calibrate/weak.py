@@ -47,35 +47,7 @@ def confirmed(run: Descent, values: Vector, vectors: Vector) -> tuple[Vector, Ve
         seen = _seen(run, vectors[:, i], values, vectors, values > CLEAR * values[i])
         if seen is not None:
             found[i], turned[:, i] = seen
-            if found[i] < 1.0 / KNOWN**2:
-                run.open.append(turned[:, i])
     return found, turned
-
-
-def opened(run: Descent, matrix: Vector) -> Vector:
-    """Normal equations without what they claim along directions that long steps find open.
-
-    Directions that were open where the fit was before are asked again: derivatives that jump mix
-    them with others here, and no direction of these is open then.
-
-    Args:
-        run: its residuals are those at theta.
-        matrix: of the normal equations.
-    """
-    for direction in run.open:
-        values, vectors = np.linalg.eigh(matrix)
-        values = np.maximum(values, 0.0)
-        claimed = float(direction @ matrix @ direction) / float(direction @ direction)
-        if claimed < 1.0 / KNOWN**2:
-            continue
-        seen = _seen(run, direction, values, vectors, values > CLEAR * claimed)
-        if seen is None or seen[0] >= 1.0 / KNOWN**2:
-            continue
-        along = matrix @ seen[1]
-        claimed = float(seen[1] @ along)
-        if claimed > 1.0 / KNOWN**2:  # else turned back to where nothing is claimed
-            matrix = matrix - np.outer(along, along) / claimed
-    return matrix
 
 
 def _seen(

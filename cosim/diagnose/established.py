@@ -15,7 +15,7 @@ from .candidates import Candidate
 from .composed import composed
 from .late_values import LateValueFitter
 from .models import GATE, Fitted, compare
-from .redundant import at_usual
+from .redundant import at_usual, without_redundant
 from .rivals import challenged
 from .rounds import Round
 from .verdict import HAIR, wanted
@@ -28,13 +28,21 @@ unstable: moments that come too early are most of that, and any law moves them a
 def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """Replace a winner by a simpler law where nothing else of it is determined.
 
+    Before that, parameters that undo its strength are held: a draft may have taken both as known.
+
     Args:
         search: fits and judges.
         base: model without the effect.
         stage: the round; its winner has intervals.
     """
     winner = stage.winner
-    assert winner is not None
+    assert winner is not None and winner.signature is not None
+    strength, prefix = winner.signature.strength.name, winner.effects[-1].prefix
+    others = [p for p in winner.problem.parameters if p.name.startswith(prefix)]
+    plain = without_redundant(search, winner, [p for p in others if p.name != strength])
+    if plain is not winner:
+        winner = search.sharpened(plain, base)
+        stage.follow(winner)
     simple = _simpler(search, base, stage)
     if simple is winner:
         return

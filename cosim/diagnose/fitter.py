@@ -20,6 +20,7 @@ from ..calibrate.parts import Sensitivity
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
+from .doubling import doubled
 from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import GATE, Fitted, absent, compare, is_open
@@ -38,10 +39,11 @@ USUAL = 2.1
 order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
-DOUBLINGS = 6
-"""Times at most that a strength to begin with is doubled, from the usual one up and down."""
 SHARP = 0.01
 """Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
+CORRECTIONS, STALE = 4, 10.0
+"""Times at most that errors of the exchange are taken from the data where a fit has ended, and what
+they may be off by there [nats]: twice what decides between two models, about what jumps leave."""
 AGAIN, BRINGS = 3, 0.1
 """Times at most that a model is fitted with new derivatives to come up with another one, and the
 share of what it lacks that each must bring to be followed by another."""
@@ -90,14 +92,29 @@ class Fitter(Judge):
             base: what its gain counts from.
             draft: only to be compared; its intervals are not needed.
         """
-        theta = quick.estimate.theta
-        try:
-            simulator = corrected(quick.simulator, theta, self.raw)
-            found = self.judged(fit(simulator, theta, effort=DRAFT if draft else CORRECTION))
-        except CosimError as error:  # a step finer than that of the quick fit may be unstable
-            self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
-            return quick
-        return self.again(found, quick, base)
+        found = quick
+        for _ in range(CORRECTIONS):
+            theta = found.estimate.theta
+            try:
+                simulator = corrected(quick.simulator, theta, self.raw)
+                estimate = fit(simulator, theta, effort=DRAFT if draft else CORRECTION)
+                found = self.again(self.judged(estimate), quick, base)
+            except CosimError as error:  # a step finer than that of the quick fit may be unstable
+                self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
+                break
+            if self.raw.unstable or self.stale(found) <= STALE:
+                break
+        return found
+
+    def stale(self, fitted: Fitted) -> float:
+        """By how much the exchange was corrected for another place than where a fit ended [nats].
+
+        Its cost is that of corrected data; the model's own, without what the search's step adds, is
+        the same if the correction holds there.
+        """
+        residuals = dict(fitted.estimate.residuals)
+        taken = self.fitting.vector([residuals[run.name] for run in self.fitting.runs])
+        return abs(self.fitting.cost(taken) - self.fitting.cost(self.fit_data - fitted.fit))
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""
@@ -203,7 +220,10 @@ class Fitter(Judge):
             bend = abs(item.score.amplitude - 1.0) > EXACT and self.lacking(base)
             if bend or is_open(base.estimate):
                 usual = item.strength.span if bend else 0.0
-                first = self._doubled(simulator, first, min(costs), item.strength.name, usual)
+                first = doubled(
+                    lambda theta: self.cost(simulator, theta), simulator.problem, first,
+                    min(costs), item.strength.name, usual,
+                )  # fmt: skip
             result = self.fitted(simulator, first, base.estimate)
             if result.estimate.unkept > max(GATE, goal - self.gain(base, result)):
                 result = self._elsewhere(simulator, rest, result)
@@ -227,40 +247,6 @@ class Fitter(Judge):
             found = self.judged(fit(simulator, start, effort=DRAFT))
             best = min(best, found, key=lambda f: f.estimate.robust)
             if best.estimate.robust < enough:
-                break
-        return best
-
-    def _doubled(
-        self, simulator: Simulator, theta: Vector, cost: float, name: str, usual: float = 0.0
-    ) -> Vector:
-        """A place to begin with a larger strength, as long as that is better.
-
-        First orders ask for too little of what shifts oscillations, such as play, and a little of
-        it may do more harm than none: up to the usual strength all are tried.
-
-        Args:
-            simulator: of the problem.
-            theta: where to begin else.
-            cost: there.
-            name: of the strength.
-            usual: where it is, 0 if the first order holds.
-        """
-        problem = simulator.problem
-        place = problem.index(name)
-        low, high = problem.lower[place], problem.upper[place]
-        trial, best = theta.copy(), theta
-        least = 0.5**DOUBLINGS * usual
-        for _ in range(2 * DOUBLINGS):
-            size = 2.0 * trial[place]
-            trial = trial.copy()
-            trial[place] = np.clip(max(size, least) if size >= 0.0 else size, low, high)
-            try:
-                now = self.cost(simulator, trial)
-            except CosimError:
-                break
-            if now < cost - GATE:
-                best, cost = trial, now
-            elif abs(trial[place]) >= usual:
                 break
         return best
 
@@ -463,12 +449,18 @@ class Fitter(Judge):
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
         result = self.again(result, fitted, base)
-        unused = compare(self.check_data, fitted.check, result.check, self.checking)
-        if self.gain(fitted, result) <= GATE or not unused.passed:
+        if result.estimate.unkept > GATE and not self._wanted(fitted, result):  # it has stalled
+            fitted, result = (self.sharpened(f, base, draft=True) for f in (fitted, result))
+        if not self._wanted(fitted, result):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
         result = self.again(without_redundant(self, result, others), fitted, base)
         return result if quick else self.sharpened(result, base, draft=True)
+
+    def _wanted(self, fitted: Fitted, other: Fitted) -> bool:
+        """Whether all runs want another model instead."""
+        unused = compare(self.check_data, fitted.check, other.check, self.checking)
+        return self.gain(fitted, other) > GATE and unused.passed
 
     def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
         """A model fitted with derivatives of its own, as long as another does better and it helps.

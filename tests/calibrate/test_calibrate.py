@@ -7,8 +7,9 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from cosim.calibrate.differences import directional, jacobian
+from cosim.calibrate.differences import jacobian
 from cosim.calibrate.estimate import channel_rms, determined
+from cosim.calibrate.felt import felt
 from cosim.calibrate.fit import Effort, fit
 from cosim.calibrate.sensitivity import correlation_index, local, significance_limit
 from cosim.calibrate.simulator import Simulator
@@ -100,13 +101,12 @@ def test_how_a_law_is_computed_is_no_parameter(short) -> None:
     assert "motor.winding.winding_heating.t_th" in warm.names
 
 
-def test_directional_derivatives_are_those_of_the_jacobian(short, truth) -> None:
+def test_derivatives_over_steps_that_are_felt_are_those_of_the_jacobian(short, truth) -> None:
     along = jacobian(simulator(short), truth, ["sines"], relative=1e-2)[0]
-    random = np.random.default_rng(0)
-    directions = np.linalg.qr(random.normal(size=(truth.size, truth.size)))[0]
-    other = directional(simulator(short), truth, "sines", directions, relative=1e-2)
+    (other,) = felt(simulator(short), truth, [along], {along.run})
+    assert other.columns.tolist() == along.columns.tolist()
     difference = np.linalg.norm((along.values - other.values) * short.scale)
-    # both are differences over 1 % of the spans; limits and ticks make them scatter
+    # these are differences over 1 % of the spans; limits and ticks make them scatter
     assert difference < 0.05 * np.linalg.norm(along.values * short.scale)
 
 

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cosim.calibrate.descent import Descent
-from cosim.calibrate.differences import jacobian, smoothest
+from cosim.calibrate.differences import jacobian
+from cosim.calibrate.felt import felt
 from cosim.calibrate.loss import Squares
 from cosim.calibrate.normal import Normal
 from cosim.calibrate.parts import Sensitivity
@@ -17,6 +19,7 @@ from cosim.calibrate.simulator import Simulator
 from cosim.calibrate.valley import profiled
 from tests.problems import simulator
 
+Vector = NDArray[np.float64]
 RANDOM = np.random.default_rng(8)
 TRUE = RANDOM.standard_normal((400, 3)) * np.array([300.0, 300.0, 30.0])
 WRONG = RANDOM.standard_normal((400, 3)) * np.array([40.0, 40.0, 1.0])
@@ -72,30 +75,76 @@ def test_what_the_data_tell_stays_told() -> None:
     assert found == pytest.approx(truth, rel=0.2)
 
 
-@pytest.mark.parametrize("edge", [0.004, 5e-5, 0.5])
-def test_derivatives_beside_a_jump_come_from_a_finer_step(
-    short: Problem, monkeypatch: pytest.MonkeyPatch, edge: float
-) -> None:
-    """It lies `edge` spans away: inside a step of a hundredth, of any that is tried, or outside."""
+def jumping(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, jumps: float, limit: float = np.inf
+) -> list[Vector]:
+    """Information on two directions of two parameters: by the Jacobian, and by steps felt alike.
+
+    The model is linear and the parameters act together: nothing changes along one direction.
+
+    Args:
+        short, monkeypatch: of the test.
+        jumps: RMS over the noise of what each change of parameters changes besides.
+        limit: sum of the parameters' changes [spans] from which twice the noise is added.
+    """
     run = short.chosen("identification")[0]
     theta = short.nominal
-    place, span = short.index("K_t"), short.scale[short.index("K_t")]
-    slope, steps = 50.0, []
+    columns = sorted([short.index("K_t"), short.index("R_a")])
+    span = short.scale[columns]
+    shape = np.random.default_rng(1).standard_normal(run.data.shape)
+    shape[::2] = 0.0  # there it only jumps: what turns directions is not what this is about
+    random = np.random.default_rng(2)
 
-    def simulate(self: Simulator, values: np.ndarray, run: object) -> np.ndarray:
-        away = (values[place] - theta[place]) / span
-        steps.append(abs(away))
-        rows = slope * away + (100.0 if away > edge else 0.0)
-        return np.full(data.shape, rows) * self.problem.sigma
+    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
+        away = float(np.sum((values[columns] - theta[columns]) / span))
+        scatter = random.standard_normal(shape.shape) * (shape == 0.0) * np.any(values != theta)
+        return (shape * (20.0 * away + 2.0 * (away > limit)) + jumps * scatter) * short.sigma
 
-    data = run.data
     monkeypatch.setattr(Simulator, "simulate", simulate)
-    coarse = jacobian(simulator(short), theta, [run.name], columns=[place], relative=1e-2)
-    found = smoothest(simulator(short), theta, coarse)
-    assert found[0].columns.tolist() == [place]
-    told = float(np.nanmax(found[0].values[:, :, 0])) * span
-    # exact: the model is linear on both sides of the jump
-    assert told == pytest.approx(slope, rel=1e-9)
-    assert (found[0] is coarse[0]) is (edge == 0.5)
-    finest = {0.004: 1e-3, 5e-5: 1e-4, 0.5: 1e-2}
-    assert min(s for s in steps if s) == pytest.approx(finest[edge])
+    found = jacobian(simulator(short), theta, [run.name], columns=columns, relative=1e-2)[0]
+    told = []
+    for _ in range(3):
+        flat = (found.values * span).reshape(-1, 2)
+        told.append(np.linalg.eigvalsh(flat.T @ flat) / (2.0 * float(np.sum((20.0 * shape) ** 2))))
+        (found,) = felt(simulator(short), theta, [found], {run.name})
+    return told
+
+
+def test_jumps_are_little_of_what_steps_felt_alike_show(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_span, once, twice = jumping(short, monkeypatch, 0.03)
+    # squares of 0.03 of noise on both sides of 0.01 spans are 4.5, of 2 * 20^2
+    assert by_span[0] == pytest.approx(4.5 / 800.0, rel=0.05)
+    # what no longer step changes by more than jumps do changes nothing
+    assert (once[0], twice[0]) == pytest.approx((0.0, 0.0), abs=1e-12)
+    # over 0.3 of noise jumps are a tenth, whose square is taken as information
+    assert twice[1] == pytest.approx(1.0, rel=0.02)
+
+
+def test_what_little_is_told_beside_no_jumps_stays_told(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The twin: a step of which more is seen than jumps leave counts."""
+    by_span, _, twice = jumping(short, monkeypatch, 0.2)
+    # 0.2 of noise over 0.1 spans is beyond what sticking leaves: it counts, a hundredth of before
+    assert 0.0 < twice[0] < 0.02 * by_span[0]
+
+
+def test_without_jumps_steps_felt_alike_change_nothing(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for told in jumping(short, monkeypatch, 0.0):
+        # the model is linear: rounding is left
+        assert told == pytest.approx([0.0, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("limit", [0.004, -0.004])
+def test_beside_a_limit_the_other_side_counts(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, limit: float
+) -> None:
+    """A step up to the limit changes half as much as the limit does: no derivative."""
+    _, once, twice = jumping(short, monkeypatch, 0.0, limit)
+    # exact: the model is linear on the side without the limit
+    assert once == pytest.approx([0.0, 1.0], abs=1e-9)
+    assert twice == pytest.approx([0.0, 1.0], abs=1e-9)

@@ -6,7 +6,7 @@ their judgement.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +50,7 @@ def problem(
     angle: float = 0.0,
     late: Mapping[str, float] = NOTHING,
     names: Sequence[str] = FEW,
+    mapped: Callable[[str], str] = str,
 ) -> Problem:
     """A disc in a few runs, one of them unused.
 
@@ -61,6 +62,7 @@ def problem(
         angle: at which the disc stands when runs begin, which no mapping says [rad].
         late: `delay` [s] or `clock_skew` of the clock by which runs were logged.
         names: of the runs.
+        mapped: the mapping as it is to be, from the usual one.
     """
     laws = law if isinstance(law, Mapping) else dict.fromkeys(names, law)
     disc.write(folder, lambda w, theta, t: 0.0, seconds=seconds, names=names)
@@ -73,8 +75,10 @@ def problem(
         table[:, 2:] += np.array([np.interp(seen, t, values) - values for values in logged]).T
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip
+    mapping = folder / "dataset.toml"
+    mapping.write_text(mapped(mapping.read_text(encoding="utf-8")), encoding="utf-8")
     if unstable:
-        with (folder / "dataset.toml").open("a", encoding="utf-8") as file:
+        with mapping.open("a", encoding="utf-8") as file:
             file.write(LATE)
     return read_problem(folder)
 
@@ -155,10 +159,11 @@ def rig(
     unstable: bool = False,
     angle: float = 0.0,
     late: Mapping[str, float] = NOTHING,
+    mapped: Callable[[str], str] = str,
 ) -> Iterator[Rig]:
     """See `problem`; the search ends with the context."""
     said: list[str] = []
-    plant = problem(folder, law, seconds, unstable=unstable, angle=angle, late=late)
+    plant = problem(folder, law, seconds, unstable=unstable, angle=angle, late=late, mapped=mapped)
     search = Search(simulator(plant), said.append, only=[])
     try:
         base = search.calibrated()

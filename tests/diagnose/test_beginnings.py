@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.mapping import read_problem
+from cosim.diagnose import fitter
 from cosim.diagnose.candidates import delays
+from cosim.diagnose.doubling import doubled
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import _sharpest
 from cosim.diagnose.search import Search
@@ -77,7 +79,9 @@ def test_a_strength_is_doubled_as_long_as_that_is_better(
         [replace(p, maximum=most * SIZE) if p.strength else p for p in model.problem.parameters]
     )
     of, theta = rig.search.simulator.of(problem), np.array([disc.J, disc.B, start * SIZE])
-    end = rig.search._doubled(of, theta, rig.search.cost(of, theta), STRENGTH)
+    end = doubled(
+        lambda at: rig.search.cost(of, at), of.problem, theta, rig.search.cost(of, theta), STRENGTH
+    )
     assert end[2] == pytest.approx(found * SIZE, rel=0.05) and theta[2] == start * SIZE
 
 
@@ -96,7 +100,9 @@ def test_up_to_the_usual_strength_all_are_tried(
     theta = np.array([disc.J, disc.B, start])
     cost = late.cost(of, theta)
     assert late.cost(of, np.array([disc.J, disc.B, start + 0.02])) > cost
-    end = late._doubled(of, theta, cost, f"{clock.prefix}t_d", usual)
+    end = doubled(
+        lambda at: late.cost(of, at), of.problem, theta, cost, f"{clock.prefix}t_d", usual
+    )
     assert end[2] == pytest.approx(found)
 
 
@@ -170,3 +176,53 @@ def test_calm_systems_are_not_asked(rig: Rig) -> None:
     rig.search.count_in_full()
     before = rig.search.evaluations
     assert rig.search.sharper(model, base) is model and rig.search.evaluations == before
+
+
+# -- fits that have not ended ----------------------------------------------------------------------
+
+
+SEARCH_STEP, ANCHOR, WEIGHT, LIGHT = 0.02, 0.5, 0.6, 0.1
+
+
+@pytest.fixture
+def hanging(tmp_path: Path) -> Iterator[Rig]:
+    """A disc with a weight beside its axis, run coarsely in a search."""
+
+    def write(text: str) -> str:
+        return text.replace("step =", f"search_step = {SEARCH_STEP}\nstep =", 1)
+
+    def law(w: float, theta: float, t: float) -> float:
+        return WEIGHT * math.sin(theta + ANCHOR)
+
+    with built.rig(tmp_path, law, mapped=write) as rig:
+        yield rig
+
+
+@pytest.mark.parametrize("most", [fitter.CORRECTIONS, 1])
+def test_errors_of_the_exchange_are_taken_off_again_where_a_fit_has_ended_elsewhere(
+    hanging: Rig, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    """With the law at a third of its size they are others; one correction does not do."""
+    monkeypatch.setattr(fitter, "CORRECTIONS", most)
+    values = {"m_u": WEIGHT / 3.0, "psi": ANCHOR}
+    far = hanging.added(hanging.base, "unbalance", values, fit=False)
+    found = hanging.search.sharpened(far, hanging.base)
+    assert found.problem.step == SEARCH_STEP
+    assert (hanging.search.stale(found) <= fitter.STALE) is (most > 1)
+
+
+def test_a_law_whose_freed_parameters_stall_is_fitted_with_derivatives_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the law with its anchor held lead nowhere; the data want the anchor all the same."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return LIGHT * math.sin(theta + ANCHOR)
+
+    with built.rig(tmp_path, law) as rig:
+        plain = rig.added(rig.base, "unbalance", {"m_u": 0.5 * LIGHT})
+        monkeypatch.setattr(fitter, "ITERATIONS", 1)
+        found = rig.search.refined(rig.base, plain)
+        name = "load.flange.unbalance.psi"
+        assert name not in plain.problem.names
+        assert found.estimate.values[name] == pytest.approx(ANCHOR, abs=0.02)

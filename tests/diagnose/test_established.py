@@ -77,6 +77,25 @@ def test_a_bristle_of_which_only_friction_shows_is_that(tmp_path: Path) -> None:
     assert compared.startswith("unbalance at load.flange instead: -")
 
 
+def test_parameters_that_undo_its_strength_are_held_once_intervals_are_known(
+    tmp_path: Path,
+) -> None:
+    """A draft may have taken both as known: of this drag one shows."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return 0.05 * math.copysign((abs(w) / 10.0) ** (2.0 / 3.0), w)
+
+    with built.rig(tmp_path, law) as rig:
+        drag = rig.added(
+            rig.base, "bearing_drag", {"tau_ref": 0.05, "w_ref": 10.0}, held={"w_ref": 9.0}
+        )
+        stage = Round(rig.base, [], {}, fitted=[drag], winner=drag)
+        settle(rig.search, rig.base, stage)
+    assert stage.winner is not None and stage.winner.labels == drag.labels
+    assert stage.winner.problem.names == ("J", "b", "load.flange.bearing_drag.tau_ref")
+    assert stage.winner.estimate.identifiable.all()
+
+
 def test_a_law_that_the_data_determine_stays(dry: Rig) -> None:
     """That friction is the same in both directions is known, not open."""
     either, coulomb = friction_laws(dry, 0.5)
