@@ -39,7 +39,8 @@ RUNS = 1
 PLACES = 4
 """Places that are probed, those with the best candidates first."""
 AIM = 3.0
-"""Largest change by the probe, in units of the largest residual: where the system is asked."""
+"""Largest change by the probe, in units of the largest residual: where the system is asked. More
+than 1, since what sticks or is limited answers little, and not much more, to stay near."""
 ELEMENTS = 6
 """Elements of a vector balance that are probed one by one; of more, all together."""
 SIZES = np.logspace(-3.0, 3.0, 25)

@@ -23,9 +23,11 @@ GATE = math.log(1.0 / LEVEL)
 ratio of two fixed models has mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most
 the probability LEVEL. A verdict asks for more, by the number of candidates: `verdict.gate`."""
 GATE_Z = 2.0
-"""Standard deviations by which it must differ from 0, residuals correlated within blocks."""
+"""Standard deviations by which it must differ from 0, residuals correlated within blocks: one in
+forty by chance, beside a gain that must exceed `GATE`, which counts residuals as white."""
 OPEN = 4.0
-"""Mean square over the noise's from which the best model of a round evidently lacks more."""
+"""Mean square over the noise's from which the best model of a round evidently lacks more: twice the
+noise; one that is stated wrongly is mostly less far off."""
 
 
 @dataclass

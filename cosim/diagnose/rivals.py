@@ -48,7 +48,8 @@ TENTHS = 4
 CLOSE, OTHERS = 0.95, 2
 """Share of the winner's gain from which other laws are fitted as far as it, and how many."""
 MOST = 3
-"""Rivals that are tried at most, besides places where to first order the same happens."""
+"""Rivals that are tried at most, besides places where to first order the same happens: each costs a
+fit, as the winner did."""
 
 
 def nearly(search: LateValueFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:

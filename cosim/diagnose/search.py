@@ -47,7 +47,8 @@ casters turn over are small."""
 SIMPLER = 1
 """Simpler laws at the best one's place that are fitted as far where much more is missing."""
 UNWANTED, SLIGHT = 2, 0.1
-"""So many where unused runs want none, if they gain this share of what the best one gains."""
+"""So many where unused runs want none, if they gain this share of what the best one gains: the
+best, and one that it may imitate. Each costs a thorough fit, after which mostly none is wanted."""
 RIVAL = 0.5
 """Where a candidate explains nearly all, those that gain less than this share of what the best one
 gains to first order are no rivals: around the declared model a first order may be off by half."""

@@ -21,7 +21,8 @@ EVIDENT, SHARE = 3.0, 0.02
 """A candidate whose first simulation gains less than 3 nats (noise does, in one of a hundred),
 or less than 1/50 of what the best one gains, is not simulated again."""
 KEPT = 40
-"""Candidates that go from one run to all of them at most."""
+"""Candidates that go from one run to all of them at most: each costs a simulation of all runs, and
+so many are a fit's worth (two for each of ten parameters, and its steps)."""
 HIDDEN = 0.98
 """Share of a signature beyond which one run cannot tell it from other parameters."""
 WHOLES = 3
