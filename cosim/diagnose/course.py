@@ -165,7 +165,7 @@ class Course:
         """The best of what rounds and sets have led to, fitted to the end."""
         search, current, whole = self.search, self.current, self.whole
         if whole is not None and (
-            search.lacking(current) or search.gains(current, whole)[0] > 0.0
+            search.lacking(current) or search.total(current, whole) > 0.0
         ):  # fmt: skip
             current = whole
         if not self.proposed and self._slow(current):

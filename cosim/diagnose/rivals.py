@@ -89,7 +89,7 @@ def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
             trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
-            gain = search.gains(present, trial)[0]
+            gain = search.total(present, trial)
             search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")
             trials.append((trial, known))
         for trial, known in _told_apart(search, present, stage.base, trials):
@@ -127,7 +127,7 @@ def simplified(search: LateValueFitter, fitted: Fitted, known: Sequence[Candidat
                 for probe in single(less, [candidate]):
                     trial = exchanged(search, present, unscored(probe), None, less, share=0.0)
                     trial = search.approached(trial, present, fitted)
-                    gain = search.gains(present, trial)[0]
+                    gain = search.total(present, trial)
                     search.say(f"{candidate.label}, a special case: {gain:+.1f} nats on all runs")
             except CosimError as error:
                 search.say(f"{candidate.label} instead: {error}")
@@ -171,7 +171,7 @@ def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) 
             except CosimError as error:
                 search.say(f"{candidate.label} instead: {error}")
                 continue
-            gain = search.gains(present, trial)[0]
+            gain = search.total(present, trial)
             search.say(f"{candidate.label}, the same elsewhere: {gain:+.1f} nats on all runs")
 
 
@@ -203,7 +203,7 @@ def _told_apart(
         base: model without the effect.
         trials: quick fits, with those of the round.
     """
-    gains = [search.gains(present, trial)[0] for trial, _ in trials]
+    gains = [search.total(present, trial) for trial, _ in trials]
     most = max(gains, default=0.0)
     order = np.argsort(gains, kind="stable")[::-1].tolist()
     near = [i for i in order if gains[i] > max(NEARLY * most, GATE)][:MOST]
@@ -211,7 +211,7 @@ def _told_apart(
     for place, i in enumerate(near if near[1:] else []):
         trial, known = trials[i]
         found[place] = search.sharpened(trial, base, draft=True), known
-    return sorted(found, key=lambda pair: -search.gains(present, pair[0])[0])
+    return sorted(found, key=lambda pair: -search.total(present, pair[0]))
 
 
 def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:

@@ -325,7 +325,7 @@ class Search(LateValueFitter):
             return None
         current = self._decided(declared, start, current)
         winner = current.winner
-        if winner is None or self.gains(fitted, winner)[0] <= GATE:
+        if winner is None or self.total(fitted, winner) <= GATE:
             return None
         return current
 
