@@ -226,7 +226,7 @@ class Fitter(Judge):
                 )  # fmt: skip
             result = self.fitted(simulator, first, base.estimate)
             if result.estimate.unkept > max(GATE, goal - self.gain(base, result)):
-                result = self._elsewhere(simulator, rest, result)
+                result = self._from_others(simulator, rest, result)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
@@ -240,7 +240,7 @@ class Fitter(Judge):
         result.signature = item
         return result
 
-    def _elsewhere(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
+    def _from_others(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
         """The best fit from other starts, with derivatives of the model itself."""
         best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:

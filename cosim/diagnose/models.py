@@ -21,7 +21,7 @@ LEVEL = 0.01
 GATE = math.log(1.0 / LEVEL)
 """Log likelihood that unused data must gain where two models are compared [nats]. The likelihood
 ratio of two fixed models has mean 1 if the simpler one is true, so it exceeds 1/LEVEL with at most
-the probability LEVEL. A verdict asks for more, by the number of candidates: `verdict.gate`."""
+the probability LEVEL. A verdict asks for more, by the number of candidates: `verdict.threshold`."""
 GATE_Z = 2.0
 """Standard deviations by which it must differ from 0, residuals correlated within blocks: one in
 forty by chance, beside a gain that must exceed `GATE`, which counts residuals as white."""

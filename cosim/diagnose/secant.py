@@ -151,12 +151,12 @@ class Bench:
         return self._spread(simulated, batches(candidates, self.problem))
 
     def _alone(self, trials: Trials) -> None:
-        while trials.best is None and trials.open:
+        while trials.best is None and trials.going:
             self.more(trials)
         found = trials.best
         if found is not None and found.unseen:
             self._weaker(trials)
-        if found is None or not trials.open:
+        if found is None or not trials.going:
             return
         if not np.any(found.change):
             trials.value = 10.0 * trials.tried[-1]  # a limit that does not bind yet
@@ -164,7 +164,7 @@ class Bench:
         for _ in range(DESCENTS):
             if not self._beyond(trials):
                 break
-            trials.tried, trials.open = trials.tried[-1:], True
+            trials.tried, trials.going = trials.tried[-1:], True
             trials.value = trials.tried[-1] * float(np.sqrt(max(abs(trials.wish), 1.0 / RUNAWAY)))
             self.more(trials)
 
@@ -178,10 +178,10 @@ class Bench:
         size = self.stack.largest(found.change.astype(np.float64))
         if size > BEYOND:
             before = trials.promise, trials.wish
-            trials.value, trials.open, trials.tried = found.value * BEYOND / size, True, []
+            trials.value, trials.going, trials.tried = found.value * BEYOND / size, True, []
             self.more(trials)
             if trials.best is None or trials.best.unseen:  # it is absorbed at any strength
-                trials.best, trials.open, (trials.promise, trials.wish) = found, False, before
+                trials.best, trials.going, (trials.promise, trials.wish) = found, False, before
 
     def _scanned(self, trials: Trials) -> None:
         """The best of its usual strengths: the residual leads from none of them to the right one.
@@ -199,7 +199,7 @@ class Bench:
                 continue
             if trials.best is None or found.score.gain > trials.best.score.gain:
                 trials.best = found
-        trials.open = False
+        trials.going = False
 
     def _beyond(self, trials: Trials) -> bool:
         """Whether a trial was far too strong to say how strong it should be."""
@@ -245,7 +245,7 @@ class Bench:
             factor *= 10.0  # a limit that does not bind yet
         for t in trials:
             if t.best is None:
-                t.open = False
+                t.going = False
 
     def _varied(self, trials: list[Trials], masks: Mapping[str, NDArray[np.bool_]]) -> None:
         """Other values of the parameters that tell nothing but where they are right."""
@@ -289,7 +289,7 @@ class Bench:
                 if trials.rough and (self._hopeful(trials, least) or self._beyond(trials)):
                     trials.best, trials.rough = None, False
                     self._alone(trials)
-                while trials.open and self._hopeful(trials, least):
+                while trials.going and self._hopeful(trials, least):
                     self.more(trials)
             return group
 
@@ -314,7 +314,7 @@ class Bench:
         def simulated(group: list[Trials]) -> list[Trials]:
             for trials in group:
                 self._alone(trials)
-                trials.open = trials.open and not trials.probe.scanned
+                trials.going = trials.going and not trials.probe.scanned
             return group
 
         again = [
@@ -335,10 +335,10 @@ class Bench:
         least = FLOOR * strength.span if strength.unit == "s" else 0.0
         near = NEAR if trials.between() is None else BETWEEN
         if abs(value) <= least or any(abs(value / old - 1.0) < near for old in tried):
-            trials.open = False
+            trials.going = False
             return
         tried.append(value)
-        trials.open = len(tried) < TRIALS
+        trials.going = len(tried) < TRIALS
         seconds: tuple[float, ...] = (trials.second,)
         if trials.best is None and not trials.known:
             seconds = SECONDS[trials.probe.mix]
@@ -356,11 +356,11 @@ class Bench:
         if trials.best is None or mismatch(found) < mismatch(trials.best):
             trials.best = found
         if found.unseen and found.score.size > VISIBLE:
-            trials.open = False
+            trials.going = False
         trials.asked[value] = trials.wish
         between = trials.between()
         if between is not None and len(tried) < BRACKETED:
-            trials.open = True
+            trials.going = True
         trials.value = self._wanted(found, value) if between is None else between
 
     @staticmethod

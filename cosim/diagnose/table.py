@@ -15,7 +15,7 @@ from .linear import SampleStack
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
-from .verdict import doubts, gate
+from .verdict import doubts, threshold
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -148,7 +148,7 @@ def comparable(table: Table) -> list[int]:
     most = max((m.score for m in models[1:]), default=0.0)
     named = max((m.score for m in models[1:] if not doubts(table, m)), default=np.inf)
     least = models[0].score + NEAR * (most - models[0].score)
-    least = min(least, named - 2.0 * gate(table.candidates))  # of fitted and of unused runs
+    least = min(least, named - 2.0 * threshold(table.candidates))  # of fitted and of unused runs
     near = [i for i, m in enumerate(models) if i and m.score >= least]
     return sorted(near, key=lambda i: -models[i].score)[:MOST]
 

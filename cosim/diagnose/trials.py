@@ -24,7 +24,7 @@ class Trials:
         fixed: its parameters that have another value than its FMU's.
         asked: strength that was tried -> share of it that the residual asked for.
         promise, wish: gain [nats] and amplitude of the last one, whatever its sign.
-        open: whether another may be tried.
+        going: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
         known: whether its second parameter is known well enough to begin with.
         error: of the last one that could not be simulated.
@@ -39,7 +39,7 @@ class Trials:
     asked: dict[float, float] = field(default_factory=dict)
     promise: float = 0.0
     wish: float = 0.0
-    open: bool = True
+    going: bool = True
     rough: bool = False
     known: bool = False
     error: str = ""

@@ -43,7 +43,7 @@ HINTS, LEAST = 3, 0.01
 show in the percentage that is printed helps nobody."""
 
 
-def gate(candidates: int) -> float:
+def threshold(candidates: int) -> float:
     """Log likelihood that unused runs must gain where there were so many candidates [nats].
 
     The likelihood ratio of two fixed models has mean 1 if the simpler one is true, so for any of
@@ -126,7 +126,7 @@ def doubts(table: Table, model: Model) -> list[str]:
         gain, z = (model.gain.unused, model.gain.unused_z) if model.gain else (0.0, 0.0)
         found.append(
             f"unused runs do not want it ({gain:.3g} nats by {z:.2g} standard deviations; "
-            f"{gate(table.candidates):.3g} by {GATE_Z:g} are needed)"
+            f"{threshold(table.candidates):.3g} by {GATE_Z:g} are needed)"
         )
     for law in model.laws:
         if not law.there:
@@ -155,7 +155,7 @@ def wanted(gain: Gain | None, candidates: int) -> bool:
     """
     return (
         gain is not None
-        and gain.unused > gate(candidates)
+        and gain.unused > threshold(candidates)
         and gain.unused_z > GATE_Z
         and gain.fitted > 0.0
     )
@@ -226,7 +226,7 @@ def _better(table: Table, first: int, second: int) -> bool:
                            unused_z=sign * g.unused_z)  # fmt: skip
             return wanted(gain, table.candidates)
     one, two = table.models[first], table.models[second]
-    return two.fitted > one.fitted and two.unused - one.unused > gate(table.candidates)
+    return two.fitted > one.fitted and two.unused - one.unused > threshold(table.candidates)
 
 
 def carries_over(model: Model) -> bool:
@@ -279,7 +279,7 @@ def _apart(table: Table, first: int, second: int) -> bool:
         return False
     for c in table.comparisons:
         if {c.first, c.second} == {first, second}:
-            need = gate(table.candidates)
+            need = threshold(table.candidates)
             told = any(
                 abs(nats) > need and abs(z) > GATE_Z
                 for nats, z in ((c.gain.fitted, c.gain.fitted_z), (c.gain.unused, c.gain.unused_z))

@@ -112,7 +112,7 @@ def test_of_usual_strengths_the_best_is_kept_though_none_leads_there(late: Searc
     base = late.calibrated()
     bench = late.bench(base, late.fitting)
     (alone,), (trials,) = bench.begun([clock]), bench.begun([clock], thorough=True)
-    assert trials.best is not None and alone.best is not None and not trials.open
+    assert trials.best is not None and alone.best is not None and not trials.going
     tries = trials.probe.strength.hints.tries
     assert trials.best.value == min(tries, key=lambda value: abs(value - LATE))
     assert trials.best.score.gain > 2.0 * alone.best.score.gain

@@ -13,7 +13,7 @@ import pytest
 from cosim.diagnose.answer import Verdict
 from cosim.diagnose.facts import Comparison, Force, Gain, Law, Left, Model, Table, Value
 from cosim.diagnose.table import comparable
-from cosim.diagnose.verdict import above, beaten, decide, gate, proposal, unasked
+from cosim.diagnose.verdict import above, beaten, decide, proposal, threshold, unasked
 
 COUNT = 4000
 """Measured values in identification runs, and in unused ones."""
@@ -133,7 +133,7 @@ def test_no_law_is_named_at_strength_0_or_without_gain(
     for one, verdict in tables:
         for item in verdict.laws:
             assert item.size.low > 0.0 and item.missed is not None
-            assert item.missed.unused > gate(one.candidates) and item.missed.fitted > 0.0
+            assert item.missed.unused > threshold(one.candidates) and item.missed.fitted > 0.0
         for hint in verdict.hints:
             assert hint.explained > 0.0 and hint.why
 
@@ -260,10 +260,10 @@ def test_a_law_that_does_not_stand_up_is_a_hint_with_the_reason(one: Law, why: s
 
 
 def test_the_gate_is_the_number_of_candidates_over_a_hundredth() -> None:
-    assert gate(1) == pytest.approx(math.log(100.0))
-    assert gate(80) == pytest.approx(math.log(8000.0))
+    assert threshold(1) == pytest.approx(math.log(100.0))
+    assert threshold(80) == pytest.approx(math.log(8000.0))
     for more, kind in ((0.1, "effect_found"), (-0.1, "unexplained")):
-        assert decide(table(FAR, model(law(gain=gate(80) + more)))).kind == kind
+        assert decide(table(FAR, model(law(gain=threshold(80) + more)))).kind == kind
 
 
 @pytest.mark.parametrize(
