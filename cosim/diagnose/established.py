@@ -28,7 +28,8 @@ unstable: moments that come too early are most of that, and any law moves them a
 def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """Replace a winner by a simpler law where nothing else of it is determined.
 
-    Before that, parameters that undo its strength are held: a draft may have taken both as known.
+    Before that, its further parameters are asked for again, and those that undo its strength held:
+    drafts may have refused the ones for errors of the exchange, and taken the others as known.
 
     Args:
         search: fits and judges.
@@ -37,9 +38,11 @@ def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """
     winner = stage.winner
     assert winner is not None and winner.signature is not None
-    strength, prefix = winner.signature.strength.name, winner.effects[-1].prefix
-    others = [p for p in winner.problem.parameters if p.name.startswith(prefix)]
-    plain = without_redundant(search, winner, [p for p in others if p.name != strength])
+    others = winner.signature.probe.others
+    whole = winner
+    if any(p.name not in winner.problem.names for p in others):
+        whole = search.refined(base, winner, quick=True)
+    plain = without_redundant(search, whole, others)
     if plain is not winner:
         winner = search.sharpened(plain, base)
         stage.follow(winner)

@@ -96,6 +96,18 @@ def test_parameters_that_undo_its_strength_are_held_once_intervals_are_known(
     assert stage.winner.estimate.identifiable.all()
 
 
+def test_parameters_that_a_draft_has_refused_are_asked_for_again(tmp_path: Path) -> None:
+    """A weight of which only the size was fitted stands where it is wanted then."""
+    with built.rig(tmp_path, weight) as rig:
+        plain = rig.added(rig.base, "unbalance", {"m_u": WEIGHT})
+        stage = Round(rig.base, [], {}, fitted=[plain], winner=plain)
+        settle(rig.search, rig.base, stage)
+    assert stage.winner is not None and stage.winner.labels == plain.labels
+    found = stage.winner.estimate.values
+    assert found["load.flange.unbalance.psi"] == pytest.approx(0.5, abs=0.05)
+    assert found["load.flange.unbalance.m_u"] == pytest.approx(WEIGHT, rel=0.05)
+
+
 def test_a_law_that_the_data_determine_stays(dry: Rig) -> None:
     """That friction is the same in both directions is known, not open."""
     either, coulomb = friction_laws(dry, 0.5)
