@@ -35,9 +35,10 @@ FELT = 0.3
 `STUCK`, and little enough for a derivative."""
 SHORTEST, LONGEST = 1e-4, 0.1
 """Such steps at least (below, what a solver's tolerance leaves is in the differences) and at most
-[spans]."""
+[spans]: so far, a model is still nearly linear in what it hardly depends on."""
 ROOM = 0.3
-"""Share of a step that bounds must leave on both sides for both to be taken."""
+"""Share of a step that bounds must leave on both sides for both to be taken: else one side, as long
+as it is wanted, has less of a jump in it than two short ones."""
 CALMER, SHORTER = 0.5, 0.1
 """Square of what a step changes on one side over that on the other, from which only the other has
 met a limit, and the factor on steps that have met one on both sides."""

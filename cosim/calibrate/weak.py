@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from ..errors import FmuCallError
 from .descent import Descent
+from .felt import LONGEST
 from .normal import KNOWN, gradient
 
 Vector = NDArray[np.float64]
 WEAK = 1e-3
 """Share of the best known direction's information up to which a direction is measured again."""
-LONG, SHORT = 0.1, 0.01
-"""Spans of the step with which that is done, and the least that the bounds must leave."""
+SHORT = 0.01
+"""Spans that the bounds must leave of the longest step, with which that is done."""
 CLEAR = 10.0
 """Times as much information as on a direction that others must have to be kept apart from it."""
 
@@ -75,7 +76,7 @@ def _seen(
         way = sign * direction * p.scale
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(way > 0, p.upper - run.theta, p.lower - run.theta) / way
-        length = min(LONG, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
+        length = min(LONGEST, float(np.nanmin(np.where(way == 0.0, np.inf, room))))
         if length < SHORT:
             continue
         try:
