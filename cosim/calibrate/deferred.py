@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,12 @@ from .simulator import Simulator
 Vector = NDArray[np.float64]
 
 
-def step_error(simulator: Simulator, theta: Vector, step: float) -> dict[str, Vector]:
+def step_error(
+    simulator: Simulator,
+    theta: Vector,
+    step: float,
+    purpose: str | Iterable[str] | None = None,
+) -> dict[str, Vector]:
     """What the exchange at communication points adds to the model values, by run.
 
     Where the rig has ticks, the problem's step is exact, and that is the difference to it.
@@ -23,15 +30,17 @@ def step_error(simulator: Simulator, theta: Vector, step: float) -> dict[str, Ve
             order.
         theta: where.
         step: at which the model values are taken.
+        purpose: runs, as of `Simulator.residuals`.
     """
     problem = simulator.problem
+    names = [run.name for run in problem.chosen(purpose)]
     ticks = problem.tick is not None
     if ticks and step == problem.step:
-        return {run.name: np.zeros(run.data.shape) for run in problem.runs}
+        return {name: np.zeros(problem.run(name).data.shape) for name in names}
     factor, fine = (1.0, problem.step) if ticks else (2.0, step / 2.0)
     # limits on time are those of another step
     coarse, exact = (
-        simulator.limited({}).of(problem.changed(step=size)).residuals(theta, None, plain=True)
+        simulator.limited({}).of(problem.changed(step=size)).residuals(theta, names, plain=True)
         for size in (step, fine)
     )
     return {

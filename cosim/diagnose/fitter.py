@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.deferred import corrected, step_error
+from ..calibrate.deferred import corrected
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import CORRECTION, DRAFT, INTERVALS, Effort, fit
 from ..calibrate.known import Known
@@ -27,6 +27,7 @@ from .models import GATE, Fitted, absent, compare, is_open
 from .redundant import without_redundant
 from .secant import FLOOR, patience
 from .signature import Signature
+from .values import Values, exact, near
 
 Vector = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -133,27 +134,23 @@ class Fitter(Judge):
         theta = settled(simulator, estimate.theta, names, self._own)
         estimate = replace(estimate, theta=theta)
         self.evaluations += estimate.evaluations
-        exact = self._exact(simulator, theta)
-        return Fitted(
-            (),
-            estimate,
-            self.fitting.vector([exact[run.name] for run in self.fitting.runs]),
-            self.checking.vector([exact[run.name] for run in self.checking.runs]),
-        )
+        what = (simulator, theta, self.raw)
+        fitting = self.fitting
 
-    def _exact(self, simulator: Simulator, theta: Vector) -> dict[str, Vector]:
-        """Model values over sigma by run, free of what the search's step adds."""
-        data = {run.name: run.data for run in self.raw.runs}
-        problem = simulator.problem.with_data(data).changed(step=self.raw.step)
-        real = simulator.limited({}).of(problem)
-        errors = step_error(real, theta, self.raw.step)
-        values = {
-            name: data[name] / problem.sigma
-            - problem.run(name).white(errors[name] / problem.sigma)
-            - residual
-            for name, residual in real.residuals(theta, None)
-        }
-        return values
+        def fit_values() -> Vector:
+            try:
+                return exact(*what, fitting)
+            except CosimError as error:
+                self.say(f"{error}; it is judged with the search's exchange")
+                return near(*what, fitting)
+
+        one = self.raw.tick is not None and self.raw.step == self.raw.search.step
+        values = Values(
+            fit_values() if one else fit_values,
+            exact(*what, self.checking),
+            lambda: near(*what, fitting),
+        )
+        return Fitted((), estimate, values)
 
     def absorber(self, fitted: Fitted, stack: SampleStack, root: Vector | None = None) -> Absorber:
         """What the parameters of a fitted model can do in some of the identification runs.

@@ -14,7 +14,7 @@ from .candidates import SKEW, Candidate
 from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
-from .models import GATE, Fitted, compare, more_general
+from .models import GATE, Fitted, Gate, compare, more_general
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -62,7 +62,20 @@ class Judge:
 
     def note(self, fitted: Fitted) -> None:
         """Remember a fit if none of its set of effects is better (`memo.SETTLED`)."""
-        self.memo.note(fitted, lambda model: self.fitting.cost(self.fit_data - model))
+        self.memo.note(fitted, self._rise)
+
+    def _rise(self, first: Fitted, second: Fitted) -> float:
+        """By how much the second of two fits is worse on fitted runs [nats].
+
+        Of data with the same correction of the exchange, their costs tell.
+        """
+        alike = first.problem.far == second.problem.far and all(
+            a.data is b.data for a, b in zip(first.problem.runs, second.problem.runs, strict=True)
+        )
+        if alike:
+            return second.estimate.robust - first.estimate.robust
+        costs = [self.fitting.cost(self.fit_data - f.fit) for f in (first, second)]
+        return costs[1] - costs[0]
 
     def better(self, first: Fitted, second: Fitted) -> Gain:
         """What the second of two models is better by."""
@@ -179,12 +192,10 @@ class Judge:
             least = tick_of(self.raw, other.effects[-1].effect, last.unit)
             if abs(other.estimate.values[last.name]) < least:
                 return False
-        return any(
-            stack.largest(second - first) > MATERIAL
-            for first, second, stack in (
-                (base.fit, other.fit, self.fitting), (base.check, other.check, self.checking)
-            )
-        )  # fmt: skip
+        return (  # what has been simulated first
+            self.checking.largest(other.check - base.check) > MATERIAL
+            or self.fitting.largest(other.fit - base.fit) > MATERIAL
+        )
 
     def gain(self, base: Fitted, other: Fitted) -> float:
         """Log likelihood gained on the identification runs, less one per additional parameter.
@@ -200,9 +211,14 @@ class Judge:
 
     def apart(self, first: Fitted, second: Fitted) -> bool:
         """Whether the runs tell two models apart."""
-        checked = compare(self.check_data, first.check, second.check, self.checking)
-        fitted = compare(self.fit_data, first.fit, second.fit, self.fitting)
-        return any(abs(g.z) > RIVAL_Z and abs(g.gain) > GATE for g in (checked, fitted))
+
+        def told(gate: Gate) -> bool:
+            return abs(gate.z) > RIVAL_Z and abs(gate.gain) > GATE
+
+        # what has been simulated first
+        return told(compare(self.check_data, first.check, second.check, self.checking)) or told(
+            compare(self.fit_data, first.fit, second.fit, self.fitting)
+        )
 
     def gains(self, first: Fitted, second: Fitted) -> tuple[float, float]:
         """What a model gains over another one on all runs, and on unused ones [nats]."""

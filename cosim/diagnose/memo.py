@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .linear import SampleStack
 from .models import Fitted
+from .values import Values
 
 Vector = NDArray[np.float64]
 SETTLED = 0.2
@@ -36,15 +37,15 @@ class Memo:
         """The fit of a set, None if there is none."""
         return self._fits.get(labels)
 
-    def note(self, fitted: Fitted, cost: Callable[[Vector], float]) -> None:
+    def note(self, fitted: Fitted, rise: Callable[[Fitted, Fitted], float]) -> None:
         """Keep a fit unless it is worse than the one known by `SETTLED` or more.
 
         Args:
             fitted: the fit.
-            cost: of model values in the identification runs.
+            rise: by how much the second of two fits is worse [nats].
         """
         known = self._fits.get(fitted.labels)
-        if known is None or cost(fitted.fit) < cost(known.fit) + SETTLED:
+        if known is None or rise(known, fitted) < SETTLED:
             self.keep(fitted)
 
     def keep(self, fitted: Fitted) -> None:
@@ -64,4 +65,4 @@ class Memo:
                 ])
                 for old, new, values in zip(before, after, (fitted.fit, fitted.check), strict=True)
             ]  # fmt: skip
-            self._fits[labels] = replace(fitted, fit=rows[0], check=rows[1])
+            self._fits[labels] = replace(fitted, values=Values(rows[0], rows[1]))

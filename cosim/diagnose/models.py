@@ -14,6 +14,7 @@ from ..calibrate.simulator import Simulator
 from .candidates import Candidate
 from .linear import SampleStack
 from .signature import Signature
+from .values import Values
 
 Vector = NDArray[np.float64]
 LEVEL = 0.01
@@ -37,7 +38,7 @@ class Fitted:
     Attributes:
         effects: what was added to the declared system.
         estimate: parameters.
-        fit, check: model values over sigma in identification and validation runs.
+        values: what it gives in all runs.
         signature: score of the effect that was added last.
         gate: gain on unused runs against the model of the round before.
         p_value: of the score test, corrected for the number of candidates.
@@ -45,11 +46,20 @@ class Fitted:
 
     effects: tuple[Candidate, ...]
     estimate: Estimate
-    fit: Vector
-    check: Vector
+    values: Values
     signature: Signature | None = None
     gate: Gate | None = None
     p_value: float = 1.0
+
+    @property
+    def fit(self) -> Vector:
+        """Model values over sigma in identification runs."""
+        return self.values.fit
+
+    @property
+    def check(self) -> Vector:
+        """The same in validation runs."""
+        return self.values.check
 
     @property
     def labels(self) -> frozenset[str]:

@@ -23,6 +23,10 @@ NEAR, MOST = 0.9, 12
 """Models that are compared with each other: those that explain this share of what the best one
 does, or are as near to the best that can be named that neither fitted nor unused runs need tell
 them apart; and how many at most. Others differ by more than any run could leave open."""
+RIVALS = 0.5
+"""Models that explain less than this share of what the best one does are judged as they were
+fitted, with the search's exchange: what that adds was a thirtieth of what the best one explains
+where a model did worst at it (play instead of an elastic gear)."""
 FIRST_ORDERS = 3
 """Candidates without a fit that are kept as hints."""
 NORMAL = 1.96
@@ -47,6 +51,11 @@ def table_of(
     declared = judge.memo.get(frozenset())
     assert declared is not None
     fits = [declared, *(f for f in judge.memo if f.effects)]
+    least = RIVALS * max(judge.total(declared, f) for f in fits)
+    fits = [
+        f if f is declared or judge.total(declared, f) >= least
+        else replace(f, values=f.values.nearly()) for f in fits
+    ]  # fmt: skip
     same = {s.candidate: s.same for stage in reversed(rounds) for s in stage.signatures}
     chance = {label: p for stage in reversed(rounds) for label, p in stage.corrected.items()}
     unused = judge.unused

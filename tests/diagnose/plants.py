@@ -27,6 +27,7 @@ from cosim.diagnose.linear import MATERIAL, ScoreTest
 from cosim.diagnose.models import Fitted, Gate
 from cosim.diagnose.probes import Probe, single
 from cosim.diagnose.signature import Signature, unscored
+from cosim.diagnose.values import Values
 from tests.diagnose import disc
 from tests.problems import simulator
 
@@ -148,7 +149,7 @@ def leaving(judge: Judge, mean_square: float | Mapping[str, float]) -> Fitted:
         simulator(problem), problem.nominal, np.eye(number), problem.lower, problem.upper,
         np.ones(number, dtype=np.bool_), (), (), cost, cost, residual.size, 0, [], [],
     )  # fmt: skip
-    return Fitted((), estimate, judge.fit_data - residual, judge.check_data.copy())
+    return Fitted((), estimate, Values(judge.fit_data - residual, judge.check_data.copy()))
 
 
 def gaining(judge: Judge, candidate: Candidate, gain: float, z: float = 9.0) -> Signature:
@@ -172,5 +173,6 @@ def fitted(judge: Judge, base: Fitted, candidate: Candidate, gain: float) -> Fit
     )  # fmt: skip
     # by as much as a law must change a channel at least
     return Fitted(
-        (candidate,), estimate, base.fit + MATERIAL + 1e-3, base.check, unscored(probe), WANTED
+        (candidate,), estimate, Values(base.fit + MATERIAL + 1e-3, base.check), unscored(probe),
+        WANTED,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import OFF, Search
+from cosim.diagnose.values import Values
 from tests.problems import simulator
 
 pytestmark = pytest.mark.slow
@@ -74,7 +75,7 @@ def test_moments_count_little_again_once_the_model_is_near(
     search = Search(simulator(unstable.with_data(data)), only=[])
     base = search.calibrated()
     search.close()
-    better = replace(base, fit=search.fit_data.copy(), check=search.check_data.copy())
+    better = replace(base, values=Values(search.fit_data.copy(), search.check_data.copy()))
     winner = better if near else replace(base)
     stage = Round(base, [], {}, fitted=[winner], winner=winner)
     counted = search.recount(stage)

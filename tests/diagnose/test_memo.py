@@ -12,6 +12,7 @@ from cosim.calibrate.estimate import Estimate
 from cosim.diagnose.linear import SampleStack
 from cosim.diagnose.memo import Memo
 from cosim.diagnose.models import Fitted
+from cosim.diagnose.values import Values
 
 
 def fitted(value: float, *labels: str, size: int = 4) -> Fitted:
@@ -21,16 +22,20 @@ def fitted(value: float, *labels: str, size: int = 4) -> Fitted:
         one, one, one, one, one, one, (), (), value, value, size, 1, jacobian=[one], residuals=[]
     )
     effects: Any = tuple(SimpleNamespace(label=label) for label in labels)
-    return Fitted(effects, estimate, np.full(size, value), np.full(size, value))
+    return Fitted(effects, estimate, Values(np.full(size, value), np.full(size, value)))
 
 
 @pytest.mark.parametrize(("later", "kept"), [(0.9, 0.9), (1.1, 1.1), (1.3, 1.0)])
 def test_a_later_fit_is_kept_unless_it_is_evidently_worse(later: float, kept: float) -> None:
     """One that is worse by 0.2 nats is as near to the minimum, and has the better intervals."""
+
+    def worse(first: Fitted, second: Fitted) -> float:
+        return float(second.fit[0] - first.fit[0])
+
     memo = Memo()
     for value in (1.0, later):
-        memo.note(fitted(value, "a", "b"), lambda model: float(model[0]))
-    memo.note(fitted(7.0, "a"), lambda model: float(model[0]))
+        memo.note(fitted(value, "a", "b"), worse)
+    memo.note(fitted(7.0, "a"), worse)
     found = memo.get(frozenset("ba"))
     assert found is not None and found.fit[0] == kept and found.estimate.jacobian == []
     assert [sorted(f.labels) for f in memo] == [["a", "b"], ["a"]]

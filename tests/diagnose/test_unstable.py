@@ -111,7 +111,7 @@ def found_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Found]:
     def exact(simulator: Simulator, *_: Any) -> dict[str, float]:
         return {run.name: 0.0 for run in simulator.problem.runs}
 
-    for module in ("fitter", "left_over"):
+    for module in ("values", "left_over"):
         monkeypatch.setattr(f"cosim.diagnose.{module}.step_error", exact)
 
     def found(problem: Problem, say: Callable[[str], None] = lambda text: None) -> Found:
