@@ -21,8 +21,8 @@ from ..errors import CosimError
 
 Vector = NDArray[np.float64]
 ABSORBED = 1e-3
-"""A signature of which less than this share is left has no direction of its own: differences over
-rounded simulations carry relative errors of that order."""
+"""A signature of whose energy less than this share is left may have no direction of its own: what
+calibration can do is known to a hundredth, from differences over steps that bend."""
 
 MATERIAL = 0.15
 """Least RMS over noise that an effect must add to a channel of a run. It raises the residual by

@@ -334,7 +334,7 @@ class Search(LateValueFitter):
         current.base = base
         first = promising(self, current)
         base = self.attempted(start, current, first)
-        if current.winner is None and is_open(base.estimate):
+        if current.winner is None and self.lacking(base):
             others = remaining(self, current, first)
             if others:
                 runs = "unused" if self.unused else "fitted"

@@ -23,7 +23,7 @@ from .choices import choices
 from .linear import MATERIAL, Absorber, SampleStack, score
 from .probes import Batch, batches
 from .signature import EVIDENT, SHARE, Signature
-from .trials import Trials, by_problem, mismatch, shared
+from .trials import Trials, by_problem, nearer, shared
 
 Vector = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -50,6 +50,10 @@ FARTHEST = 100.0
 """Bound on a shift: beyond, the effect is a constant."""
 GREATEST = 1e3
 """Factor by which one trial may exceed the one before."""
+CURVED, TANGENT = 20.0, 10.0
+"""Times the noise by which a trial changes a channel from which its curvature counts where
+calibration absorbs nearly all of it, and at which it is tried then: a thousandth of that would not
+be seen."""
 BEYOND, ASKED, DESCENTS = 100.0, 0.01, 4
 """A trial that changes a channel by so many times the noise where the residual asks for less than
 this share of it has left the regime in which shares mean anything: a loop that oscillates does so
@@ -154,7 +158,7 @@ class Bench:
         while trials.best is None and trials.going:
             self.more(trials)
         found = trials.best
-        if found is not None and found.unseen:
+        if found is not None and found.curved:
             self._weaker(trials)
         if found is None or not trials.going:
             return
@@ -169,19 +173,18 @@ class Bench:
             self.more(trials)
 
     def _weaker(self, trials: Trials) -> None:
-        """Once more with less of what calibration absorbs in whole where it changes very much.
+        """Once more with less of what calibration absorbs nearly all of, if it changes much.
 
-        A spring that holds a shaft is as good as a larger inertia.
+        What is left is then mostly curvature: of the law, which is not what the residual has, or of
+        the parameters that make up for it. A spring that holds a shaft is as good as a larger
+        inertia.
         """
         found = trials.best
         assert found is not None
         size = self.stack.largest(found.change.astype(np.float64))
-        if size > BEYOND:
-            before = trials.promise, trials.wish
-            trials.value, trials.going, trials.tried = found.value * BEYOND / size, True, []
+        if size > CURVED:
+            trials.value, trials.going = found.value * TANGENT / size, True
             self.more(trials)
-            if trials.best is None or trials.best.unseen:  # it is absorbed at any strength
-                trials.best, trials.going, (trials.promise, trials.wish) = found, False, before
 
     def _scanned(self, trials: Trials) -> None:
         """The best of its usual strengths: the residual leads from none of them to the right one.
@@ -297,9 +300,9 @@ class Bench:
         return [t.best for t in begun if t.best is not None]
 
     def _hopeful(self, trials: Trials, least: float) -> bool:
-        if trials.promise <= least or trials.best is None:
-            return False
         found = trials.best
+        if found is None or not (trials.promise > least or found.curved):
+            return False
         # the best trial need not be the last one; one that should be negative asks for nothing
         asked = (found.score.amplitude or abs(trials.wish)) * found.rest.astype(np.float64)
         return self.stack.largest(asked) > WORTH * MATERIAL
@@ -353,10 +356,8 @@ class Bench:
             trials.value = value * 0.1  # too strong for the system to run
             return
         found = self._mixed(trials, value, changes)
-        if trials.best is None or mismatch(found) < mismatch(trials.best):
+        if trials.best is None or nearer(found, trials.best):
             trials.best = found
-        if found.unseen and found.score.size > VISIBLE:
-            trials.going = False
         trials.asked[value] = trials.wish
         between = trials.between()
         if between is not None and len(tried) < BRACKETED:

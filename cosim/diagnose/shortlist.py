@@ -21,6 +21,9 @@ PART = 0.2
 refitted: it is no rival, and if the winner leaves more than noise, another round asks again."""
 MEMBERS = 2
 """Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
+IMITATED = 2
+"""Candidates of which calibration absorbs so much that the rest may be an error of its derivatives,
+which are refitted last, where no other explains nearly all, if they promise enough."""
 SHARED = 0.5
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""
@@ -33,11 +36,7 @@ times the best one's will do where the model is far off, beyond `GATE_Z`."""
 def able(judge: Judge, current: Round) -> list[Signature]:
     """Candidates that show in the fitted runs and ask for enough to matter, by gain."""
     return [
-        s
-        for s in current.signatures
-        if not s.unseen
-        and s.score.gain > GATE
-        and judge.fitting.largest(s.asked) > NEARLY * MATERIAL
+        s for s in current.signatures if not s.unseen and s.score.gain > GATE and asks(judge, s)
     ]
 
 
@@ -53,7 +52,7 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
     if not good and judge.lacking(current.base):
         # far off, deviations are those of what is missing: only fits tell the next ones apart
         far = is_open(current.base.estimate)
-        good = [s for s in seen if far or s.score.z > GATE_Z]
+        good = [s for s in seen if far or abs(s.score.z) > GATE_Z]
     best = max((s.score.gain for s in good), default=0.0)
     single = balances(current.base.problem)
     alike: Counter[tuple[str, str, str]] = Counter()
@@ -80,21 +79,32 @@ def promising(judge: Judge, current: Round) -> list[Signature]:
         chosen += [
             s for s in seen
             if s.candidate.label not in known and s.score.gain > least
-            and (s.score.z > GATE_Z or s.score.gain > best)
+            and (abs(s.score.z) > GATE_Z or s.score.gain > best)
         ][:EXTRA]  # fmt: skip
         # where casters turn over, first orders of a group say nothing
         chosen += groups_of(chosen, seen, single, 0.0 if judge.raw.unstable else PART * best)
-    return sorted(chosen, key=lambda s: -s.score.gain)
+    chosen.sort(key=lambda s: -s.score.gain)
+    least = max(PART * best, GATE)
+    imitated = [
+        s for s in current.signatures
+        if s.unseen and s.score.gain > least and abs(s.score.z) > GATE_Z and asks(judge, s)
+    ]  # fmt: skip
+    return chosen + imitated[:IMITATED]
+
+
+def asks(judge: Judge, item: Signature) -> bool:
+    """Whether the residual asks for enough of a candidate to matter."""
+    return judge.fitting.largest(item.asked) > NEARLY * MATERIAL
 
 
 def remaining(judge: Judge, current: Round, tried: list[Signature]) -> list[Signature]:
     """The next candidates of a round, where unused runs want none of the first.
 
-    What a far-off model lacks is in the variance of its blocks, so a law far down the list by
-    significance may be the right one.
+    What a model lacks is in the variance of its blocks, so a law far down the list by significance
+    may be the right one.
     """
     known = {s.candidate.label for s in tried}
-    seen = [s for s in able(judge, current) if s.score.z > GATE_Z]
+    seen = [s for s in able(judge, current) if abs(s.score.z) > GATE_Z]
     best = max((s.score.gain for s in seen), default=0.0)
     few = [s for s in seen if s.score.gain > PART * best]
     return [s for s in few if s.candidate.label not in known][:REFITS]

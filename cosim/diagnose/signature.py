@@ -24,7 +24,7 @@ KEPT = 40
 """Candidates that go from one run to all of them at most: each costs a simulation of all runs, and
 so many are a fit's worth (two for each of ten parameters, and its steps)."""
 HIDDEN = 0.98
-"""Share of a signature beyond which one run cannot tell it from other parameters."""
+"""Share of a signature's energy beyond which one run cannot tell it from other parameters."""
 WHOLES = 3
 """Groups whose members act alike that are refitted at most."""
 STRETCH, COARSE = 64, 0.03
@@ -92,6 +92,11 @@ class Signature:
     def unseen(self) -> bool:
         """Whether calibration absorbs it, or the runs do not show it at all."""
         return self.absorbed > 1.0 - ABSORBED or self.score.size == 0.0
+
+    @property
+    def curved(self) -> bool:
+        """Whether calibration absorbs so much that what is left may be curvature."""
+        return self.absorbed > HIDDEN or self.score.size == 0.0
 
 
 def unscored(probe: Probe) -> Signature:

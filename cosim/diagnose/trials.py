@@ -83,9 +83,16 @@ def shared(trials: list[Trials]) -> list[Trials]:
     return [t for t in trials if t.rough]
 
 
-def mismatch(item: Signature) -> tuple[bool, float]:
-    """How far the strength of the trial is from the one that the residual asks for.
+def nearer(item: Signature, other: Signature) -> bool:
+    """Whether one trial's strength is nearer to the one that the residual asks for.
 
-    Farther than any, if calibration absorbs all that the strength does.
+    Farther than any, if calibration absorbs all that the strength does. If it absorbs nearly all,
+    what is left is curvature, unless it is small: then the one that gains more.
     """
+    if item.curved and other.curved:
+        return item.score.gain > other.score.gain
+    return _mismatch(item) < _mismatch(other)
+
+
+def _mismatch(item: Signature) -> tuple[bool, float]:
     return item.unseen, abs(float(np.log(max(item.score.amplitude, 1e-6))))

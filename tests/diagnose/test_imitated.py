@@ -1,0 +1,96 @@
+"""Laws that calibration imitates nearly in whole: tried weakly, and fitted where no other does.
+
+Of a strong trial only curvature is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cosim.calibrate.mapping import read_problem
+from cosim.calibrate.problem import Problem
+from cosim.diagnose.candidates import candidates
+from cosim.diagnose.judge import Judge
+from cosim.diagnose.probes import single
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.search import CHECK, Search
+from cosim.diagnose.secant import CURVED, TANGENT
+from cosim.diagnose.shortlist import IMITATED, promising
+from cosim.diagnose.signature import Signature
+from cosim.diagnose.trials import Trials, nearer
+from tests.diagnose import disc, plants
+from tests.problems import simulator
+
+RUB, DRAG = "coulomb at load.flange", "quadratic_drag at load.flange"
+SPRING = "hose_spring at load.flange"
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> Problem:
+    """A disc."""
+    return read_problem(disc.write(tmp_path, lambda w, theta, t: 0.0, seconds=1.6))
+
+
+def signature(judge: Judge, label: str, gain: float, absorbed: float, z: float = 9.0) -> Signature:
+    """A candidate that gains so much, of which calibration absorbs a share."""
+    (candidate,) = [c for c in candidates(judge.raw) if c.label == label]
+    return replace(plants.gaining(judge, candidate, gain, z), absorbed=absorbed)
+
+
+@pytest.mark.parametrize(("gain", "z", "last"), [(30.0, -5.0, True), (15.0, 5.0, False),
+                                                 (30.0, 1.0, False)])  # fmt: skip
+def test_what_calibration_imitates_is_fitted_last_if_it_promises_enough(
+    plain: Problem, gain: float, z: float, last: bool
+) -> None:
+    judge = Judge(plain, CHECK)
+    known = [signature(judge, DRAG, gain, 1.0, z), signature(judge, RUB, 100.0, 0.5)]
+    stage = Round(plants.leaving(judge, 1.5), known, {RUB: 1e-6, DRAG: 1e-6})
+    found = [s.candidate.label for s in promising(judge, stage)]
+    assert found == [RUB, DRAG] if last else found == [RUB]
+
+
+def test_no_more_of_them_than_a_few(plain: Problem) -> None:
+    judge = Judge(plain, CHECK)
+    labels = [c.label for c in candidates(plain)][: IMITATED + 2]
+    known = [signature(judge, label, 50.0, 1.0) for label in labels]
+    known.append(signature(judge, RUB, 100.0, 0.5))
+    stage = Round(plants.leaving(judge, 1.5), known, dict.fromkeys([*labels, RUB], 1e-6))
+    assert len(promising(judge, stage)) == 1 + IMITATED
+
+
+def test_of_two_trials_that_calibration_absorbs_the_one_that_gains_more_counts(
+    plain: Problem,
+) -> None:
+    judge = Judge(plain, CHECK)
+    strong, weak = (signature(judge, DRAG, gain, 0.99) for gain in (5.0, 50.0))
+    strong = replace(strong, score=replace(strong.score, amplitude=0.9))
+    weak = replace(weak, score=replace(weak.score, amplitude=-40.0))
+    assert nearer(weak, strong) and not nearer(strong, weak)
+    # where calibration absorbs less, the one that is asked for
+    seen = [replace(s, absorbed=0.5) for s in (strong, weak)]
+    assert nearer(seen[0], seen[1]) and not nearer(seen[1], seen[0])
+
+
+def test_a_trial_that_changes_much_and_is_absorbed_is_made_again_along_the_tangent(
+    plain: Problem,
+) -> None:
+    search = Search(simulator(plain), only=[])
+    base = search.calibrated()
+    bench = search.bench(base, search.fitting)
+    (spring,) = [c for c in candidates(plain) if c.label == SPRING]
+    (viscous,) = [c for c in candidates(plain) if c.label == "viscous at load.flange"]
+    for candidate, again in ((viscous, True), (spring, False)):
+        (probe,) = single(base.problem, [candidate])
+        trials = Trials(probe, probe.strength.span)
+        bench.more(trials)
+        first = trials.best
+        assert first is not None and first.curved is again
+        if again:  # friction that the disc has already
+            size = search.fitting.largest(first.change.astype(float))
+            assert size > CURVED
+            bench._weaker(trials)
+            assert trials.tried[1] == pytest.approx(first.value * TANGENT / size)
+    search.close()
