@@ -23,7 +23,8 @@ MEMBERS = 2
 """Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
 IMITATED = 2
 """Candidates of which calibration absorbs so much that the rest may be an error of its derivatives,
-which are refitted last, where no other explains nearly all, if they promise enough."""
+which are refitted last, where no other explains nearly all, if they promise enough: few, since what
+they promise may be that error, and a fit is spent on it."""
 SHARED = 0.5
 """What acts alike on all of a group (the swivels of all casters) is refitted as well if it gains
 this share of what the best one gains, and at most `WHOLES`: members must not crowd it out."""

@@ -6,6 +6,7 @@ their judgement.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -171,3 +172,20 @@ def rig(
         yield Rig(search, base, said)
     finally:
         search.close()
+
+
+SEARCH_STEP, ANCHOR, WEIGHT = 0.02, 0.5, 0.6
+
+
+@contextmanager
+def hanging(folder: Path) -> Iterator[Rig]:
+    """A disc with a weight beside its axis, run coarsely in a search."""
+
+    def write(text: str) -> str:
+        return text.replace("step =", f"search_step = {SEARCH_STEP}\nstep =", 1)
+
+    def law(w: float, theta: float, t: float) -> float:
+        return WEIGHT * math.sin(theta + ANCHOR)
+
+    with rig(folder, law, mapped=write) as found:
+        yield found

@@ -18,7 +18,7 @@ from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import _sharpest
 from cosim.diagnose.search import Search
 from tests.diagnose import built, disc
-from tests.diagnose.built import Rig
+from tests.diagnose.built import ANCHOR, SEARCH_STEP, WEIGHT, Rig
 from tests.problems import simulator
 
 USUAL, SIZE = 2e-3, 0.1
@@ -181,20 +181,13 @@ def test_calm_systems_are_not_asked(rig: Rig) -> None:
 # -- fits that have not ended ----------------------------------------------------------------------
 
 
-SEARCH_STEP, ANCHOR, WEIGHT, LIGHT = 0.02, 0.5, 0.6, 0.1
+LIGHT = 0.1
 
 
 @pytest.fixture
 def hanging(tmp_path: Path) -> Iterator[Rig]:
     """A disc with a weight beside its axis, run coarsely in a search."""
-
-    def write(text: str) -> str:
-        return text.replace("step =", f"search_step = {SEARCH_STEP}\nstep =", 1)
-
-    def law(w: float, theta: float, t: float) -> float:
-        return WEIGHT * math.sin(theta + ANCHOR)
-
-    with built.rig(tmp_path, law, mapped=write) as rig:
+    with built.hanging(tmp_path) as rig:
         yield rig
 
 

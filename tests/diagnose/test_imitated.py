@@ -14,18 +14,17 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.judge import Judge
-from cosim.diagnose.probes import single
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import CHECK, Search
 from cosim.diagnose.secant import CURVED, TANGENT
 from cosim.diagnose.shortlist import IMITATED, promising
 from cosim.diagnose.signature import Signature
-from cosim.diagnose.trials import Trials, nearer
+from cosim.diagnose.trials import nearer
 from tests.diagnose import disc, plants
 from tests.problems import simulator
 
 RUB, DRAG = "coulomb at load.flange", "quadratic_drag at load.flange"
-SPRING = "hose_spring at load.flange"
+WEIGHT = "unbalance at load.flange"
 
 
 @pytest.fixture
@@ -80,17 +79,16 @@ def test_a_trial_that_changes_much_and_is_absorbed_is_made_again_along_the_tange
     search = Search(simulator(plain), only=[])
     base = search.calibrated()
     bench = search.bench(base, search.fitting)
-    (spring,) = [c for c in candidates(plain) if c.label == SPRING]
+    (weight,) = [c for c in candidates(plain) if c.label == WEIGHT]
     (viscous,) = [c for c in candidates(plain) if c.label == "viscous at load.flange"]
-    for candidate, again in ((viscous, True), (spring, False)):
-        (probe,) = single(base.problem, [candidate])
-        trials = Trials(probe, probe.strength.span)
-        bench.more(trials)
-        first = trials.best
-        assert first is not None and first.curved is again
-        if again:  # friction that the disc has already
-            size = search.fitting.largest(first.change.astype(float))
+    for candidate, again in ((viscous, True), (weight, False)):  # the disc has friction already
+        (trials,) = bench.begun([candidate])
+        assert trials.best is not None and trials.best.curved is again
+        if again:
+            assert trials.tried[0] == trials.probe.strength.span and len(trials.tried) == 2
+            values = trials.probe.values(trials.tried[0], 0.0, {})
+            change = bench.at(trials.probe.problem, values) - bench.model
+            size = search.fitting.largest(change)
             assert size > CURVED
-            bench._weaker(trials)
-            assert trials.tried[1] == pytest.approx(first.value * TANGENT / size)
+            assert trials.tried[1] == pytest.approx(trials.tried[0] * TANGENT / size)
     search.close()

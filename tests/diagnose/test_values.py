@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,22 +14,13 @@ from cosim.diagnose.models import Fitted
 from cosim.diagnose.table import table_of
 from cosim.errors import StepError
 from tests.diagnose import built
-from tests.diagnose.built import Rig
-
-SEARCH_STEP, ANCHOR, WEIGHT = 0.02, 0.5, 0.6
+from tests.diagnose.built import ANCHOR, SEARCH_STEP, WEIGHT, Rig
 
 
 @pytest.fixture
 def hanging(tmp_path: Path) -> Iterator[Rig]:
     """A disc with a weight beside its axis, run coarsely in a search."""
-
-    def write(text: str) -> str:
-        return text.replace("step =", f"search_step = {SEARCH_STEP}\nstep =", 1)
-
-    def law(w: float, theta: float, t: float) -> float:
-        return WEIGHT * math.sin(theta + ANCHOR)
-
-    with built.rig(tmp_path, law, mapped=write) as rig:
+    with built.hanging(tmp_path) as rig:
         yield rig
 
 
