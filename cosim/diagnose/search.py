@@ -20,6 +20,7 @@ from ..errors import UnbuiltError, UnknownNameError, listing
 from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
+from .completing import completed
 from .established import needed, settle
 from .fitter import ITERATIONS, Say
 from .grounding import grounded
@@ -419,6 +420,7 @@ class Search(LateValueFitter):
         current.open = is_open(current.winner.estimate)
         if not current.open:
             return
+        completed(self, base, current)
         # quick fits are rough, so what is left may be that of the wrong law
         kept = current.winner
         swapped = reconsidered(self, kept, [current])

@@ -27,7 +27,7 @@ from .fitter import AGAIN, BRINGS, QUICKLY
 from .following import follow
 from .localise import Place
 from .models import GATE, Fitted, compare
-from .search import Search
+from .search import OFF, Search
 from .secant import patience
 from .signature import unscored
 
@@ -104,6 +104,9 @@ def together(
             followed = follow(declared.simulator, theta, search.fitting, places[0], among)
             names = ", ".join(followed.places)
             search.say(f"along the log by efforts at {names}: mean square {followed.left:.3g}")
+            if followed.left > OFF:
+                search.say("that is not the log's motion: first orders would mislead")
+                break
             responses = Responses(followed, search.fitting)
             known = search.offered(candidates(declared.problem))
             known = [c for c in known if not only or c.place in only]

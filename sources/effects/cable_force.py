@@ -1,6 +1,9 @@
 """Cable under constant tension, from a point of the body to an anchor in the world.
 
     F = T d/L,   E = T L,   L = sqrt(|d|^2 + d_0^2),   d from the body's point to the anchor
+    anchor = (r cos(psi), r sin(psi), h)   in the world
+
+Far away, and at the mass centre, it pulls as gravity does on a slope.
 
 Not modelled: sag, friction of the reel, a cable that goes slack.
 
@@ -11,12 +14,23 @@ from __future__ import annotations
 
 import casadi as ca
 
+from cosim.spec.hints import SearchHints
+
 from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
 TENSION = Quantity("tension", "N", "tension, 0 = absent", start=8.0, minimum=0.0, strength=True)
-ANCHOR = Quantity("anchor", "m", "world position of the anchor", start=(-1.0, 1.0, 1.0), size=3)
+HEADING = Quantity(
+    "heading",
+    "rad",
+    "direction of the anchor from the world's origin, from its x axis",
+    hints=SearchHints(mix="turn"),
+)
+DISTANCE = Quantity(
+    "distance", "m", "distance of the anchor from the world's z axis", start=5.0, minimum=0.0
+)
+HEIGHT = Quantity("height", "m", "height of the anchor in the world")
 POINT = Quantity(
     "point", "m", "where the cable is fixed, from the reference point in body axes", size=3
 )
@@ -35,14 +49,16 @@ EFFECT = Effect(
     TENSION,
     needs=("position", "rotation"),
     source="statics",
+    contains=("floor_slope",),
 )
 
 
 def law(e: EffectModel) -> None:
     """Add the pull."""
-    p = e.parameters(T=TENSION, point=POINT, anchor=ANCHOR, d_0=D_0)
+    p = e.parameters(T=TENSION, point=POINT, psi=HEADING, r=DISTANCE, h=HEIGHT, d_0=D_0)
     s = e.signals(x="position", R="rotation")
-    d = p.anchor - s.x - s.R @ p.point
+    anchor = ca.vertcat(p.r * ca.cos(p.psi), p.r * ca.sin(p.psi), p.h)
+    d = anchor - s.x - s.R @ p.point
     L = ca.sqrt(ca.dot(d, d) + p.d_0**2)
     F = s.R.T @ (p.T / L * d)
     e.add(ca.vertcat(F, ca.cross(p.point, F)))

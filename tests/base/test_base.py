@@ -488,8 +488,8 @@ def test_bristles_hold_a_braked_base_across_a_slope() -> None:
 
 
 def test_cable_pulls_sideways_towards_its_anchor() -> None:
-    values = {"cable_force.tension": 20.0, "cable_force.anchor[1]": 0.0}
-    values |= {"cable_force.anchor[2]": 50.0, "cable_force.anchor[3]": 0.1}
+    values = {"cable_force.tension": 20.0, "cable_force.heading": np.pi / 2}
+    values |= {"cable_force.distance": 50.0, "cable_force.height": 0.1}
     base = oracle_of(PLANAR + "[wheel_contact=creep]+cable_force")
     free = {**values, "drive_wheel.mu": 0.0, "caster.mu_s": 1e-6, "caster.mu_d": 0.0}
     rates = base.derivatives(free)

@@ -1,0 +1,82 @@
+"""A rival that lacks only what its law holds is fitted with it; where that brings nothing, not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cosim.diagnose.completing import RIVALS, completed
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.rounds import Round
+from tests.diagnose import built, disc
+
+STIFFNESS, REST = 0.3, 2.0
+"""A hose [N.m/rad] that hangs free far from where the disc begins [rad]."""
+
+
+def pulled(w: float, theta: float, t: float) -> float:
+    return STIFFNESS * (theta - REST)
+
+
+def dragging(w: float, theta: float, t: float) -> float:
+    return 0.2 * w * abs(w)
+
+
+def stage(rig: built.Rig) -> Round:
+    """A round that drag has won, with a hose that hangs free at 0 next to it."""
+    winner = rig.added(rig.base, "quadratic_drag", {"c": 0.01})
+    rival = rig.added(rig.base, "hose_spring", {"k": 0.1})
+    found = Round(rig.base, [], {}, fitted=[winner, rival], winner=winner, open=True)
+    found.near = frozenset(f.effects[-1] for f in found.fitted)
+    return found
+
+
+def name(fitted: Fitted | None) -> str:
+    assert fitted is not None
+    return fitted.effects[-1].effect
+
+
+@pytest.mark.parametrize(("law", "last"), [(pulled, "hose_spring"), (dragging, "quadratic_drag")])
+def test_a_rival_is_judged_with_the_parameters_of_its_law(
+    tmp_path: Path, law: disc.Law, last: str
+) -> None:
+    with built.rig(tmp_path, law) as rig:
+        found = stage(rig)
+        before = found.winner
+        completed(rig.search, rig.base, found)
+        assert name(found.winner) == last
+        if last == "hose_spring":
+            assert found.winner is not None
+            values = found.winner.estimate.values
+            assert values["load.flange.hose_spring.theta_0"] == pytest.approx(REST, rel=0.01)
+            assert not found.open and any("does better with its other" in s for s in rig.said)
+        else:
+            assert found.winner is before and found.open
+
+
+def test_rivals_that_are_far_or_hold_nothing_are_left(tmp_path: Path) -> None:
+    with built.rig(tmp_path, pulled) as rig:
+        found = stage(rig)
+        before, fits = found.winner, list(found.fitted)
+        found.near = frozenset({before.effects[-1]}) if before is not None else frozenset()
+        completed(rig.search, rig.base, found)
+        assert found.winner is before and found.fitted == fits
+        viscous = rig.added(rig.base, "viscous", {"b": 0.1})  # all that it has is fitted
+        found.fitted.append(viscous)
+        found.near |= {viscous.effects[-1]}
+        completed(rig.search, rig.base, found)
+        assert found.winner is before and viscous in found.fitted
+
+
+def test_no_more_of_them_than_a_few(tmp_path: Path) -> None:
+    with built.rig(tmp_path, pulled) as rig:
+        found = stage(rig)
+        rival = found.fitted[1]
+        others = [rig.added(rig.base, effect, {size: 0.1}, fit=False)
+                  for effect, size in (("coulomb", "tau_c"), ("bristle", "tau_c"))]  # fmt: skip
+        assert len(others) == RIVALS
+        found.fitted[1:1] = others
+        found.near |= {f.effects[-1] for f in others}
+        completed(rig.search, rig.base, found)
+        assert rival in found.fitted  # not fitted again
