@@ -261,6 +261,9 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         motor = motor - stuck * np.tanh(b_rate / 0.02)
         if has["hose"]:
             motor = motor - hose * b
+        cos, sin = np.cos(phi), np.sin(phi)
+        hill_x, hill_y = hill[0] * cos + hill[1] * sin, -hill[0] * sin + hill[1] * cos
+        motor = motor - WHEEL_SET * BEHIND / total * (t * hill_y - u * hill_x)
         ground = -p["e"] * f_n
         if has["scrub"]:
             ground = ground - scrub * load * np.tanh((w + b_rate) / 0.05)
@@ -273,12 +276,10 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         to_acc = (arm * n_k - FORK) / (FORK + ROTOR)
         # momentum of all; a fork's mass centre: A - BEHIND t, turning with w + b'
         spun = (w + b_rate) ** 2
-        cos, sin = np.cos(phi), np.sin(phi)
         out_x = (hill[0] + rope[0]) * cos + (hill[1] + rope[1]) * sin
         out_y = -(hill[0] + rope[0]) * sin + (hill[1] + rope[1]) * cos
         pace = np.sqrt(v_x**2 + v_y**2)
         out_x, out_y = out_x - air * pace * v_x, out_y - air * pace * v_y
-        hill_x, hill_y = hill[0] * cos + hill[1] * sin, -hill[0] * sin + hill[1] * cos
         rest_x = WHEEL_SET * (-(w**2) * a_x + BEHIND * (known * u + spun * t))
         rest_y = WHEEL_SET * (-(w**2) * a_y - BEHIND * (known * t - spun * u))
         right_x = f_x.sum(axis=0) + out_x - rest_x.sum(axis=0) + body * w**2 * centre[0]

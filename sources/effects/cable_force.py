@@ -28,11 +28,21 @@ HEADING = Quantity(
     hints=SearchHints(mix="turn"),
 )
 DISTANCE = Quantity(
-    "distance", "m", "distance of the anchor from the world's z axis", start=5.0, minimum=0.0
+    "distance",
+    "m",
+    "distance of the anchor from the world's z axis",
+    start=5.0,
+    minimum=0.0,
+    maximum=1e3,
 )
-HEIGHT = Quantity("height", "m", "height of the anchor in the world")
+HEIGHT = Quantity("height", "m", "height of the anchor in the world", minimum=-10.0, maximum=100.0)
 POINT = Quantity(
-    "point", "m", "where the cable is fixed, from the reference point in body axes", size=3
+    "point",
+    "m",
+    "where the cable is fixed, from the reference point in body axes",
+    size=3,
+    minimum=-5.0,
+    maximum=5.0,
 )
 D_0 = Quantity(
     "d_0",

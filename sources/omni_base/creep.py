@@ -71,11 +71,11 @@ def equations(m: Model) -> None:
         base.M_P, base.M_W, base.D, base.I_P, base.I_S, base.I_PHI, base.X_G, base.Y_G,
         base.GRAVITY, J_BETA, B_D, B_S, F_R, W_R, C_X, C_Y, MU, V_0,
     )  # fmt: skip
-    body = base.bodies(m, g, motion, p)
+    body = base.bodies(m, g, motion, p, beta_rate)
     masses = body.masses
     contact_x = g.x - g.e * ca.cos(motion.beta)
     contact_y = g.y - g.e * ca.sin(motion.beta)
-    normal = m.output(NORMAL, loads(motion, body, contact_x, contact_y))
+    normal = m.output(NORMAL, loads(body, contact_x, contact_y))
 
     j1, c1 = rolling_rows(g, motion.beta), lateral_rows(g, motion.beta)
     along = m.output(SLIP_ALONG, j1 @ motion.u + g.r * phi_rate)
@@ -114,7 +114,8 @@ def equations(m: Model) -> None:
     h_pose, h_beta = velocity_forces(g, masses, motion.beta, motion.u[2], beta_rate)
     i_beta = masses.i_beta + p.J_beta
     on_pose = base.on_pose(body.wrench, pivot) + j1.T @ f_along + c1.T @ f_across - h_pose
-    on_beta = u.tau_beta - p.b_s * beta_rate + steering + pivot + g.e * f_across - h_beta
+    on_beta = u.tau_beta - p.b_s * beta_rate + steering + pivot + body.forks
+    on_beta = on_beta + g.e * f_across - h_beta
     on_phi = u.tau_phi - p.b_d * phi_rate - resistance + rolling + g.r * f_along
     # beta'' eliminated: (F - G G^T/I_beta) a = Q_pose - G Q_beta/I_beta
     acceleration = symmetric.solve(
@@ -139,16 +140,14 @@ def each(m: Model, name: str, kind: str, unit: str = "", **signals: SX) -> SX:
     return together.effort + ca.vertcat(*single)
 
 
-def loads(motion: base.Motion, body: base.Bodies, x: SX, y: SX) -> SX:
+def loads(body: base.Bodies, x: SX, y: SX) -> SX:
     """Normal forces from the equilibrium of the whole weight on the contact points (x, y).
 
     Each wheel carries the share of the triangle that the mass centre spans with the other two.
     """
     masses = body.masses
     mass = masses.mass + 3 * masses.m_w
-    trail = masses.m_w * masses.d
-    c_x = (body.moment[0] - trail * ca.sum1(ca.cos(motion.beta))) / mass
-    c_y = (body.moment[1] - trail * ca.sum1(ca.sin(motion.beta))) / mass
+    c_x, c_y = body.moment[0] / mass, body.moment[1] / mass
 
     def area(i: int, j: int, p_x: SX, p_y: SX) -> SX:
         return (x[i] - p_x) * (y[j] - p_y) - (x[j] - p_x) * (y[i] - p_y)

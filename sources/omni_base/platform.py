@@ -105,22 +105,30 @@ class Forces(NamedTuple):
 
 
 class Bodies(NamedTuple):
-    """Masses with what effects add, first moment of all [kg.m], weight [N], wrench of effects."""
+    """Masses with what effects add, and what they and gravity do.
+
+    Attributes:
+        masses: with those of effects.
+        moment: first moment of all (2) [kg.m].
+        weight: of all [N].
+        wrench: of effects on the base (6).
+        forks: torques on the forks (3) [N.m], where gravity leans.
+    """
 
     masses: Masses
     moment: SX
     weight: SX
     wrench: SX
+    forks: SX
 
 
-def bodies(m: Model, g: Geometry, motion: Motion, p: Symbols) -> Bodies:
-    """Open the balances of the platform and gather its masses.
-
-    The first moment is taken with the wheel sets at their steering axes.
-    """
+def bodies(m: Model, g: Geometry, motion: Motion, p: Symbols, beta_rate: SX) -> Bodies:
+    """Open the balances of the platform and gather its masses."""
     load = m.balance("load", "position", value=ca.vertcat(p.x_G, p.y_G, 0))
     centre = ca.vertcat(p.x_G, p.y_G, 0) + load.effort
-    first_moment = p.m_p * centre + p.m_w * ca.vertcat(ca.sum1(g.x), ca.sum1(g.y), 0)
+    behind_x, behind_y = (-p.m_w * p.d * f(motion.beta) for f in (ca.cos, ca.sin))
+    sets_x, sets_y = (ca.sum1(p.m_w * at + b) for at, b in ((g.x, behind_x), (g.y, behind_y)))
+    first_moment = p.m_p * centre + ca.vertcat(sets_x, sets_y, 0)
     body = m.balance(
         "body",
         "body",
@@ -143,7 +151,11 @@ def bodies(m: Model, g: Geometry, motion: Motion, p: Symbols) -> Bodies:
         p.I_phi,
     )
     weight = (masses.mass + 3 * p.m_w) * p.gravity - body.effort[2]
-    return Bodies(masses, first_moment[:2] + body.first_moment[:2], weight, body.effort)
+    forks = behind_x * body.lean[1] - behind_y * body.lean[0]
+    if not body.lean.is_zero():
+        m.supply(ca.dot(forks, beta_rate))
+    moment = first_moment[:2] + body.first_moment[:2]
+    return Bodies(masses, moment, weight, body.effort, forks)
 
 
 def forces(
@@ -156,7 +168,7 @@ def forces(
     """
     u = m.inputs(qs.TAU_BETA, qs.TAU_PHI)
     p = m.parameters(M_P, M_W, D, I_P, I_S, I_PHI, X_G, Y_G, GRAVITY, F_S, F_V, W_0)
-    body = bodies(m, g, motion, p)
+    body = bodies(m, g, motion, p, beta_rate)
     steering = m.balance(
         "steering", "rotation", velocity=beta_rate, angle=motion.beta, load=u.tau_beta
     )
@@ -170,7 +182,7 @@ def forces(
     m.loss("axles", ca.dot(friction_beta, beta_rate) + ca.dot(friction_phi, phi_rate))
     m.port(qs.STEERING, u.tau_beta, beta_rate)
     m.port(qs.ROLLING, u.tau_phi, phi_rate)
-    on_beta = u.tau_beta - friction_beta + steering.effort + pivot
+    on_beta = u.tau_beta - friction_beta + steering.effort + pivot + body.forks
     on_phi = u.tau_phi - friction_phi + rolling.effort
     return body.masses, Forces(on_pose(body.wrench, pivot), on_beta, on_phi, normal)
 

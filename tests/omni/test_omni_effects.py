@@ -99,6 +99,23 @@ def test_pivot_torque_acts_on_steering_and_yaw_and_opposes_the_spin(k: float) ->
     assert out["pivot_torque.P_loss"] == pytest.approx(-np.dot(moments, spin), rel=1e-9)
 
 
+@pytest.mark.parametrize("fidelity", ["slip", "creep"])
+def test_platform_and_forks_slide_down_a_slope_together(fidelity: str) -> None:
+    """As all bodies fall alike: at rest no tyre pulls, so nothing turns."""
+    turned = {f"steering_angle[{i}]": angle for i, angle in zip((1, 2, 3), (0.4, 2.0, -1.1), strict=True)}
+    slope = {"floor_slope.slope": 0.02, "floor_slope.heading": 0.7, "pose_theta": 0.3}
+    still = {name: 0.0 for name in ("f_s", "f_v") if fidelity != "creep"}
+    lift = {"payload.mass": 20.0, "payload.position[1]": 0.2, "payload.position[2]": -0.1}
+    rates = oracle(f"omni_base/{fidelity}+payload+floor_slope").derivatives(
+        {**turned, **slope, **still, **lift}
+    )
+    along = -9.81 * np.sin(0.02)
+    spins = [rates["yaw_rate"], *(rates[f"steering_rate[{i}]"] for i in (1, 2, 3))]
+    assert rates["vel_x"] == pytest.approx(along * np.cos(0.7), rel=1e-9)
+    assert rates["vel_y"] == pytest.approx(along * np.sin(0.7), rel=1e-9)
+    assert spins == pytest.approx(np.zeros(4), abs=1e-9)  # rounding of solves of 2500 N
+
+
 def test_payload_and_slope_move_the_base_as_they_should() -> None:
     still = {"f_s": 0.0, "f_v": 0.0}
     # gravity along the slope, 250 kg; the inertia reflected from the wheels is 1 to 3 percent
