@@ -102,7 +102,9 @@ def test_pivot_torque_acts_on_steering_and_yaw_and_opposes_the_spin(k: float) ->
 @pytest.mark.parametrize("fidelity", ["slip", "creep"])
 def test_platform_and_forks_slide_down_a_slope_together(fidelity: str) -> None:
     """As all bodies fall alike: at rest no tyre pulls, so nothing turns."""
-    turned = {f"steering_angle[{i}]": angle for i, angle in zip((1, 2, 3), (0.4, 2.0, -1.1), strict=True)}
+    turned = {
+        f"steering_angle[{i}]": angle for i, angle in zip((1, 2, 3), (0.4, 2.0, -1.1), strict=True)
+    }
     slope = {"floor_slope.slope": 0.02, "floor_slope.heading": 0.7, "pose_theta": 0.3}
     still = {name: 0.0 for name in ("f_s", "f_v") if fidelity != "creep"}
     lift = {"payload.mass": 20.0, "payload.position[1]": 0.2, "payload.position[2]": -0.1}
