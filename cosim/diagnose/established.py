@@ -24,6 +24,9 @@ PART = 0.2
 """Share of what a model leaves beyond noise that a further effect must explain where runs may turn
 unstable: moments that come too early are most of that, and any law moves them a little."""
 
+FAINT = 0.1
+"""Share of a strength that is next to absent: what the rest did, other parameters have taken."""
+
 
 def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     """Replace a winner by a simpler law where nothing else of it is determined.
@@ -46,6 +49,8 @@ def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     if plain is not winner:
         winner = search.sharpened(plain, base)
         stage.follow(winner)
+    winner = told_from_absence(search, base, winner)
+    stage.follow(winner)
     simple = _simpler(search, base, stage)
     if simple is winner:
         return
@@ -53,6 +58,41 @@ def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     stage.winner = simple
     challenged(search, base, stage)  # its places have been compared by the other law only
     stage.follow(search.sharpened(stage.winner, base))
+
+
+def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> Fitted:
+    """The winner, its strength's interval without absence where the data refuse a tenth of it.
+
+    Intervals are as wide on either side. Where other parameters undo the strength along a bend (a
+    light mass far away shifts the mass centre as a heavy one close by, but for its inertia), what
+    is open above is not below.
+
+    Args:
+        search: fits and judges.
+        base: model without the effect.
+        winner: with intervals.
+    """
+    item = winner.signature
+    if item is None or search.law(winner, winner.effects[-1]).there:
+        return winner
+    strength = item.strength
+    place, estimate = winner.problem.index(strength.name), winner.estimate
+    value = float(estimate.theta[place])
+    faint = strength.absent + FAINT * (value - strength.absent)
+    if estimate.identifiable[place] or not strength.minimum <= faint <= strength.maximum:
+        return winner
+    less = search.held(winner, strength.name, faint)
+    if less is None:
+        return winner
+    less.effects, less.signature = winner.effects, item
+    less = search.approached(less, winner, base)
+    if search.gain(less, winner) <= GATE:
+        return winner
+    low, high = estimate.low.copy(), estimate.high.copy()
+    ends = low if faint < value else high
+    ends[place] = faint
+    search.say(f"{strength.name} = {faint:.3g} {strength.unit}: refused by the data")
+    return replace(winner, estimate=replace(estimate, low=low, high=high))
 
 
 def _simpler(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:

@@ -53,9 +53,19 @@ fit, as the winner did."""
 
 
 def nearly(search: LateValueFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:
-    """Candidates whose fits gain nearly as much as the best quick one did."""
+    """Candidates whose fits gain nearly as much as the best quick one did.
+
+    Of those that stand at one of a few values that were tried, the first order counts as well: a
+    quick fit holds them there.
+    """
     least = NEARLY * stage.quick
-    return frozenset(f.effects[-1] for f in stage.fitted if search.total(base, f) > least)
+    gains = {f.effects[-1]: f.signature.score.gain for f in stage.fitted if f.signature is not None}
+    promised = NEARLY * max(gains.values(), default=0.0)
+    return frozenset(
+        f.effects[-1] for f in stage.fitted
+        if search.total(base, f) > least
+        or (f.signature is not None and f.signature.placed and gains[f.effects[-1]] > promised)
+    )  # fmt: skip
 
 
 def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from cosim.diagnose.candidates import candidates
 from cosim.diagnose.completing import RIVALS, completed
+from cosim.diagnose.late_values import LateValueFitter
 from cosim.diagnose.models import Fitted
+from cosim.diagnose.rivals import nearly
 from cosim.diagnose.rounds import Round
-from tests.diagnose import built, disc
+from cosim.diagnose.search import CHECK
+from tests.diagnose import built, disc, plants
+from tests.problems import simulator
 
 STIFFNESS, REST = 0.3, 2.0
 """A hose [N.m/rad] that hangs free far from where the disc begins [rad]."""
@@ -80,3 +86,21 @@ def test_no_more_of_them_than_a_few(tmp_path: Path) -> None:
         found.near |= {f.effects[-1] for f in others}
         completed(rig.search, rig.base, found)
         assert rival in found.fitted  # not fitted again
+
+
+def test_a_law_at_one_of_a_few_places_is_near_if_it_promised_to_be(tmp_path: Path) -> None:
+    judge = LateValueFitter(simulator(plants.base_on_casters(tmp_path)), CHECK, lambda text: None)
+    base = plants.leaving(judge, 100.0)
+    known = {c.label: c for c in candidates(judge.raw)}
+    shift, load = known["load_shift at base.load"], known["payload at base.body"]
+    best = plants.fitted(judge, base, shift, 1000.0)
+    held = plants.fitted(judge, base, load, 500.0)  # where it was tried
+    best.signature = plants.gaining(judge, shift, 1000.0)
+    assert held.signature is not None
+    place = f"{load.prefix}position[1]"
+    for promised, fixed, near in ((900.0, {place: 0.2}, True), (700.0, {place: 0.2}, False),
+                                  (900.0, {}, False)):  # fmt: skip
+        score = plants.gaining(judge, load, promised).score
+        held.signature = replace(held.signature, score=score, fixed=fixed)
+        stage = Round(base, [], {}, fitted=[best, held], quick=1000.0)
+        assert nearly(judge, base, stage) == frozenset({shift, load} if near else {shift})

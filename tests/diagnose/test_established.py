@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cosim.diagnose.candidates import Candidate
-from cosim.diagnose.established import freed, needed, settle
+from cosim.diagnose.established import FAINT, freed, needed, settle, told_from_absence
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from tests.diagnose import built
@@ -289,3 +289,39 @@ def test_a_law_that_stands_on_another_is_not_asked_alone(dry: Rig) -> None:
     less = replace(dry.base, effects=(spring,))
     assert freed(dry.search, less, less) is less
     assert dry.said[-1].startswith("cubic_stiffness at load.spring alone: ")
+
+
+# -- intervals that hold absence on the other side of a bend ------------------------------------
+
+
+def as_if_open(fitted: Fitted) -> Fitted:
+    """A fit whose strength's interval is as wide below as it is open above."""
+    assert fitted.signature is not None
+    place = fitted.problem.index(fitted.signature.strength.name)
+    estimate = fitted.estimate
+    low, known = estimate.low.copy(), estimate.identifiable.copy()
+    low[place], known[place] = 0.0, False
+    return replace(fitted, estimate=replace(estimate, low=low, identifiable=known))
+
+
+def test_a_strength_whose_tenth_the_data_refuse_is_there(dry: Rig) -> None:
+    winner = as_if_open(dry.added(dry.base, "coulomb", {"tau_c": DRY}))
+    assert not dry.search.law(winner, winner.effects[-1]).there
+    found = told_from_absence(dry.search, dry.base, winner)
+    law = dry.search.law(found, found.effects[-1])
+    assert law.there and law.size.low == pytest.approx(FAINT * law.size.value)
+    assert law.size.high == dry.search.law(winner, winner.effects[-1]).size.high
+    assert "refused by the data" in dry.said[-1]
+
+
+def test_one_whose_tenth_does_as_well_may_be_absent(dry: Rig) -> None:
+    """A drag that is not there: nothing is refused, nothing is said."""
+    winner = as_if_open(dry.added(dry.base, "quadratic_drag", {"c": 1e-6}))
+    said = list(dry.said)
+    assert told_from_absence(dry.search, dry.base, winner) is winner
+    assert dry.said == said
+
+
+def test_a_strength_that_the_data_determine_is_not_asked(dry: Rig) -> None:
+    winner = dry.added(dry.base, "coulomb", {"tau_c": DRY})
+    assert told_from_absence(dry.search, dry.base, winner) is winner
