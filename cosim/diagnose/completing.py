@@ -33,6 +33,8 @@ def completed(fitter: Fitter, base: Fitted, stage: Round) -> None:
     if best is not winner:
         fitter.say(f"{best.effects[-1].label} does better with its other parameters")
         better = fitter.sharpened(best, base, draft=True)
+        if is_open(better.estimate):  # a rough fit may have held what it could not tell
+            better = fitter.refined(base, better)
         stage.fitted = [better if f is best else f for f in stage.fitted]
         stage.winner, stage.open = better, is_open(better.estimate)
 

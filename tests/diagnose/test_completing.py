@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,3 +105,16 @@ def test_a_law_at_one_of_a_few_places_is_near_if_it_promised_to_be(tmp_path: Pat
         held.signature = replace(held.signature, score=score, fixed=fixed)
         stage = Round(base, [], {}, fitted=[best, held], quick=1000.0)
         assert nearly(judge, base, stage) == frozenset({shift, load} if near else {shift})
+
+
+def test_one_that_still_leaves_more_keeps_all_its_parameters(tmp_path: Path) -> None:
+    def law(w: float, theta: float, t: float) -> float:
+        return pulled(w, theta, t) + 0.05 * math.sin(5.0 * t)
+
+    with built.rig(tmp_path, law) as rig:
+        found = stage(rig)
+        completed(rig.search, rig.base, found)
+        assert name(found.winner) == "hose_spring" and found.open
+        assert found.winner is not None and found.winner in found.fitted
+        values = found.winner.estimate.values
+        assert values["load.flange.hose_spring.theta_0"] == pytest.approx(REST, rel=0.1)
