@@ -6,7 +6,7 @@ from .fitter import Fitter
 from .models import Fitted, is_open
 from .rounds import Round
 
-RIVALS = 2
+COMPLETED = 2
 """Rivals that are completed at most, the best: each costs a fit with more parameters than a quick
 one, and which of many laws comes next is left to the next round."""
 
@@ -25,7 +25,7 @@ def completed(fitter: Fitter, base: Fitted, stage: Round) -> None:
     best = winner = stage.winner
     assert best is not None
     near = [f for f in stage.fitted if f.effects[-1] in stage.near and _held(f, best)]
-    for rival in near[:RIVALS]:
+    for rival in near[:COMPLETED]:
         found = fitter.refined(base, rival, quick=True)
         stage.fitted = [found if f is rival else f for f in stage.fitted]
         if fitter.total(base, found) > fitter.total(base, best) and fitter.accepted(base, found):

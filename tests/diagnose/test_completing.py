@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.completing import RIVALS, completed
+from cosim.diagnose.completing import COMPLETED, completed
 from cosim.diagnose.late_values import LateValueFitter
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import nearly
@@ -82,7 +82,7 @@ def test_no_more_of_them_than_a_few(tmp_path: Path) -> None:
         rival = found.fitted[1]
         others = [rig.added(rig.base, effect, {size: 0.1}, fit=False)
                   for effect, size in (("coulomb", "tau_c"), ("bristle", "tau_c"))]  # fmt: skip
-        assert len(others) == RIVALS
+        assert len(others) == COMPLETED
         found.fitted[1:1] = others
         found.near |= {f.effects[-1] for f in others}
         completed(rig.search, rig.base, found)
