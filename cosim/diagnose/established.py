@@ -81,18 +81,22 @@ def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> 
     faint = strength.absent + FAINT * (value - strength.absent)
     if estimate.identifiable[place] or not strength.minimum <= faint <= strength.maximum:
         return winner
-    less = search.held(winner, strength.name, faint)
+    less, known = search.held(winner, strength.name, faint), search.memo.get(winner.labels)
     if less is None:
         return winner
     less.effects, less.signature = winner.effects, item
     less = search.approached(less, winner, base)
+    if known is not None:
+        search.memo.keep(known)  # what holds the strength is no fit of the set
     if search.gain(less, winner) <= GATE:
         return winner
     low, high = estimate.low.copy(), estimate.high.copy()
     ends = low if faint < value else high
     ends[place] = faint
     search.say(f"{strength.name} = {faint:.3g} {strength.unit}: refused by the data")
-    return replace(winner, estimate=replace(estimate, low=low, high=high))
+    found = replace(winner, estimate=replace(estimate, low=low, high=high))
+    search.note(found)
+    return found
 
 
 def _simpler(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:

@@ -312,6 +312,8 @@ def test_a_strength_whose_tenth_the_data_refuse_is_there(dry: Rig) -> None:
     assert law.there and law.size.low == pytest.approx(FAINT * law.size.value)
     assert law.size.high == dry.search.law(winner, winner.effects[-1]).size.high
     assert "refused by the data" in dry.said[-1]
+    known = dry.search.memo.get(found.labels)
+    assert known is not None and dry.search.law(known, known.effects[-1]).there
 
 
 def test_one_whose_tenth_does_as_well_may_be_absent(dry: Rig) -> None:
