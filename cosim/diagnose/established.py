@@ -73,8 +73,8 @@ def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> 
         winner: with intervals.
     """
     item = winner.signature
-    if item is None or search.law(winner, winner.effects[-1]).there:
-        return winner
+    if item is None or search.law(winner, winner.effects[-1]).there or search.lacking(winner):
+        return winner  # beside what is missing, nats refuse too easily
     strength = item.strength
     place, estimate = winner.problem.index(strength.name), winner.estimate
     value = float(estimate.theta[place])
