@@ -18,14 +18,11 @@ from .models import GATE, Fitted, compare
 from .redundant import at_usual, without_redundant
 from .rivals import challenged
 from .rounds import Round
-from .verdict import HAIR, wanted
+from .verdict import HAIR, TENTH, wanted
 
 PART = 0.2
 """Share of what a model leaves beyond noise that a further effect must explain where runs may turn
 unstable: moments that come too early are most of that, and any law moves them a little."""
-
-FAINT = 0.1
-"""Share of a strength that is next to absent: what the rest did, other parameters have taken."""
 
 
 def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
@@ -65,7 +62,8 @@ def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> 
 
     Intervals are as wide on either side. Where other parameters undo the strength along a bend (a
     light mass far away shifts the mass centre as a heavy one close by, but for its inertia), what
-    is open above is not below.
+    is open above is not below. A tenth of a strength does a tenth of what the law did: what
+    the verdict lets a model leave.
 
     Args:
         search: fits and judges.
@@ -78,7 +76,7 @@ def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> 
     strength = item.strength
     place, estimate = winner.problem.index(strength.name), winner.estimate
     value = float(estimate.theta[place])
-    faint = strength.absent + FAINT * (value - strength.absent)
+    faint = strength.absent + TENTH * (value - strength.absent)
     if estimate.identifiable[place] or not strength.minimum <= faint <= strength.maximum:
         return winner
     less, known = search.held(winner, strength.name, faint), search.memo.get(winner.labels)

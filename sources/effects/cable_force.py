@@ -20,6 +20,7 @@ from ..effect import Effect
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 
+# Bounds are those of a yard: a kilometre of cable, a mast of 100 m, a pit of 10, a machine of 5 m.
 TENSION = Quantity("tension", "N", "tension, 0 = absent", start=8.0, minimum=0.0, strength=True)
 HEADING = Quantity(
     "heading",

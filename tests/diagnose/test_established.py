@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from cosim.diagnose.candidates import Candidate
-from cosim.diagnose.established import FAINT, freed, needed, settle, told_from_absence
+from cosim.diagnose.established import freed, needed, settle, told_from_absence
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
+from cosim.diagnose.verdict import TENTH
 from tests.diagnose import built
 from tests.diagnose.built import Rig
 
@@ -309,7 +310,7 @@ def test_a_strength_whose_tenth_the_data_refuse_is_there(dry: Rig) -> None:
     assert not dry.search.law(winner, winner.effects[-1]).there
     found = told_from_absence(dry.search, dry.base, winner)
     law = dry.search.law(found, found.effects[-1])
-    assert law.there and law.size.low == pytest.approx(FAINT * law.size.value)
+    assert law.there and law.size.low == pytest.approx(TENTH * law.size.value)
     assert law.size.high == dry.search.law(winner, winner.effects[-1]).size.high
     assert "refused by the data" in dry.said[-1]
     known = dry.search.memo.get(found.labels)
