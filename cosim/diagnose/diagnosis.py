@@ -24,7 +24,7 @@ from .bursts import bursts, times
 from .candidates import candidates
 from .carriers import leave_fmus
 from .course import Course, asked_everywhere, asked_single
-from .established import examined
+from .established import all_told, examined
 from .experiment import propose
 from .facts import Table
 from .foreign import Adapter, attached
@@ -296,7 +296,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
         if best.labels != current.labels:
             known = search.memo.get(best.labels)
             assert known is not None
-            current = search.sharpened(known, declared)
+            current = all_told(search, search.sharpened(known, declared))
         elif above(best) and best.labels not in forces:
             search.say("does a force at a port explain what is left?")
             ranked = [s.candidate for s in rounds[0].signatures]

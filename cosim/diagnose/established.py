@@ -46,7 +46,7 @@ def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     if plain is not winner:
         winner = search.sharpened(plain, base)
         stage.follow(winner)
-    winner = told_from_absence(search, base, winner)
+    winner = told_from_absence(search, base, winner, winner.effects[-1])
     stage.follow(winner)
     simple = _simpler(search, base, stage)
     if simple is winner:
@@ -57,8 +57,10 @@ def settle(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     stage.follow(search.sharpened(stage.winner, base))
 
 
-def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> Fitted:
-    """The winner, its strength's interval without absence where the data refuse a tenth of it.
+def told_from_absence(
+    search: LateValueFitter, base: Fitted, fitted: Fitted, effect: Candidate
+) -> Fitted:
+    """A model, a strength's interval without absence where the data refuse a tenth of it.
 
     Intervals are as wide on either side. Where other parameters undo the strength along a bend (a
     light mass far away shifts the mass centre as a heavy one close by, but for its inertia), what
@@ -67,34 +69,44 @@ def told_from_absence(search: LateValueFitter, base: Fitted, winner: Fitted) -> 
 
     Args:
         search: fits and judges.
-        base: model without the effect.
-        winner: with intervals.
+        base: a simpler model, from whose parameters a fit may begin, too.
+        fitted: with intervals.
+        effect: of which the strength is asked.
     """
-    item = winner.signature
-    if item is None or search.law(winner, winner.effects[-1]).there or search.lacking(winner):
-        return winner  # beside what is missing, nats refuse too easily
-    strength = item.strength
-    place, estimate = winner.problem.index(strength.name), winner.estimate
+    if search.law(fitted, effect).there or search.lacking(fitted):
+        return fitted  # beside what is missing, nats refuse too easily
+    problem, estimate = fitted.problem, fitted.estimate
+    strength = next(
+        p for p in problem.parameters if p.strength and p.name.startswith(effect.prefix)
+    )
+    place = problem.index(strength.name)
     value = float(estimate.theta[place])
     faint = strength.absent + TENTH * (value - strength.absent)
     if estimate.identifiable[place] or not strength.minimum <= faint <= strength.maximum:
-        return winner
-    less, known = search.held(winner, strength.name, faint), search.memo.get(winner.labels)
+        return fitted
+    less, known = search.held(fitted, strength.name, faint), search.memo.get(fitted.labels)
     if less is None:
-        return winner
-    less.effects, less.signature = winner.effects, item
-    less = search.approached(less, winner, base)
+        return fitted
+    less.effects, less.signature = fitted.effects, fitted.signature
+    less = search.approached(less, fitted, base)
     if known is not None:
         search.memo.keep(known)  # what holds the strength is no fit of the set
-    if search.gain(less, winner) <= GATE:
-        return winner
+    if search.gain(less, fitted) <= GATE:
+        return fitted
     low, high = estimate.low.copy(), estimate.high.copy()
     ends = low if faint < value else high
     ends[place] = faint
     search.say(f"{strength.name} = {faint:.3g} {strength.unit}: refused by the data")
-    found = replace(winner, estimate=replace(estimate, low=low, high=high))
+    found = replace(fitted, estimate=replace(estimate, low=low, high=high))
     search.note(found)
     return found
+
+
+def all_told(search: LateValueFitter, fitted: Fitted) -> Fitted:
+    """A model each of whose strengths has been asked like that: a new fit has even intervals."""
+    for effect in fitted.effects:
+        fitted = told_from_absence(search, fitted, fitted, effect)
+    return fitted
 
 
 def _simpler(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
@@ -172,7 +184,10 @@ def examined(search: LateValueFitter, fitted: Fitted, candidates: int) -> Fitted
         law = search.law(fitted, effect)
         return law.there and wanted(law.missed, candidates)
 
-    for effect in fitted.effects if len(fitted.effects) > 1 else ():
+    if len(fitted.effects) < 2:
+        return fitted
+    fitted = all_told(search, fitted)
+    for effect in fitted.effects:
         try:
             less = search.without(fitted, effect)
         except CosimError as error:  # it is needed

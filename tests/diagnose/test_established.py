@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cosim.diagnose.candidates import Candidate
-from cosim.diagnose.established import freed, needed, settle, told_from_absence
+from cosim.diagnose.established import examined, freed, needed, settle, told_from_absence
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.verdict import TENTH
@@ -308,7 +308,7 @@ def as_if_open(fitted: Fitted) -> Fitted:
 def test_a_strength_whose_tenth_the_data_refuse_is_there(dry: Rig) -> None:
     winner = as_if_open(dry.added(dry.base, "coulomb", {"tau_c": DRY}))
     assert not dry.search.law(winner, winner.effects[-1]).there
-    found = told_from_absence(dry.search, dry.base, winner)
+    found = told_from_absence(dry.search, dry.base, winner, winner.effects[-1])
     law = dry.search.law(found, found.effects[-1])
     assert law.there and law.size.low == pytest.approx(TENTH * law.size.value)
     assert law.size.high == dry.search.law(winner, winner.effects[-1]).size.high
@@ -321,10 +321,29 @@ def test_one_whose_tenth_does_as_well_may_be_absent(dry: Rig) -> None:
     """A drag that is not there: nothing is refused, nothing is said."""
     winner = as_if_open(dry.added(dry.base, "quadratic_drag", {"c": 1e-6}))
     said = list(dry.said)
-    assert told_from_absence(dry.search, dry.base, winner) is winner
+    assert told_from_absence(dry.search, dry.base, winner, winner.effects[-1]) is winner
     assert dry.said == said
 
 
 def test_a_strength_that_the_data_determine_is_not_asked(dry: Rig) -> None:
     winner = dry.added(dry.base, "coulomb", {"tau_c": DRY})
-    assert told_from_absence(dry.search, dry.base, winner) is winner
+    assert told_from_absence(dry.search, dry.base, winner, winner.effects[-1]) is winner
+
+
+def test_so_is_each_of_several_laws_when_they_are_fitted_anew(tmp_path: Path) -> None:
+    """Else a law that the data need would be dropped beside another one."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return friction(w, theta, t) + WEIGHT * math.sin(theta)
+
+    with built.rig(tmp_path, law) as rig:
+        first = rig.added(rig.base, "unbalance", {"m_u": WEIGHT})
+        whole = rig.added(first, "coulomb", {"tau_c": DRY})
+        place = whole.problem.index("load.flange.unbalance.m_u")
+        low, known = whole.estimate.low.copy(), whole.estimate.identifiable.copy()
+        low[place], known[place] = 0.0, False
+        even = replace(whole, estimate=replace(whole.estimate, low=low, identifiable=known))
+        assert not rig.search.law(even, even.effects[0]).there
+        found = examined(rig.search, even, 2)
+        assert found.labels == whole.labels
+        assert all(rig.search.law(found, effect).there for effect in found.effects)
