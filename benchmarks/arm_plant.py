@@ -345,7 +345,7 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         memory = memory + fixed("Ki") * error * TICK
         # currents over the tick, their mean, and what the sensor shows
         r = resistance * (1.0 + heat)
-        settled = (volts - k_t * RATIO * spin - brushes * np.tanh(current / 0.1)) / r
+        settled = _balanced(volts - k_t * RATIO * spin, r, brushes)
         gap = current - settled
         mean = settled + gap * (1 - fade) / share
         shown = settled + (shown - settled - lag * gap) * see + lag * gap * fade
@@ -389,6 +389,21 @@ def simulate(benches: list[Bench], chosen: list[Run], seconds: float) -> dict[st
         f"{name}_{k + 1}": table[:, place, k]
         for place, name in enumerate(SIGMA) for k in range(6)
     }  # fmt: skip
+
+
+def _balanced(volts: Vector, resistance: Vector, drop: Vector) -> Vector:
+    """Currents at which the voltages balance, r i + drop tanh(i / 0.1 A) = u, by Newton's method.
+
+    From 0 on it cannot pass the solution, since tanh bends towards 0.
+    """
+    if not drop.any():
+        return volts / resistance
+    found = np.zeros(volts.shape)
+    for _ in range(12):  # the last ones change nothing that a float holds
+        bent = np.tanh(found / 0.1)
+        missing = volts - resistance * found - drop * bent
+        found = found + missing / (resistance + drop * (1.0 - bent**2) / 0.1)
+    return found
 
 
 def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:

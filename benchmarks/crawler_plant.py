@@ -43,7 +43,7 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "marker_offset": (2e-3, ("marker_offset",)),
     "slope": (0.03, ("floor_slope",)),
     "cable": (4.0, ("cable_force",)),
-    "pivot_torque": (1.0, ("pivot_torque",)),
+    "turning_torque": (1.0, ("turning_friction",)),
     "patch": (0.3, ("low_friction_patch",)),
     "belt_slip": (0.02, ()),
     "sprocket_runout": (0.01, ("wheel_runout",)),
@@ -55,7 +55,7 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
 
 friction_asymmetry: the right track has mu (1 + d), the left mu (1 - d). friction_anisotropy: less
 across. payload: [kg] at (0.1, 0.06) m. slope, cable: [rad], [N] at x = -0.19 m, in a direction of
-the floor. pivot_torque: against turning, whatever the speed [N.m]. patch: friction is lower by
+the floor. turning_torque: against turning, whatever the speed [N.m]. patch: friction is lower by
 this share within 0.5 m around (0.3, 0.2). belt_slip: a track is slower by this share of its speed
 times what it pulls over mu N. speed_friction: mu falls by this share per m/s of sliding.
 load_transfer: height of the mass centre [m] over which accelerations move the load.
@@ -149,7 +149,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     pull, towards = of("cable"), form("cable")
     push_x = mass * GRAVITY * slope * np.cos(heading), pull * np.cos(towards)
     push_y = mass * GRAVITY * slope * np.sin(heading), pull * np.sin(towards)
-    pivot, patch, slip = of("pivot_torque"), of("patch"), of("belt_slip")
+    turning, patch, slip = of("turning_torque"), of("patch"), of("belt_slip")
     runout, phase = of("sprocket_runout"), form("sprocket_runout")
     fading, height = of("speed_friction"), of("load_transfer")
     ahead_l = late("encoders_late") + late("left_encoder_late")
@@ -216,7 +216,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
             pulled_l, pulled_r = pulled / held
         sum_x, sum_y = pulled.sum(axis=0), g_y.sum(axis=0)
         torque = np.sum((at_x - x_g) * g_y - (at_y - y_g) * g_x, axis=0)
-        torque = torque - pivot * np.tanh(rate / 0.02)
+        torque = torque - turning * np.tanh(rate / 0.02)
         to_x, to_y = push_x[0] + push_x[1], push_y[0] + push_y[1]
         arm = -0.19 - x_g, -y_g  # where the cable pulls
         torque = torque + (arm[0] * (-push_x[1] * sin + push_y[1] * cos)

@@ -53,7 +53,7 @@ EFFECTS: dict[str, tuple[float, tuple[str, ...]]] = {
     "slope": (0.01, ("floor_slope",)),
     "cable": (8.0, ("cable_force",)),
     "air": (30.0, ("body_drag",)),
-    "turning_torque": (3.0, ()),
+    "turning_torque": (3.0, ("turning_friction",)),
     "command_late": (0.03, ("delay",)),
     "camera_late": (0.04, ("delay",)),
     "camera_skew": (2e-3, ("clock_skew",)),

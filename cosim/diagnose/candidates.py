@@ -19,6 +19,9 @@ from ..system.variants import component
 
 LOG, DELAY, SKEW = "log", "delay", "clock_skew"
 """Where columns of the log are late, and what that is called: as the effect in the system."""
+PASSED = "load"
+"""Signal of a balance: the torque that passes. It is another one on either end of a bond, since the
+giver takes its own friction off before."""
 SHOWS = "Late sensor or clock of what was logged."
 FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 DRIFTS = "Clock that runs slow against that of the inputs; negative: fast."
@@ -40,10 +43,14 @@ class Catalogue(Protocol):
 
 @runtime_checkable
 class Kinship(Protocol):
-    """A provider that knows which laws are special cases of others."""
+    """A provider that knows which laws are special cases of others, and what they read."""
 
     def contained(self, effect: str) -> Sequence[str]:
         """Effects that the law of an effect becomes for some values of its parameters."""
+        ...
+
+    def needs(self, effect: str) -> Sequence[str]:
+        """Signals that an effect's law reads beyond those of every balance of its kind."""
         ...
 
 
@@ -110,20 +117,24 @@ def candidates(problem: Problem) -> list[Candidate]:
     provider = problem.provider
     if not isinstance(provider, Catalogue):
         return []
-    found = []
-    others = twins(problem)
+    found: list[Candidate] = []
+    before: list[Candidate] = []  # after all others: where there is no difference, they are twins
+    others, kin = twins(problem), provider if isinstance(provider, Kinship) else None
     for instance, variant in problem.instances.items():
         kind = component(variant)
         if not kind:
             continue  # a file: nothing can be added to it
         for effect, port, text in provider.candidates(variant):
-            if (instance, port) not in others:
-                special = tuple(provider.contained(effect) if isinstance(provider, Kinship) else ())
-                found.append(Candidate(instance, kind, effect, port, text, contains=special))
+            twin = (instance, port) in others
+            if twin and (kin is None or PASSED not in kin.needs(effect)):
+                continue
+            special = () if kin is None else tuple(kin.contained(effect))
+            known = before if twin else found
+            known.append(Candidate(instance, kind, effect, port, text, contains=special))
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
-    return found + delays(problem) + drifts(problem)
+    return found + before + delays(problem) + drifts(problem)
 
 
 def delays(problem: Problem) -> list[Candidate]:
@@ -206,7 +217,7 @@ def twins(problem: Problem) -> set[tuple[str, str]]:
     (Not the twins of a `Signature`, which do the same to first order.)
 
     What acts on a shaft is left to the end that gives the motion: there it enters the equation of
-    motion itself, and not a tick later through the exchange.
+    motion itself, and not a tick later through the exchange. Not so what reads `PASSED`.
     """
     kinds = balances(problem)
     twins = set()

@@ -200,10 +200,11 @@ class Fitter(Judge):
         own = [item.strength.name, *([item.probe.second] if item.probe.second else [])]
         starts = []
         near = [v for v in item.strength.hints.tries if 1.0 / USUAL < v / value < USUAL]
+        along = [(1.0, value), (0.0, value), (0.0, 0.1 * value), *((1.0, v) for v in near)]
         if abs(item.score.amplitude - 1.0) > EXACT:
-            near.append(item.value)  # what was simulated: a steep law goes too far from there
-        for factor, begun in ((1.0, value), (0.0, value), (0.0, 0.1 * value),
-                              *((1.0, v) for v in near)):  # fmt: skip
+            # what was simulated: a steep law goes too far from there, or one that is imitated
+            along.append((item.value / value, item.value))
+        for factor, begun in along:
             theta = problem.nominal
             count = base.estimate.theta.size
             theta[:count] = base.estimate.theta + factor * shift

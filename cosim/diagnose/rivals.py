@@ -314,15 +314,16 @@ def _alike(
     fitted = {f.effects[-1]: f for f in stage.fitted}
     found += [(t, None) for t in kin(search, base, stage) if t.candidate not in fitted]
     found += _simpler(stage)
-    # another law that does nearly as well elsewhere has not been fitted as far; one with more
-    # parameters makes up by them for what a limit does, and lacks what is held of its place
-    least = CLOSE * search.total(base, winner)
+    # another law that does nearly as well elsewhere has not been fitted as far, so unused runs may
+    # want it yet; one with more parameters makes up by them for what a limit does, and lacks what
+    # is held of its place
+    least = CLOSE * search.gain(base, winner)
     found += [
         (f.signature, f) for f in stage.fitted
         if f.signature is not None and f.effects[-1].effect != name and f.effects[-1] in near
-        and f.effects[-1].place != winner.effects[-1].place and search.accepted(base, f)
+        and f.effects[-1].place != winner.effects[-1].place
         and (f.signature.placed or (f.signature.probe.own <= winner.signature.probe.own
-                                    and search.total(base, f) > least))
+                                    and search.gain(base, f) > least))
     ][:OTHERS]  # fmt: skip
     unique = {item.candidate: (item, f) for item, f in reversed(found)}
     return sorted(

@@ -242,6 +242,11 @@ class Builder:
         with naming_errors():
             return tuple(sources("packaging.catalog").contained(effect))
 
+    def needs(self, effect: str) -> tuple[str, ...]:
+        """Signals that an effect's law reads beyond those of every balance of its kind."""
+        with naming_errors():
+            return tuple(sources("packaging.catalog").needs(effect))
+
 
 class Installed:
     """Provider for an installed wheel: FMUs that it carries, the rest built if that is possible."""
@@ -315,6 +320,11 @@ class Installed:
         """Effects that the law of an effect becomes for some values of its parameters."""
         found = self.library.contained(effect)
         return found if found is not None else self._built(effect).contained(effect)
+
+    def needs(self, effect: str) -> tuple[str, ...]:
+        """Signals that an effect's law reads beyond those of every balance of its kind."""
+        found = self.library.needs(effect)
+        return found if found is not None else self._built(effect).needs(effect)
 
 
 def default_provider(told: Told | None = None) -> Provider:

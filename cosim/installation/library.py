@@ -197,6 +197,11 @@ class Library:
         found = self.content.get("contained")
         return None if found is None else tuple(found.get(effect, ()))
 
+    def needs(self, effect: str) -> tuple[str, ...] | None:
+        """Signals that an effect's law reads, None if the library does not know the effects."""
+        found = self.content.get("needs")
+        return None if found is None else tuple(found.get(effect, ()))
+
     def refinements(self, variant: str) -> list[dict[str, Any]] | None:
         """Fidelities of which a variant is the limit, None if the library does not know."""
         found = self.content.get("refinements", {}).get(str(parse_name(variant)))

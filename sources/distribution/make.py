@@ -175,6 +175,7 @@ def _catalogue(names: Sequence[str]) -> dict[str, Any]:
         "variants": [catalog.describe(name) for name in names],
         "effects": {name: module.EFFECT.text for name, module in effects().items()},
         "contained": {name: catalog.contained(name) for name in effects()},
+        "needs": {name: catalog.needs(name) for name in effects()},
         "candidates": {
             name: [(effect, port) for effect, port, _ in catalog.candidates(name)] for name in names
         },

@@ -128,6 +128,12 @@ def contained(effect: str) -> tuple[str, ...]:
     return known.EFFECT.contains if known is not None else ()
 
 
+def needs(effect: str) -> tuple[str, ...]:
+    """Signals that an effect's law reads beyond those that every balance of its kind has."""
+    known = effects().get(effect)
+    return known.EFFECT.needs if known is not None else ()
+
+
 def _has_place(effect: str) -> bool:
     """Whether an effect sits at a point in the world."""
     values = vars(effects()[effect]).values()

@@ -35,7 +35,7 @@ ON_WHEELS = [
     "radius_offset",
     "toe_angle",
 ]
-ON_BODIES = ["floor_slope", "cable_force", "payload", "body_drag"]
+ON_BODIES = ["floor_slope", "cable_force", "payload", "body_drag", "turning_friction"]
 EFFECTS = [
     *(f"wheel_contact/spatial+{name}" for name in (*ON_WHEELS, "coulomb", "bristle")),
     *(f"wheel_contact/brush+{name}" for name in ON_WHEELS),

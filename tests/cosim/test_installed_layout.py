@@ -139,13 +139,15 @@ def test_its_catalogue_is_listed_and_copied_without_casadi(site: Path, tmp_path:
 
 
 def test_what_a_diagnosis_asks_is_known_without_casadi(site: Path, tmp_path: Path) -> None:
-    """Which effects fit, which contain others, which fidelities a variant is the limit of."""
+    """Which effects fit, contain others, read what; which fidelities a variant is the limit of."""
     asked = (
         "from cosim.installation.builder import default_provider\n"
         "provider, name = default_provider(), 'gearbox.lab_bench/ratio'\n"
         "effects = sorted({effect for effect, _, _ in provider.candidates(name)})\n"
         "contained = {effect: provider.contained(effect) for effect in effects}\n"
-        "print(json.dumps([provider.candidates(name), contained, provider.refinements(name)]))\n"
+        "needs = {effect: provider.needs(effect) for effect in effects}\n"
+        "found = [provider.candidates(name), contained, needs, provider.refinements(name)]\n"
+        "print(json.dumps(found))\n"
     )
     program = f"import json, sys\nsys.path.insert(0, {str(site)!r})\n"
     answers = []
@@ -154,7 +156,8 @@ def test_what_a_diagnosis_asks_is_known_without_casadi(site: Path, tmp_path: Pat
         done = subprocess.run([sys.executable, "-c", head + asked], cwd=at, text=True, check=True,
                               capture_output=True)  # fmt: skip
         answers.append(json.loads(done.stdout))
-    assert answers[0] == answers[1] and any(answers[0][1].values())
+    assert answers[0] == answers[1]
+    assert any(answers[0][1].values()) and any(answers[0][2].values())
 
 
 def test_a_system_is_composed_without_casadi(site: Path, tmp_path: Path) -> None:

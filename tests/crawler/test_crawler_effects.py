@@ -29,6 +29,7 @@ def test_the_asked_effects_attach() -> None:
         "payload@body",
         "floor_slope@body",
         "cable_force@body",
+        "turning_friction@body",
         "pivot_torque@pivot",
         "coulomb@sprocket_left",
     ):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -286,3 +288,20 @@ def test_friction_effects_act(effect: str) -> None:
     if effect == "friction_anisotropy":  # more grip across the track resists the turn
         assert some["yaw_rate"] < bare["yaw_rate"]
         assert some["vel_x"] == pytest.approx(bare["vel_x"], abs=1e-12)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_turning_friction_is_the_same_at_every_speed_along(speed: float) -> None:
+    """M_t tanh(w/w_0) against the turn, on the yaw inertia alone: no force, nothing at rest."""
+    model = oracle(".lab/track_contact+turning_friction")
+    values = {"vel_x": speed, "vel_y": 0.1, "w2": 3.0, "yaw_inertia": 0.5}
+    for rate in (0.03, -2.0, 0.0):
+        state = {**values, "yaw_rate": rate}
+        some, bare = (
+            model.derivatives({**state, "turning_friction.M_t": size}) for size in (1.5, 0.0)
+        )
+        torque = -1.5 * math.tanh(rate / 0.01)
+        assert some["yaw_rate"] - bare["yaw_rate"] == pytest.approx(torque / 0.5, abs=1e-9)
+        assert some["vel_x"] == bare["vel_x"] and some["vel_y"] == bare["vel_y"]
+        out = model.outputs({**state, "turning_friction.M_t": 1.5})
+        assert out["turning_friction.P_loss"] == pytest.approx(-torque * rate, rel=1e-12)

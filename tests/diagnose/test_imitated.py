@@ -8,10 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.judge import Judge
 from cosim.diagnose.rounds import Round
@@ -23,6 +26,7 @@ from cosim.diagnose.trials import nearer
 from tests.diagnose import disc, plants
 from tests.problems import simulator
 
+Vector = NDArray[np.float64]
 RUB, DRAG = "coulomb at load.flange", "quadratic_drag at load.flange"
 WEIGHT = "unbalance at load.flange"
 
@@ -92,3 +96,27 @@ def test_a_trial_that_changes_much_and_is_absorbed_is_made_again_along_the_tange
             assert size > CURVED
             assert trials.tried[1] == pytest.approx(trials.tried[0] * TANGENT / size)
     search.close()
+
+
+def test_a_fit_of_one_may_begin_along_the_tangent(plain: Problem) -> None:
+    """At what was simulated, with so much of the shift as goes with that: the rest is curvature."""
+    search = Search(simulator(plain), only=[c for c in candidates(plain) if c.label == DRAG])
+    base = search.calibrated()
+    search.note(base)
+    (item,) = search.scored(base).signatures
+    far = replace(item, score=replace(item.score, amplitude=50.0 * item.score.amplitude))
+    starts: list[Vector] = []
+    usual = search.cost
+
+    def cost(simulator: Simulator, theta: Vector) -> float:
+        starts.append(theta)
+        return usual(simulator, theta)
+
+    search.cost = cost  # type: ignore[method-assign]
+    search.refit(base, far)
+    search.close()
+    place = starts[0].size - 1
+    full, part = (np.array([s[place], *(s[:2] - base.estimate.theta[:2])]) for s in starts[:4:3])
+    assert part[0] == pytest.approx(item.value)
+    assert np.any(full[1:] != 0.0)
+    np.testing.assert_allclose(part, full * (part[0] / full[0]), rtol=1e-9, atol=1e-12)

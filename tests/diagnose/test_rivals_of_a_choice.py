@@ -15,7 +15,7 @@ from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.linear import ScoreTest
-from cosim.diagnose.models import Fitted
+from cosim.diagnose.models import Fitted, Gate
 from cosim.diagnose.rivals import MOST, _alike, _others, restarted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import CLOSE, LOOSE, Search
@@ -121,6 +121,14 @@ def test_another_law_elsewhere_is_fitted_as_far_if_it_is_close(
         current.fitted[1].signature = replace(item, probe=probe, fixed={tried[0].name: 0.1})
     found = labels(_alike(plain, current.base, current, set()))
     assert found == [other] * challenges
+
+
+def test_unused_runs_may_want_it_once_it_has_been(plain: Search) -> None:
+    """A torque against turning: 185 nats worse there as a draft, 128 better when it was fitted."""
+    other = f"quadratic_drag at {PLACE}"
+    current = stage(plain, {LATE[0]: 100.0, other: 96.0})
+    current.fitted[1].gate = Gate(-50.0, -3.0)
+    assert labels(_alike(plain, current.base, current, set())) == [other]
 
 
 def test_another_law_at_the_same_place_is_not(plain: Search) -> None:

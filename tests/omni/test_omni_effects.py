@@ -31,6 +31,7 @@ def test_the_asked_effects_attach() -> None:
             "pivot_torque@pivot",
             "payload@body",
             "floor_slope@body",
+            "turning_friction@body",
             "load_shift@load",
         ):
             assert f"{plain}+{wanted}" in CASES
