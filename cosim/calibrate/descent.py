@@ -20,6 +20,7 @@ from .felt import SHORTEST, felt
 from .known import STEP, Known
 from .loss import Loss, Squares
 from .normal import BOUNDS, Normal, cost_of, drawn, gradient
+from .products import pairs, stepped
 from .simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -78,6 +79,7 @@ class Descent:
         self.damping = FIRM
         self.begun = simulator.evaluations if begun is None else begun
         self.drawn = drawn(problem)
+        self.products, self.straight = pairs(problem), np.zeros(self.theta.size)
         self.residuals = simulator.residuals(self.theta, self.purpose)
         self.cost = self.total(self.theta, self.residuals)
 
@@ -204,7 +206,9 @@ class Descent:
             matrix = root[:, None] * vectors.T
             change = lsq_linear(matrix, along, (low, high), method="bvls").x
         self.promised = float(gradient @ change - 0.5 * change @ whole @ change)
-        return np.asarray(np.clip(theta + change * p.scale, p.lower, p.upper))
+        self.straight = change * p.scale
+        found = stepped(theta, self.straight, self.products)
+        return np.asarray(np.clip(found, p.lower, p.upper))
 
     def descend(self, relative: float, limit: int, tolerance: float) -> None:
         """Levenberg-Marquardt until the cost no longer falls by `tolerance` of it.
@@ -264,11 +268,12 @@ class Descent:
         for _ in range(limit):
             self.damping = damping
             whole = self.step(normal, damping)
+            straight = self.straight
             if abs(self.promised) < SETTLED:
                 return True
             # a limit or a threshold is passed: the direction is right, but not so far
             if not (self.restored(normal, whole, damping) or any(
-                self.attempt(self.theta + part * (whole - self.theta)) for part in PARTS
+                self.attempt(stepped(self.theta, part * straight, self.products)) for part in PARTS
             )):  # fmt: skip
                 for _ in range(SHORTER):
                     damping = self.damping = max(damping, 1e-7) * 30.0

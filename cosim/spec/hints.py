@@ -31,6 +31,8 @@ class SearchHints:
             signal is delayed by whole samples; between, its steps are smeared).
         visits: output of the component among whose values along a run the right value is, for a
             parameter that tells nothing where it is wrong (where a patch lies).
+        times: parameter of the same effect with which it is multiplied, if little but the product
+            shows (a mass, and where it sits).
     """
 
     mix: Mix = ""
@@ -39,6 +41,7 @@ class SearchHints:
     cycles: str = ""
     lattice: float = 0.0
     visits: str = ""
+    times: str = ""
 
     def __post_init__(self) -> None:
         if self.mix not in get_args(Mix):
@@ -62,7 +65,7 @@ class SearchHints:
 
 NO_HINTS = SearchHints()
 _TABLES = {"mix": "mixes", "tries": "tries", "decades": "decades", "cycles": "cycles",
-           "lattice": "lattices", "visits": "visits"}  # fmt: skip
+           "lattice": "lattices", "visits": "visits", "times": "products"}  # fmt: skip
 _LISTS = ("tries", "decades")
 
 

@@ -27,7 +27,7 @@ POSITION = Quantity(
     size=3,
     # a mass at the reference point does not tell where it sits; on either side it does, and what it
     # does is nearly linear in the place: 0.2 m are a hand's length on an arm, half a base's radius
-    hints=SearchHints(tries=(-0.2, 0.2)),
+    hints=SearchHints(tries=(-0.2, 0.2), times="mass"),
 )
 
 EFFECT = Effect("payload", "Mass fixed to a body.", ("body",), MASS, source="mechanics")

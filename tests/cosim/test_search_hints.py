@@ -17,9 +17,10 @@ def test_hints_of_parameters_survive_their_file() -> None:
         "t_th": SearchHints(decades=(0.5, 1000.0)),
         "t_d": SearchHints(lattice=1e-3, tries=(0.01,)),
         "x_p": SearchHints(visits="pose_x"),
+        "position": SearchHints(times="mass"),
     }
     tables = to_json(hints)
-    assert list(tables) == ["mixes", "tries", "decades", "cycles", "lattices", "visits"]
+    assert list(tables) == ["mixes", "tries", "decades", "cycles", "lattices", "visits", "products"]
     assert list(tables["tries"]) == ["n", "t_d"]
     found = from_json(json.loads(json.dumps({"slots": [], **tables})))
     assert found == {name: item for name, item in hints.items() if name != "plain"}
