@@ -22,6 +22,7 @@ def descent(target: np.ndarray, bound: float) -> tuple[Descent, SimpleNamespace]
         lower=np.full(3, -bound), upper=np.full(3, bound), scale=np.ones(3), nominal=np.zeros(3)
     )
     run.theta, run.drawn = np.zeros(3), np.zeros(3, dtype=bool)
+    run.products = []
     return run, SimpleNamespace(matrix=MATRIX.T @ MATRIX, gradient=MATRIX.T @ target)
 
 
