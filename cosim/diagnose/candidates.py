@@ -118,7 +118,9 @@ def candidates(problem: Problem) -> list[Candidate]:
     if not isinstance(provider, Catalogue):
         return []
     found: list[Candidate] = []
-    before: list[Candidate] = []  # after all others: where there is no difference, they are twins
+    at_givers: list[
+        Candidate
+    ] = []  # after all others: where there is no difference, they are twins
     others, kin = twins(problem), provider if isinstance(provider, Kinship) else None
     for instance, variant in problem.instances.items():
         kind = component(variant)
@@ -129,12 +131,12 @@ def candidates(problem: Problem) -> list[Candidate]:
             if twin and (kin is None or PASSED not in kin.needs(effect)):
                 continue
             special = () if kin is None else tuple(kin.contained(effect))
-            known = before if twin else found
+            known = at_givers if twin else found
             known.append(Candidate(instance, kind, effect, port, text, contains=special))
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
-    return found + before + delays(problem) + drifts(problem)
+    return found + at_givers + delays(problem) + drifts(problem)
 
 
 def delays(problem: Problem) -> list[Candidate]:

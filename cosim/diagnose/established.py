@@ -69,7 +69,7 @@ def told_from_absence(
 
     Args:
         search: fits and judges.
-        base: a simpler model, from whose parameters a fit may begin, too.
+        base: what gains on unused runs count from.
         fitted: with intervals.
         effect: of which the strength is asked.
     """

@@ -179,7 +179,8 @@ class Fitter(Judge):
         """
         problem = item.candidate.added_to(base.problem)
         _, others = new_parameters(base.problem, problem)
-        value = item.value * (item.score.amplitude or 1.0)
+        amplitude = item.score.amplitude or 1.0
+        value = item.value * amplitude
         value = float(np.clip(value, item.strength.minimum, item.strength.maximum))
         span = abs(value) or item.strength.span
         least = item.strength.minimum
@@ -203,7 +204,7 @@ class Fitter(Judge):
         along = [(1.0, value), (0.0, value), (0.0, 0.1 * value), *((1.0, v) for v in near)]
         if abs(item.score.amplitude - 1.0) > EXACT:
             # what was simulated: a steep law goes too far from there, or one that is imitated
-            along.append((item.value / value, item.value))
+            along.append((1.0 / amplitude, item.value))
         for factor, begun in along:
             theta = problem.nominal
             count = base.estimate.theta.size

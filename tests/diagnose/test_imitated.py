@@ -120,3 +120,14 @@ def test_a_fit_of_one_may_begin_along_the_tangent(plain: Problem) -> None:
     assert part[0] == pytest.approx(item.value)
     assert np.any(full[1:] != 0.0)
     np.testing.assert_allclose(part, full * (part[0] / full[0]), rtol=1e-9, atol=1e-12)
+
+
+def test_a_first_order_of_the_wrong_sign_begins_at_the_bound(plain: Problem) -> None:
+    """A drag that should be negative has no strength left to share the shift by."""
+    search = Search(simulator(plain), only=[c for c in candidates(plain) if c.label == DRAG])
+    base = search.calibrated()
+    search.note(base)
+    (item,) = search.scored(base).signatures
+    found = search.refit(base, replace(item, score=replace(item.score, amplitude=-3.0)))
+    search.close()
+    assert found is not None and found.estimate.values[item.strength.name] >= 0.0
