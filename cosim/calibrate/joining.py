@@ -27,8 +27,9 @@ from .counts import steady
 from .mapped_logs import MappedLogs
 from .model import Model
 from .named import named, readings
-from .parts import CLOCK, COINCIDENT, Channel, MeasuredRun, Parameter, check_parameters
+from .parts import CLOCK, COINCIDENT, COLUMN, Channel, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
+from .recorder import check_column, column_unit
 from .scales import known, per_second, scaled
 from .steps import steps
 
@@ -295,6 +296,8 @@ class Joined(MappedLogs):
             if name.startswith(CLOCK):
                 inputs = [target for target, _, _ in self.drivers()]
                 check_clock(name, self.columns, inputs, where)
+            elif name.startswith(COLUMN):
+                check_column(name, self.columns, where)
             wanted = self._wanted(name)
             given = factor if isinstance(entry, Mapping) else None
             way = f"state it in {wanted.symbol if wanted else ''!r}"
@@ -308,6 +311,8 @@ class Joined(MappedLogs):
         """Unit of a target, None where that is unknown."""
         if name.startswith(CLOCK):
             return clock_unit(name)
+        if name.startswith(COLUMN):
+            return column_unit(name, {c: self.units.get(of, "") for c, of in self.columns.items()})
         try:
             return self.system.variables(name)[1][0].unit
         except UnknownNameError:

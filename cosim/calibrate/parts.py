@@ -29,6 +29,10 @@ CLOCK, DRIFT = "clock:", "drift:"
 """Begins the name of a target that is no variable of the system: `clock:CHANNEL` or `clock:INPUT`,
 how late the clock of a channel, or of the column that drives an input, is [s]; and what follows
 where it is how much later it becomes in a run, per time: `clock:drift:CHANNEL`."""
+COLUMN, GAIN, BIAS = "column:", "gain:", "bias:"
+"""The same for what a recorder makes of a column: `column:gain:CHANNEL`, `column:bias:CHANNEL`."""
+LOGGED = (CLOCK, COLUMN)
+NO_ERRORS: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,8 @@ class Parameter:
     Attributes:
         name, unit, text: for people.
         nominal, minimum, maximum: start value and bounds.
-        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`, `clock:INPUT`.
+        targets: (full variable name, factor) that it sets, or `clock:CHANNEL`, `clock:INPUT`,
+            `column:gain:CHANNEL`, `column:bias:CHANNEL`.
         role: `declared` (rig sheet), `nuisance` (nobody asks for it), `effect`.
         run: name of the only run that it concerns, "" for all.
         prior: standard deviation around the nominal value that is known beforehand, None if nothing
@@ -127,16 +132,18 @@ class Channel:
     shift: float = 0.0
     by: str = ""
 
-    def of(self, sampler: Sampler, values: Vector, late: float = 0.0, drift: float = 0.0) -> Vector:
+    def of(
+        self, sampler: Sampler, values: Vector, errors: Mapping[str, float] = NO_ERRORS
+    ) -> Vector:
         """What the channel would read, of a signal that was recorded at the sampler's times.
 
         Args:
             sampler: of the run.
             values: of the signal.
-            late: how late the channel's clock is when the run begins [s].
-            drift: how much later it becomes, per time.
+            errors: of the log, see `Problem.log_errors`.
         """
-        shift = self.shift - late
+        shift = self.shift - errors.get(self.name, 0.0)
+        drift = errors.get(DRIFT + self.name, 0.0)
         if self.transform == "sample":
             result = sampler.at(shift, values, drift)
         elif self.transform == "difference":
@@ -150,7 +157,9 @@ class Channel:
             width = np.maximum(times - first, 1e-12)
             mean = np.interp(times, recorded, integral) - np.interp(first, recorded, integral)
             result = np.where(times > first, mean / width, values[0])
-        return np.asarray(self.gain * result + self.offset, dtype=np.float64)
+        gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
+        offset = self.offset + errors.get(BIAS + self.name, 0.0)
+        return np.asarray(gain * result + offset, dtype=np.float64)
 
 
 class Sampler:
@@ -253,7 +262,7 @@ class Target(NamedTuple):
     """What one parameter sets.
 
     Attributes:
-        name: full variable name, or a clock.
+        name: full variable name, or an error of the log.
         place: of the parameter.
         factor: on its value.
         least: of a value whose inverse counts; None where the value itself does.
@@ -304,16 +313,16 @@ class Assigned(NamedTuple):
     Attributes:
         run: which.
         known: full variable name -> value that no parameter changes.
-        late: the same of clocks, by channel or input, or `drift:CHANNEL`.
-        variables, clocks: what parameters set.
+        errors: the same of the log: `CHANNEL` or `INPUT` of a clock, `drift:CHANNEL`, and so on.
+        variables, log: what parameters set.
         size: how many parameters there are.
     """
 
     run: MeasuredRun
     known: Mapping[str, float]
-    late: Mapping[str, float]
+    errors: Mapping[str, float]
     variables: Targets
-    clocks: Targets
+    log: Targets
     size: int
 
     @classmethod
@@ -324,20 +333,14 @@ class Assigned(NamedTuple):
         known: Mapping[str, float],
         given: Mapping[str, float],
     ) -> Assigned:
-        """What these parameters set, over what is known of variables and given of clocks."""
+        """What these parameters set, over what is known of variables and given of the log."""
         targets = targets_of(parameters, run.name)
         return cls(
             run,
-            {name: value for name, value in known.items() if not name.startswith(CLOCK)},
-            {n.removeprefix(CLOCK): v for n, v in given.items() if n.startswith(CLOCK)},
-            Targets([t for t in targets if not t.name.startswith(CLOCK)]),
-            Targets(
-                [
-                    t._replace(name=t.name.removeprefix(CLOCK))
-                    for t in targets
-                    if t.name.startswith(CLOCK)
-                ]
-            ),
+            {name: value for name, value in known.items() if not name.startswith(LOGGED)},
+            {_bare(n): v for n, v in given.items() if n.startswith(LOGGED)},
+            Targets([t for t in targets if not t.name.startswith(LOGGED)]),
+            Targets([t._replace(name=_bare(t.name)) for t in targets if t.name.startswith(LOGGED)]),
             len(parameters),
         )
 
@@ -348,6 +351,11 @@ class Assigned(NamedTuple):
         if not targets.names:
             return {}
         return dict(zip(targets.names, targets.of(theta).tolist(), strict=True))
+
+
+def _bare(target: str) -> str:
+    """Target of the log without what says that it is one."""
+    return target.removeprefix(CLOCK).removeprefix(COLUMN)
 
 
 class Sensitivity(NamedTuple):

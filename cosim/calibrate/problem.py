@@ -26,7 +26,7 @@ from ..system.toml import SystemFile
 from .checks.finding import NO_SOURCE, Source
 from .model import Model
 from .parts import (
-    CLOCK,
+    LOGGED,
     Assigned,
     Channel,
     Coarse,
@@ -243,7 +243,7 @@ class Problem:
     @cached_property
     def _fixed(self) -> dict[str, float]:
         known = {n: v for n, v in self.constants.items() if self._has(n)}
-        if len(known) < sum(not n.startswith(CLOCK) for n in self.constants):
+        if len(known) < sum(not n.startswith(LOGGED) for n in self.constants):
             self.system()  # says which one it does not know
         return {n: v for n, v in known.items() if n not in self._coarse}
 
@@ -260,14 +260,15 @@ class Problem:
                     values[name] -= starts[name] * off
         return values
 
-    def lateness(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
-        """How late the clocks of channels are in a run [s], where that is estimated or held.
+    def log_errors(self, theta: Vector, run: MeasuredRun | str) -> dict[str, float]:
+        """What is wrong with columns of a run's log, where that is estimated or held.
 
-        What `drift:CHANNEL` is late comes on top, per time since the run's first sample.
+        By CHANNEL or INPUT how late its clock is [s]; what `drift:CHANNEL` is late comes on top,
+        per time since the run's first sample. `gain:CHANNEL` and `bias:CHANNEL`: see `recorder`.
         """
         run = self.run(run) if isinstance(run, str) else run
         assigned = self._assigned(run)
-        return {**assigned.late, **assigned.of(theta, assigned.clocks)}
+        return {**assigned.errors, **assigned.of(theta, assigned.log)}
 
     def _assigned(self, run: MeasuredRun) -> Assigned:
         """What is set in a run; made once, since thousands of simulations ask for it."""

@@ -13,23 +13,23 @@ Vector = NDArray[np.float64]
 
 
 def known(
-    run: MeasuredRun, channels: Sequence[Channel], late: Mapping[str, float], read: Vector
+    run: MeasuredRun, channels: Sequence[Channel], errors: Mapping[str, float], read: Vector
 ) -> Vector:
     """What channels would read, NaN where clocks have moved what was measured out of the run.
 
     Args:
         run: measured.
         channels: of its columns.
-        late: how late clocks are [s], by channel or input, and `drift:CHANNEL`.
+        errors: of the log, see `Problem.log_errors`.
         read: one column per channel.
     """
     times, read = run.times, read.copy()
     close = COINCIDENT * run.interval
     begin = float(times[0]) - run.lead - close
-    end = float(times[-1]) - max([0.0, *(late.get(name, 0.0) for name in run.inputs)]) + close
+    end = float(times[-1]) - max([0.0, *(errors.get(name, 0.0) for name in run.inputs)]) + close
     for index, channel in enumerate(channels):
-        wanted = times - late.get(channel.name, 0.0)
-        wanted = wanted - late.get(DRIFT + channel.name, 0.0) * (times - times[0])
+        wanted = times - errors.get(channel.name, 0.0)
+        wanted = wanted - errors.get(DRIFT + channel.name, 0.0) * (times - times[0])
         out = (wanted < begin) | (wanted > end)
         read[out & np.isfinite(run.data[:, index]), index] = np.nan
     return read

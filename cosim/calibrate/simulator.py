@@ -22,7 +22,7 @@ from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
 from .budget import Budget
-from .parts import CLOCK, COINCIDENT, DRIFT, MeasuredRun, Sampler, Vector
+from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
 from .problem import Problem
 from .reach import apart, known
@@ -130,13 +130,13 @@ class Simulator:
         """
         problem = self.problem
         run = problem.run(run) if isinstance(run, str) else run
-        late = problem.lateness(theta, run)
-        later = {name: -late[name] for name in run.inputs if late.get(name)}
+        errors = problem.log_errors(theta, run)
+        later = {name: -errors[name] for name in run.inputs if errors.get(name)}
         ran = self._ran(problem.values(theta, run), run, later)
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
-        return self._read(run, ran, late)
+        return self._read(run, ran, errors)
 
     def driven(
         self, theta: Vector, run: MeasuredRun, inputs: Sequence[Mapping[str, Signal]]
@@ -146,7 +146,7 @@ class Simulator:
         Raises:
             StepError, ValueRangeError: as of `simulate`.
         """
-        problem, late = self.problem, self.problem.lateness(theta, run)
+        problem, errors = self.problem, self.problem.log_errors(theta, run)
         session = self.session(run)
         found = []
         try:
@@ -155,33 +155,25 @@ class Simulator:
                 session.drive(given)
                 times, rows = session.run(problem.values(theta, run))
                 ran = Ran(session.names, times, rows, session.work, run.inputs)
-                found.append(self._read(run, ran, late))
+                found.append(self._read(run, ran, errors))
         finally:
             session.close()
         with self._lock:
             self.evaluations += len(found)
         return found
 
-    def _read(self, run: MeasuredRun, ran: Ran, late: Mapping[str, float]) -> Vector:
+    def _read(self, run: MeasuredRun, ran: Ran, errors: Mapping[str, float]) -> Vector:
         """What the channels read of a simulated run."""
         problem = self.problem
         place = {name: column for column, name in enumerate(ran.names)}
         sampler = self._sampler(run, ran.times)
         read = np.column_stack(
-            [
-                c.of(
-                    sampler,
-                    ran.rows[:, place[c.signal]],
-                    late.get(c.name, 0.0),
-                    late.get(DRIFT + c.name, 0.0),
-                )
-                for c in problem.channels
-            ]
+            [c.of(sampler, ran.rows[:, place[c.signal]], errors) for c in problem.channels]
         )
         for names in problem.relative:
             pose = [[c.name for c in problem.channels].index(name) for name in names]
             read[:, pose] = relative_pose(read[:, pose], run.anchor)
-        return known(run, problem.channels, late, read) if late else read
+        return known(run, problem.channels, errors, read) if errors else read
 
     def _sampler(self, run: MeasuredRun, recorded: Vector) -> Sampler:
         """What reads signals of a run: the same while it is recorded at the same times."""

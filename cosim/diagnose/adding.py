@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..calibrate.parts import CLOCK
+from ..calibrate.parts import LOGGED
 from ..calibrate.problem import Problem
 from ..installation import places
 from .models import Fitted
@@ -32,7 +32,7 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
     for parameter, value in zip(estimate.problem.parameters, estimate.theta.tolist(), strict=True):
         if parameter.role != "nuisance" and not parameter.run:
             own = parameter.set(value).items()
-            table["values"].update((n, v) for n, v in own if not n.startswith(CLOCK))
+            table["values"].update((n, v) for n, v in own if not n.startswith(LOGGED))
     return table
 
 

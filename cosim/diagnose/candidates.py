@@ -1,7 +1,7 @@
 """What could be missing: every effect of the catalogue that fits a balance of the system.
 
-Besides, fidelities of which a declared one is a limit, and clocks of the log's columns that are
-late or drift.
+Besides, fidelities of which a declared one is a limit, clocks of the log's columns that are late or
+drift, and gains and biases of columns for which the system has no sensor.
 """
 
 from __future__ import annotations
@@ -9,22 +9,29 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from ..calibrate.clocks import Shift, clocked
 from ..calibrate.parts import DRIFT, Parameter
 from ..calibrate.problem import Problem
+from ..calibrate.recorder import Reading, recorded
 from ..calibrate.refinement import Refinement
 from ..system.variants import component
 
 LOG, DELAY, SKEW = "log", "delay", "clock_skew"
-"""Where columns of the log are late, and what that is called: as the effect in the system."""
+"""Where columns of the log are wrong, and what that is called: as the effect in the system."""
 PASSED = "load"
 """Signal of a balance: the torque that passes. It is another one on either end of a bond, since the
 giver takes its own friction off before."""
 SHOWS = "Late sensor or clock of what was logged."
 FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 DRIFTS = "Clock that runs slow against that of the inputs; negative: fast."
+READS: dict[Literal["gain", "bias"], str] = {
+    "gain": "Gain error of what was logged: nothing else reads it.",
+    "bias": "Constant error of what was logged: nothing else reads it.",
+}
+SENSORS = ("signal", "point", "scale")
+"""Kinds of balances at which a sensor of the system is wrong."""
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -65,7 +72,7 @@ class Candidate:
         port: balance of the instance, or group of balances, at which it acts.
         text: one line about the effect.
         refinement: the fidelity that it stands for, None for an effect.
-        shift: the delay, or drift of a clock, of columns of the log that it stands for, None for
+        column: the delay, drift, gain or bias of columns of the log that it stands for, None for
             what is in the system.
         contains: effects that its law becomes for some values of its parameters.
     """
@@ -76,7 +83,7 @@ class Candidate:
     port: str
     text: str = ""
     refinement: Refinement | None = None
-    shift: Shift | None = None
+    column: Shift | Reading | None = None
     contains: tuple[str, ...] = field(default=(), compare=False)
 
     @property
@@ -96,8 +103,8 @@ class Candidate:
 
     @property
     def change(self) -> dict[str, str]:
-        """As of `cosim run --set`; nothing for clocks of the log's columns."""
-        if self.shift is not None:
+        """As of `cosim run --set`; nothing for columns of the log."""
+        if self.column is not None:
             return {}
         if self.refinement is not None:
             return {self.instance: self.refinement.fidelity}
@@ -105,8 +112,8 @@ class Candidate:
 
     def added_to(self, problem: Problem) -> Problem:
         """The problem on the system with this effect, which is absent at the nominal values."""
-        if self.shift is not None:
-            return self.shift.added_to(problem, self.prefix)
+        if self.column is not None:
+            return self.column.added_to(problem, self.prefix)
         if self.refinement is not None:
             return self.refinement.added_to(problem, self.instance)
         return problem.with_effects(self.change)
@@ -136,7 +143,7 @@ def candidates(problem: Problem) -> list[Candidate]:
         for entry in provider.refinements(variant):
             step = Refinement(**{**entry, "held": tuple(entry["held"].items())})
             found.append(Candidate(instance, kind, step.effect, step.port, step.text, step))
-    return found + at_givers + delays(problem) + drifts(problem)
+    return found + at_givers + delays(problem) + drifts(problem) + misread(problem)
 
 
 def delays(problem: Problem) -> list[Candidate]:
@@ -170,7 +177,7 @@ def delays(problem: Problem) -> list[Candidate]:
     return [
         Candidate(
             LOG, LOG, DELAY, place,
-            FOLLOWS if shift.inputs or place.endswith(".inputs") else SHOWS, shift=shift,
+            FOLLOWS if shift.inputs or place.endswith(".inputs") else SHOWS, column=shift,
         )
         for place, shift in (single | groups).items()
     ]  # fmt: skip
@@ -189,10 +196,36 @@ def drifts(problem: Problem) -> list[Candidate]:
     return [
         Candidate(
             LOG, LOG, SKEW, f"{giver}.outputs" if few[1:] else few[0], DRIFTS,
-            shift=Shift(channels=tuple(few), grows=True),
+            column=Shift(channels=tuple(few), grows=True),
         )
         for giver, few in gives.items()
     ]  # fmt: skip
+
+
+def misread(problem: Problem) -> list[Candidate]:
+    """Gains and biases of columns that show what no sensor of the system gives.
+
+    A sensor of the same unit in the instance may be wrong as well, for the log and for what reads
+    it. What a mapping declares is not asked again.
+    """
+    declared, system = recorded(problem.parameters), problem.system()
+    sensors = {
+        (name, str(balance["unit"]) if balance["kind"] == "signal" else "")
+        for name, member in system.members.items()
+        for balance in member.description.extra.get("balances", ())
+        if balance["kind"] in SENSORS
+    }
+    found = []
+    for channel in problem.channels:
+        name = channel.signal.partition(".")[0]
+        variable = system.variables(channel.signal)[1][0]
+        if {(name, ""), (name, variable.symbol)} & sensors or channel.by:
+            continue
+        for effect, text in READS.items():
+            if f"{effect}:{channel.name}" not in declared:
+                reading = Reading(channel.name, effect)
+                found.append(Candidate(LOG, LOG, effect, channel.name, text, column=reading))
+    return found
 
 
 def balances(problem: Problem) -> dict[tuple[str, str], str]:

@@ -154,7 +154,7 @@ def carried(problem: Problem, raw: Problem, fitted: Fitted) -> Problem:
     """
     model = problem.model
     for item in fitted.effects:
-        if item.shift is not None:
+        if item.column is not None:
             continue
         if raw.instances[item.instance] != problem.instances.get(item.instance):
             raise VariantError(

@@ -68,7 +68,7 @@ class Probe:
         """Whether all usual values of its strength are tried: a spring, whose mass oscillates, or a
         delay, beyond which signals oscillate.
         """
-        added = self.candidate.refinement or self.candidate.shift
+        added = self.candidate.refinement or self.candidate.column
         return added is not None and bool(self.strength.hints.tries)
 
     @property
@@ -194,7 +194,7 @@ def batches(candidates: Sequence[Candidate], problem: Problem) -> list[Batch]:
     known = balances(problem)
     for c in candidates:
         part = element_of(c.port)
-        if c.refinement is not None or c.shift is not None:
+        if c.refinement is not None or c.column is not None:
             result.append(Batch(None, ((c, None),)))
         elif part and (c.instance, c.effect, part[0]) in ports:
             key = (c.instance, c.effect, part[0])

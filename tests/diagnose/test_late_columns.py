@@ -119,7 +119,7 @@ def test_clocks_that_agree_are_not_named(tmp_path: Path) -> None:
 def test_a_declared_clock_is_not_named_again(tmp_path: Path) -> None:
     """As a nuisance it is the same quantity: it takes what the effect would."""
     problem = written(tmp_path, 0.2, MAPPING + CLOCK)
-    few = {c.port: c.shift for c in delays(problem)}
+    few = {c.port: c.column for c in delays(problem)}
     assert set(few) == {"base.w_l", "base.w_r", "base.inputs"}
     assert few["base.inputs"] == Shift(inputs=("base.w_l", "base.w_r"))
     base, winner = found(problem)
@@ -140,6 +140,6 @@ def test_a_delay_is_of_columns_and_needs_no_fmu(tmp_path: Path) -> None:
         assert (delay.minimum, delay.maximum, delay.nominal) == (-0.5, 0.5, 0.0)
         assert delay.name == f"{item.prefix}t_d"
     # all inputs late and all channels late: one model, so no log can tell, and both are named
-    shifts = {c.port: c.shift for c in few}
+    shifts = {c.port: c.column for c in few}
     assert shifts["base.inputs"] == shifts["base.outputs"] != shifts["base.w_l"]
     assert isinstance(few[0], Candidate) and few[0].effect == "delay"
