@@ -42,6 +42,9 @@ as it is wanted, has less of a jump in it than two short ones."""
 CALMER, SHORTER = 0.5, 0.1
 """Square of what a step changes on one side over that on the other, from which only the other has
 met a limit, and the factor on steps that have met one on both sides."""
+AGREED = 0.1
+"""Share of the square of a change on which both sides may differ where it is no jump: two jumps
+have as much in common as not."""
 NOTHING = 1e-12
 """Share of the largest information on a run's own parameters that rounding leaves of none."""
 
@@ -57,6 +60,7 @@ class _Directions:
         lengths: of the steps [spans].
         slopes, bends: derivatives along them and half the difference of both sides, over the noise.
         changes: squares of what the steps changed, NaN where none could be simulated.
+        bent: squares of what both sides do not agree on, infinite where there was one side only.
     """
 
     run: MeasuredRun
@@ -67,6 +71,7 @@ class _Directions:
     slopes: Vector
     bends: Vector
     changes: Vector
+    bent: Vector
 
 
 def felt(
@@ -74,7 +79,8 @@ def felt(
 ) -> list[Sensitivity]:
     """Derivatives of some runs along main directions, given back along the parameters.
 
-    What changes these runs, over the longest step, by no more than jumps do changes nothing.
+    What changes these runs, over the longest step, by no more than jumps do changes nothing, unless
+    both sides agree.
     Parameters with a lattice keep the derivatives that they have.
 
     Args:
@@ -91,9 +97,12 @@ def felt(
     count = sum(int(np.isfinite(d.run.data).sum()) for d in found.values())
     silent = np.zeros(min(shared, default=0), dtype=bool)
     if shared:
-        each = [d.changes[:size] for d, size in zip(found.values(), shared, strict=True)]
         longest = next(iter(found.values())).lengths[: silent.size] >= LONGEST
-        silent = longest & (np.nansum(each, axis=0) <= STUCK**2 * count)
+        changes, bent = (
+            np.nansum([of[:size] for of, size in zip(each, shared, strict=True)], axis=0)
+            for each in zip(*((d.changes, d.bent) for d in found.values()), strict=True)
+        )
+        silent = longest & (changes <= STUCK**2 * count) & ~(bent <= AGREED * changes)
     return [
         _by_parameter(problem, item, found[item.run], silent) if item.run in found else item
         for item in items
@@ -139,6 +148,7 @@ def _directions(
             _Directions(
                 run, columns, own, matrix, np.concatenate([lengths, inner_lengths]),
                 np.zeros(shape), np.zeros(shape), np.full(matrix.shape[1], np.nan),
+                np.full(matrix.shape[1], np.inf),
             )
         )  # fmt: skip
     return found
@@ -193,6 +203,7 @@ def _differences(simulator: Simulator, theta: Vector, it: _Directions) -> None:
         it.slopes[:, :, k] = slope
         if sides[1:]:
             it.bends[:, :, k] = 0.5 * (sides[1][1] / sides[1][0] - sides[0][1] / sides[0][0])
+            it.bent[k] = float(np.nansum((length * it.bends[:, :, k]) ** 2))
         it.changes[k] = float(np.nansum((length * slope) ** 2))
     it.slopes, it.bends = run.white(it.slopes), run.white(it.bends)
 

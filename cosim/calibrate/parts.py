@@ -23,6 +23,9 @@ PURPOSE = "identification"
 COINCIDENT = 1e-3
 """Fraction of a sample interval within which sample times and recorded times are the same (logs
 keep times rounded, often to 32 bits)."""
+ROOM, ROOM_OF_STRENGTHS = 100.0, 1e4
+"""Bounds of what an effect has brought, over its start value, where its FMU says none. Strengths
+start at those of a motor's shaft: behind a gear of a hundred, what damps is its square larger."""
 SHIFTS = 32
 """Shifts whose places are kept; channels have two or three."""
 CLOCK, DRIFT = "clock:", "drift:"
@@ -389,8 +392,9 @@ def free_parameter(
     """
     start = float(variable.start[0] or 0.0) if variable.start else 0.0
     span = abs(start) or variable.nominal or 1.0
-    low = -100.0 * span if variable.minimum is None else variable.minimum
-    high = 100.0 * span if variable.maximum is None else variable.maximum
+    room = (ROOM_OF_STRENGTHS if strength else ROOM) * span
+    low = -room if variable.minimum is None else variable.minimum
+    high = room if variable.maximum is None else variable.maximum
     return Parameter(
         name, variable.symbol, 0.0 if strength else start, low, high, ((target, 1.0),), "effect",
         strength=strength, span=span, text=variable.text, hints=hints,

@@ -77,16 +77,21 @@ def test_what_the_data_tell_stays_told() -> None:
 
 
 def jumping(
-    short: Problem, monkeypatch: pytest.MonkeyPatch, jumps: float, limit: float = np.inf
+    short: Problem,
+    monkeypatch: pytest.MonkeyPatch,
+    jumps: float,
+    limit: float = np.inf,
+    little: float = 0.0,
 ) -> list[Vector]:
     """Information on two directions of two parameters: by the Jacobian, and by steps felt alike.
 
-    The model is linear and the parameters act together: nothing changes along one direction.
+    The model is linear and the parameters act together: hardly anything changes along one direction.
 
     Args:
         short, monkeypatch: of the test.
         jumps: RMS over the noise of what each change of parameters changes besides.
         limit: sum of the parameters' changes [spans] from which twice the noise is added.
+        little: RMS over the noise of what a span of their difference changes.
     """
     run = short.chosen("identification")[0]
     theta = short.nominal
@@ -95,11 +100,14 @@ def jumping(
     shape = np.random.default_rng(1).standard_normal(run.data.shape)
     shape[::2] = 0.0  # there it only jumps: what turns directions is not what this is about
     random = np.random.default_rng(2)
+    faint = np.where(shape == 0.0, 0.0, random.standard_normal(shape.shape))
 
     def simulate(self: Simulator, values: Vector, run: object) -> Vector:
-        away = float(np.sum((values[columns] - theta[columns]) / span))
+        moved = (values[columns] - theta[columns]) / span
+        away, other = float(np.sum(moved)), float(moved[0] - moved[1])
         scatter = random.standard_normal(shape.shape) * (shape == 0.0) * np.any(values != theta)
-        return (shape * (20.0 * away + 2.0 * (away > limit)) + jumps * scatter) * short.sigma
+        steep = shape * (20.0 * away + 2.0 * (away > limit)) + little * faint * other
+        return (steep + jumps * scatter) * short.sigma
 
     monkeypatch.setattr(Simulator, "simulate", simulate)
     found = jacobian(simulator(short), theta, [run.name], columns=columns, relative=1e-2)[0]
@@ -130,6 +138,22 @@ def test_what_little_is_told_beside_no_jumps_stays_told(
     by_span, _, twice = jumping(short, monkeypatch, 0.2)
     # 0.2 of noise over 0.1 spans is beyond what sticking leaves: it counts, a hundredth of before
     assert 0.0 < twice[0] < 0.02 * by_span[0]
+
+
+def test_what_both_sides_agree_on_is_told_however_little_it_is(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over the longest step it changes less than jumps do, and there are none."""
+    little = 0.2  # 0.02 of the noise over a tenth of a span: STUCK is 0.05
+    for told in jumping(short, monkeypatch, 0.0, little=little):
+        # in proportion to the steep direction; 5 %: by chance one shape is a little larger
+        assert told[0] == pytest.approx((little / 20.0) ** 2, rel=0.05)
+
+
+def test_what_jumps_hide_is_not_told(short: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The twin: as little, beside jumps that are larger."""
+    _, once, twice = jumping(short, monkeypatch, 0.04, little=0.2)
+    assert (once[0], twice[0]) == pytest.approx((0.0, 0.0), abs=1e-12)
 
 
 def test_without_jumps_steps_felt_alike_change_nothing(
