@@ -16,6 +16,9 @@ from cosim.errors import StepError
 from tests.diagnose import built
 from tests.diagnose.built import ANCHOR, SEARCH_STEP, WEIGHT, Rig
 
+SHARE = 0.9
+"""Of the best model's gain, which a drag that holds the disc fast does not reach."""
+
 
 @pytest.fixture
 def hanging(tmp_path: Path) -> Iterator[Rig]:
@@ -76,7 +79,7 @@ def test_a_model_that_the_rigs_exchange_cannot_follow_is_judged_with_the_searchs
     assert hanging.said == ["the load failed; it is judged with the search's exchange"]
 
 
-@pytest.mark.parametrize("least", [table.RIVALS, 0.0])
+@pytest.mark.parametrize("least", [SHARE, 0.0])
 def test_models_far_from_the_best_are_not_simulated_again_for_the_table(
     hanging: Rig, asked: list[float], monkeypatch: pytest.MonkeyPatch, least: float
 ) -> None:
@@ -87,7 +90,7 @@ def test_models_far_from_the_best_are_not_simulated_again_for_the_table(
     for model in (hanging.base, good, poor):
         search.note(model)
     assert hanging.base.fit.size and good.fit.size
-    assert search.total(hanging.base, poor) < 0.5 * search.total(hanging.base, good)
+    assert search.total(hanging.base, poor) < SHARE * search.total(hanging.base, good)
     del asked[:]
     found = table_of(search, [], {}, {})
     assert (min(asked) == SEARCH_STEP) is (least > 0.0)
