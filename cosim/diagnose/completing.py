@@ -1,14 +1,45 @@
-"""Rivals of a winner that leaves far more than noise, with the parameters that their laws lack."""
+"""Quick fits that hold what a law has, of which first orders say little, with that free."""
 
 from __future__ import annotations
 
-from .fitter import Fitter
-from .models import Fitted, is_open
+from .fitter import BRINGS, Fitter
+from .judge import OFF
+from .models import GATE, Fitted, is_open
 from .rounds import Round
 
 COMPLETED = 2
-"""Rivals that are completed at most, the best: each costs a fit with more parameters than a quick
+"""Laws that are completed at most, the best: each costs a fit with more parameters than a quick
 one, and which of many laws comes next is left to the next round."""
+TURNS = 4
+"""Times at most that one is fitted so: with derivatives of the one before, and with its own."""
+
+
+def freed(fitter: Fitter, stage: Round, fitted: Fitted) -> Fitted:
+    """A law that was tried at a few places, fitted with its place free where the model is far off.
+
+    There first orders do not lead to the right one, so that its quick fit says nothing of the law:
+    a slippery patch beside where it lies does worse than a slope.
+
+    Args:
+        fitter: fits and judges.
+        stage: the round, with the laws that were fitted before.
+        fitted: a quick fit; the better one among those that hold as much come first.
+    """
+    before = sum(f.signature is not None and f.signature.placed for f in stage.fitted)
+    placed = fitted.signature is not None and fitted.signature.placed
+    if not placed or before >= COMPLETED or not fitter.typical(stage.base) > OFF:
+        return fitted
+    for _ in range(TURNS):
+        found = fitter.refined(stage.base, fitted, quick=True)
+        if found is fitted:
+            break
+        found = fitter.sharpened(found, stage.base, draft=True)
+        least = max(BRINGS * (found.estimate.robust - 0.5 * found.estimate.count), GATE)
+        going = fitter.gain(fitted, found) > least
+        fitted = found
+        if not going:
+            break
+    return fitted
 
 
 def completed(fitter: Fitter, base: Fitted, stage: Round) -> None:

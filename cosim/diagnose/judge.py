@@ -25,6 +25,10 @@ FAR = 4.0
 made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
 ALIKE = 1e-5
 """Share of what they explain by which models may differ that are one to first order."""
+OFF = 400.0
+"""Mean square over the noise's of a channel's typical windows beyond which first orders say little,
+and all residuals count in full: by their logarithm, fits end far from their minima, and beside that
+much, moments at which casters turn over are small."""
 EXPLAINED, CONCENTRATED = 0.98, 0.9
 """Share of what a model leaves beyond noise from which a candidate explains nearly all of it; the
 second where much counts by its logarithm (`loss.Windowed`)."""

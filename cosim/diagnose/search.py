@@ -20,10 +20,11 @@ from ..errors import UnbuiltError, UnknownNameError, listing
 from ..system.provider import expected, locate
 from ..system.variants import apply
 from .candidates import Candidate, candidates
-from .completing import completed
+from .completing import completed, freed
 from .established import needed, settle
 from .fitter import ITERATIONS, Say
 from .grounding import grounded
+from .judge import OFF
 from .late_values import LateValueFitter
 from .linear import SampleStack, holm
 from .models import GATE, Fitted, compare, is_open, more_general
@@ -41,10 +42,6 @@ REFINED, CLOSE, LOOSE = 3, 0.95, 0.8
 """So many quick fits are made thorough, if they gain this share of what the best one gains; the
 second share counts where the model before was far off, and for what derivatives must promise beside
 a law that explains nearly all."""
-OFF = 400.0
-"""Mean square over the noise's of a channel's typical windows beyond which all residuals count in
-full: by their logarithm, fits end far from their minima, and beside that much, moments at which
-casters turn over are small."""
 SIMPLER = 1
 """Simpler laws at the best one's place that are fitted as far where much more is missing."""
 UNWANTED, SLIGHT = 2, 0.1
@@ -450,6 +447,7 @@ class Search(LateValueFitter):
         base, fitted = current.base, self.refit(start, item, again=again, goal=goal)
         if fitted is None:
             return
+        fitted = freed(self, current, fitted)
         fitted.p_value = current.corrected[item.candidate.label]
         fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
         current.fitted.append(fitted)

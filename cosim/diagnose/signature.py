@@ -75,8 +75,9 @@ class Signature:
 
     @property
     def placed(self) -> bool:
-        """Whether it stands at one of a few values that were tried, along one axis of a place."""
-        return any(p.name in self.fixed for p in self.probe.others if p.hints.tries)
+        """Whether it stands at one of a few places that were tried."""
+        others = (p for p in self.probe.others if p.hints.tries or p.hints.visits)
+        return any(p.name in self.fixed for p in others)
 
     @property
     def strength(self) -> Parameter:

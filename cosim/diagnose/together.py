@@ -25,9 +25,10 @@ from .directions import Direction, Responses
 from .evidence import ALIKE, Chosen, Evidence
 from .fitter import AGAIN, BRINGS, QUICKLY
 from .following import follow
+from .judge import OFF
 from .localise import Place
 from .models import GATE, Fitted, compare
-from .search import OFF, Search
+from .search import Search
 from .secant import patience
 from .signature import unscored
 

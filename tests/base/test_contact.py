@@ -155,9 +155,18 @@ def test_forces_turn_with_the_direction_of_rolling(variant: str, values: dict[st
 def test_low_friction_patch_acts_where_it_lies() -> None:
     wheel = oracle_of("wheel_contact/stick_slip+low_friction_patch")
     base = {"v_y": 0.5, "low_friction_patch.reduction": 0.8, "low_friction_patch.x_p": 1.0}
-    away = wheel.outputs({**base, "x_w": 3.0})["f_y"]
-    inside = wheel.outputs({**base, "x_w": 1.0})["f_y"]
-    assert inside / away == pytest.approx(0.2, rel=1e-12)  # exp(-(2/0.3)^4) is 0
+
+    def share(x: float, **shape: float) -> float:
+        values = {**base, **{f"low_friction_patch.{n}": v for n, v in shape.items()}}
+        away = wheel.outputs({**values, "x_w": 3.0})["f_y"]
+        return wheel.outputs({**values, "x_w": x})["f_y"] / away
+
+    # the edge's tanh is one but for 2 exp(-2 radius/edge) in the middle, and far outside
+    assert share(1.0, radius=0.3, edge=0.03) == pytest.approx(0.2, rel=1e-7)
+    assert share(1.3, radius=0.3, edge=0.03) == pytest.approx(0.6, rel=1e-7)
+    # over 2.2 widths from a tenth to nine tenths
+    assert share(1.3 - 0.033, radius=0.3, edge=0.03) == pytest.approx(1.0 - 0.8 * 0.9, abs=2e-3)
+    assert share(1.3 + 0.033, radius=0.3, edge=0.03) == pytest.approx(1.0 - 0.8 * 0.1, abs=2e-3)
 
 
 def test_eccentric_wheel_lifts_and_falls_with_its_angle() -> None:

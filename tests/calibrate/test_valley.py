@@ -85,7 +85,7 @@ def jumping(
 ) -> list[Vector]:
     """Information on two directions of two parameters: by the Jacobian, and by steps felt alike.
 
-    The model is linear and the parameters act together: hardly anything changes along one direction.
+    The model is linear and the parameters act together: hardly anything changes when they differ.
 
     Args:
         short, monkeypatch: of the test.

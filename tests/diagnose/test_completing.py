@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 
 from cosim.diagnose.candidates import candidates
-from cosim.diagnose.completing import COMPLETED, completed
+from cosim.diagnose.completing import COMPLETED, completed, freed
+from cosim.diagnose.judge import OFF
 from cosim.diagnose.late_values import LateValueFitter
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import nearly
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.search import CHECK
+from cosim.spec.hints import SearchHints
 from tests.diagnose import built, disc, plants
 from tests.problems import simulator
 
@@ -137,3 +139,40 @@ def test_one_that_still_leaves_more_keeps_all_its_parameters(tmp_path: Path) -> 
         assert found.winner is not None and found.winner in found.fitted
         values = found.winner.estimate.values
         assert values["load.flange.hose_spring.theta_0"] == pytest.approx(REST, rel=0.1)
+
+
+def at_a_place(rig: built.Rig) -> tuple[Round, Fitted]:
+    """A round, and a quick fit of a hose that was tried hanging free at two angles."""
+    rival = rig.added(rig.base, "hose_spring", {"k": 0.1}, fit=False)
+    item = rival.signature
+    assert item is not None
+    tried = SearchHints(tries=(0.0, 1.0))
+    others = tuple(replace(p, hints=tried) for p in item.probe.others)
+    rest = {f"{item.candidate.prefix}theta_0": 0.0}
+    rival.signature = replace(item, probe=replace(item.probe, others=others), fixed=rest)
+    assert rival.signature.placed
+    return Round(rig.base, [], {}), rival
+
+
+def test_far_off_a_law_that_was_tried_at_a_few_places_is_fitted_with_its_place(
+    tmp_path: Path,
+) -> None:
+    with built.rig(tmp_path, pulled) as rig:
+        found, rival = at_a_place(rig)
+        assert rig.search.typical(rig.base) > OFF
+        values = freed(rig.search, found, rival).estimate.values
+        assert values["load.flange.hose_spring.theta_0"] == pytest.approx(REST, rel=0.01)
+
+
+def test_near_the_noise_or_without_a_place_or_after_others_a_quick_fit_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with built.rig(tmp_path, pulled) as rig:
+        found, rival = at_a_place(rig)
+        found.fitted = [rival] * COMPLETED
+        assert freed(rig.search, found, rival) is rival
+        found.fitted = []
+        drag = rig.added(rig.base, "quadratic_drag", {"c": 0.01}, fit=False)
+        assert freed(rig.search, found, drag) is drag
+        monkeypatch.setattr("cosim.diagnose.completing.OFF", rig.search.typical(rig.base) + 1.0)
+        assert freed(rig.search, found, rival) is rival

@@ -9,8 +9,9 @@ import pytest
 
 from cosim.calibrate.loss import Huber, Windowed, loss_for, typical
 from cosim.calibrate.problem import Problem
+from cosim.diagnose.judge import OFF
 from cosim.diagnose.rounds import Round
-from cosim.diagnose.search import OFF, Search
+from cosim.diagnose.search import Search
 from cosim.diagnose.values import Values
 from tests.problems import simulator
 
