@@ -5,6 +5,7 @@ from __future__ import annotations
 from .fitter import BRINGS, Fitter
 from .judge import OFF
 from .models import GATE, Fitted, is_open
+from .rivals import NEARLY
 from .rounds import Round
 
 COMPLETED = 2
@@ -29,24 +30,15 @@ def freed(fitter: Fitter, stage: Round, fitted: Fitted) -> Fitted:
     placed = fitted.signature is not None and fitted.signature.placed
     if not placed or before >= COMPLETED or not fitter.typical(stage.base) > OFF:
         return fitted
-    for _ in range(TURNS):
-        found = fitter.refined(stage.base, fitted, quick=True)
-        if found is fitted:
-            break
-        found = fitter.sharpened(found, stage.base, draft=True)
-        least = max(BRINGS * (found.estimate.robust - 0.5 * found.estimate.count), GATE)
-        going = fitter.gain(fitted, found) > least
-        fitted = found
-        if not going:
-            break
-    return fitted
+    return _whole(fitter, stage.base, fitted)
 
 
 def completed(fitter: Fitter, base: Fitted, stage: Round) -> None:
     """Fit near rivals of a round's winner with their other parameters; one may take its place.
 
-    Quick fits hold them. A law that does nearly as well as the winner without them may be the right
-    one: a cable pulls as gravity does on a slope but for where it is fixed.
+    Quick fits hold them. A law that does nearly as well as the best one without them, in all runs
+    or in those that were fitted, may be the right one: a cable pulls as gravity does on a slope but
+    for where it is fixed. Unused runs speak of the law only once nothing of it is held.
 
     Args:
         fitter: fits and judges.
@@ -55,19 +47,34 @@ def completed(fitter: Fitter, base: Fitted, stage: Round) -> None:
     """
     best = winner = stage.winner
     assert best is not None
-    near = [f for f in stage.fitted if f.effects[-1] in stage.near and _held(f, best)]
+    least = NEARLY * max(fitter.gain(base, f) for f in stage.fitted)
+    near = [
+        f for f in stage.fitted
+        if _held(f, best) and (f.effects[-1] in stage.near or fitter.gain(base, f) > least)
+    ]  # fmt: skip
     for rival in near[:COMPLETED]:
-        found = fitter.refined(base, rival, quick=True)
+        found = _whole(fitter, base, rival)
         stage.fitted = [found if f is rival else f for f in stage.fitted]
         if fitter.total(base, found) > fitter.total(base, best) and fitter.accepted(base, found):
             best = found
     if best is not winner:
         fitter.say(f"{best.effects[-1].label} does better with its other parameters")
-        better = fitter.sharpened(best, base, draft=True)
-        if is_open(better.estimate):  # a rough fit may have held what it could not tell
-            better = fitter.refined(base, better)
-        stage.fitted = [better if f is best else f for f in stage.fitted]
-        stage.winner, stage.open = better, is_open(better.estimate)
+        stage.winner, stage.open = best, is_open(best.estimate)
+
+
+def _whole(fitter: Fitter, base: Fitted, fitted: Fitted) -> Fitted:
+    """A law fitted with all its parameters, as long as a turn brings a tenth of what is left."""
+    for _ in range(TURNS):
+        found = fitter.refined(base, fitted, quick=True)
+        if found is fitted:
+            break
+        found = fitter.sharpened(found, base, draft=True)
+        beyond = found.estimate.robust - 0.5 * found.estimate.count
+        going = fitter.gain(fitted, found) > max(BRINGS * beyond, GATE)
+        fitted = found
+        if not going:
+            break
+    return fitted
 
 
 def _held(fitted: Fitted, winner: Fitted) -> bool:

@@ -341,6 +341,8 @@ class Search(LateValueFitter):
         if current.winner is None:
             return current
         if not current.open:
+            if self.lacking(current.winner):
+                completed(self, base, current)
             challenged(self, base, current)
             current.follow(self.released(current.winner, base))
             needed(self, base, current)

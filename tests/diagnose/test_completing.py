@@ -64,11 +64,23 @@ def test_a_rival_is_judged_with_the_parameters_of_its_law(
             assert found.winner is before and found.open
 
 
-def test_rivals_that_are_far_or_hold_nothing_are_left(tmp_path: Path) -> None:
+def test_one_that_only_fitted_runs_want_is_completed(tmp_path: Path) -> None:
+    """Unused runs speak of a law once nothing of it is held."""
+    with built.rig(tmp_path, pulled) as rig:
+        found = stage(rig)
+        found.near = frozenset({found.fitted[0].effects[-1]})
+        completed(rig.search, rig.base, found)
+        assert name(found.winner) == "hose_spring"
+
+
+def test_rivals_that_are_far_or_hold_nothing_are_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with built.rig(tmp_path, pulled) as rig:
         found = stage(rig)
         before, fits = found.winner, list(found.fitted)
         found.near = frozenset({before.effects[-1]}) if before is not None else frozenset()
+        monkeypatch.setattr("cosim.diagnose.completing.NEARLY", 1.01)  # not even the best
         completed(rig.search, rig.base, found)
         assert found.winner is before and found.fitted == fits
         viscous = rig.added(rig.base, "viscous", {"b": 0.1})  # all that it has is fitted
