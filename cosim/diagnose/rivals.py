@@ -35,8 +35,8 @@ Vector = NDArray[np.float64]
 NEARLY = 0.8
 """Rivals gained this share of what the best one did; their fits were rough."""
 HOPEFUL = 0.5
-"""A law that gains less than this share of what the winner does, from the winner's parameters or
-held at one of a few values, is not fitted further."""
+"""A law that gains less than this share of what the winner does, from the winner's parameters, is
+not fitted further."""
 NEAR = 0.98
 """Late values, which were estimated for the winner, are estimated again for a law that gains this
 share of what the winner does."""
@@ -55,19 +55,17 @@ fit, as the winner did."""
 def nearly(search: LateValueFitter, base: Fitted, stage: Round) -> frozenset[Candidate]:
     """Candidates whose fits gain nearly as much as the best quick one did.
 
-    Those that stand at one of a few values that were tried are held there by a quick fit: of them
-    the first order counts as well, and hopeful ones are near.
+    Of those that stand at one of a few values that were tried, the first order counts as well: a
+    quick fit holds them there.
     """
+    least = NEARLY * stage.quick
     gains = {f.effects[-1]: f.signature.score.gain for f in stage.fitted if f.signature is not None}
     promised = NEARLY * max(gains.values(), default=0.0)
-
-    def near(fitted: Fitted) -> bool:
-        placed = fitted.signature is not None and fitted.signature.placed
-        if placed and gains[fitted.effects[-1]] > promised:
-            return True
-        return search.total(base, fitted) > (HOPEFUL if placed else NEARLY) * stage.quick
-
-    return frozenset(f.effects[-1] for f in stage.fitted if near(f))
+    return frozenset(
+        f.effects[-1] for f in stage.fitted
+        if search.total(base, f) > least
+        or (f.signature is not None and f.signature.placed and gains[f.effects[-1]] > promised)
+    )  # fmt: skip
 
 
 def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -> Fitted:

@@ -121,25 +121,6 @@ def test_a_law_at_one_of_a_few_places_is_near_if_it_promised_to_be(tmp_path: Pat
         assert nearly(judge, base, stage) == frozenset({shift, load} if near else {shift})
 
 
-def test_a_law_at_one_of_a_few_places_is_near_if_it_does_more_than_half(tmp_path: Path) -> None:
-    """Its quick fit holds it there; one that holds nothing must do nearly as well."""
-    judge = LateValueFitter(simulator(plants.base_on_casters(tmp_path)), CHECK, lambda text: None)
-    base = plants.leaving(judge, 100.0)
-    known = {c.label: c for c in candidates(judge.raw)}
-    shift, load = known["load_shift at base.load"], known["payload at base.body"]
-    best = plants.fitted(judge, base, shift, 1000.0)
-    best.signature = plants.gaining(judge, shift, 1000.0)
-    place = {f"{load.prefix}position[1]": 0.2}
-    held = plants.fitted(judge, base, load, 100.0)
-    total = judge.total(base, held)
-    assert total > 0.0 and held.signature is not None
-    for share, fixed, near in ((0.6, place, True), (0.4, place, False), (0.6, {}, False)):
-        score = plants.gaining(judge, load, 100.0).score
-        held.signature = replace(held.signature, score=score, fixed=fixed)
-        stage = Round(base, [], {}, fitted=[best, held], quick=total / share)
-        assert (load in nearly(judge, base, stage)) is near
-
-
 def test_one_that_still_leaves_more_keeps_all_its_parameters(tmp_path: Path) -> None:
     def law(w: float, theta: float, t: float) -> float:
         return pulled(w, theta, t) + 0.05 * math.sin(5.0 * t)
