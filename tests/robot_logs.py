@@ -14,6 +14,20 @@ x = { source = "pose.px_mm", from = "mm", unit = "m" }
 y = { source = "pose.py_mm", from = "mm", unit = "m" }
 yaw = { source = "pose.heading_deg", from = "deg", unit = "rad", unwrap = true }
 """
+ROBOT = f"""
+system = "robot.toml"
+step = 0.01
+period = 0.01
+algorithm = "gauss_seidel"
+time = "pose.stamp_ns"
+{COLUMNS}[inputs]
+"base.w_l" = "left"
+"base.w_r" = "right"
+[channels]
+x = {{ signal = "base.x", sigma = 0.002 }}
+y = {{ signal = "base.y", sigma = 0.002 }}
+yaw = {{ signal = "base.phi", sigma = 0.004 }}
+"""
 CLOCK = """
 [[nuisance]]
 name = "clock"
@@ -24,6 +38,15 @@ max = 0.5
 targets = ["clock:x", "clock:y", "clock:yaw"]
 """
 """The camera's."""
+YAW_GAIN = """
+[[nuisance]]
+name = "error"
+unit = "1"
+nominal = 0.0
+min = -0.5
+max = 0.5
+targets = "column:gain:yaw"
+"""
 START = "".join(
     f"""
 [[nuisance]]

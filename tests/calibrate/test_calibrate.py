@@ -101,6 +101,16 @@ def test_how_a_law_is_computed_is_no_parameter(short) -> None:
     assert "motor.winding.winding_heating.t_th" in warm.names
 
 
+def test_strengths_have_room_behind_a_gear_and_other_parameters_less(short) -> None:
+    """The start is a motor shaft's; behind a gear of 101, the same fan has 101^2 of it."""
+    found = short.with_effects({"load": "+quadratic_drag+asymmetric_coulomb"})
+    known = {p.name: p for p in found.parameters if p.role == "effect"}
+    drag = known["load.quadratic_drag.c"]
+    assert drag.minimum == 0.0 and drag.maximum > 0.9 * 101**2 * drag.span  # 1e4 is a round 101^2
+    smooth = known["load.asymmetric_coulomb.w_0"]
+    assert smooth.maximum == pytest.approx(100.0 * smooth.span, rel=1e-12)  # rounding
+
+
 def test_derivatives_over_steps_that_are_felt_are_those_of_the_jacobian(short, truth) -> None:
     along = jacobian(simulator(short), truth, ["sines"], relative=1e-2)[0]
     (other,) = felt(simulator(short), truth, [along], {along.run})

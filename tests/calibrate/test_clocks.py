@@ -13,24 +13,11 @@ from cosim.calibrate.fit import fit
 from cosim.calibrate.simulator import Simulator
 from cosim.errors import UnitError, UnknownNameError, ValueRangeError
 from cosim.intake.example import FRAME, RADIUS, drive, write_csv
-from tests.robot_logs import CLOCK, COLUMNS, START, write_system
+from tests.robot_logs import CLOCK, ROBOT, START, write_system
 
 LATE = 0.11
 MAPPING = f"""
-system = "robot.toml"
-step = 0.01
-period = 0.01
-algorithm = "gauss_seidel"
-time = "pose.stamp_ns"
-relative = [["x", "y", "yaw"]]
-{COLUMNS}[inputs]
-"base.w_l" = "left"
-"base.w_r" = "right"
-[channels]
-x = {{ signal = "base.x", sigma = 0.002 }}
-y = {{ signal = "base.y", sigma = 0.002 }}
-yaw = {{ signal = "base.phi", sigma = 0.004 }}
-[[parameter]]
+relative = [["x", "y", "yaw"]]{ROBOT}[[parameter]]
 name = "r"
 unit = "m"
 nominal = {RADIUS}

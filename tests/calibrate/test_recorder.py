@@ -13,34 +13,12 @@ from cosim.calibrate.parts import Channel, Sampler
 from cosim.calibrate.simulator import Simulator
 from cosim.errors import UnitError, UnknownNameError
 from cosim.intake.example import drive, write_csv
-from tests.robot_logs import COLUMNS, START, write_system
+from tests.robot_logs import ROBOT, START, YAW_GAIN, write_system
 
-MAPPING = f"""
-system = "robot.toml"
-step = 0.01
-period = 0.01
-algorithm = "gauss_seidel"
-time = "pose.stamp_ns"
-{COLUMNS}[inputs]
-"base.w_l" = "left"
-"base.w_r" = "right"
-[channels]
-x = {{ signal = "base.x", sigma = 0.002 }}
-y = {{ signal = "base.y", sigma = 0.002 }}
-yaw = {{ signal = "base.phi", sigma = 0.004 }}
-[[run]]
+MAPPING = f"""{ROBOT}[[run]]
 name = "one"
 files = {{ cmd = "one_cmd.csv", pose = "one_pose.csv" }}
 purpose = "identification"
-"""
-ERROR = """
-[[nuisance]]
-name = "error"
-unit = "1"
-nominal = 0.0
-min = -0.5
-max = 0.5
-targets = "column:gain:yaw"
 """
 BIAS = """
 [[nuisance]]
@@ -77,7 +55,7 @@ def test_a_channel_reads_its_gain_and_bias_and_no_other_ones() -> None:
 
 
 def test_declared_gain_and_bias_are_recovered(folder: Path) -> None:
-    it = problem(folder, START + ERROR)
+    it = problem(folder, START + YAW_GAIN)
     run = it.runs[0]
     wrong = run.data.copy()
     wrong[:, 2] *= 1.04
@@ -101,7 +79,7 @@ def test_a_bias_has_the_unit_of_its_column(folder: Path) -> None:
 
 
 def test_nothing_is_simulated_again_for_another_gain(folder: Path) -> None:
-    it = problem(folder, ERROR)
+    it = problem(folder, YAW_GAIN)
     simulator = Simulator(it)
     for error in (0.0, 0.1, 0.2):
         simulator.simulate(np.array([error]), it.runs[0])
@@ -110,7 +88,7 @@ def test_nothing_is_simulated_again_for_another_gain(folder: Path) -> None:
 
 
 def test_what_is_held_still_counts(folder: Path) -> None:
-    it = problem(folder, ERROR)
+    it = problem(folder, YAW_GAIN)
     simulator, held = Simulator(it), Simulator(it.hold({"error": 0.1}))
     wanted = simulator.simulate(np.array([0.1]), it.runs[0])
     assert np.array_equal(held.simulate(np.empty(0), held.problem.runs[0]), wanted)
@@ -120,8 +98,8 @@ def test_what_is_held_still_counts(folder: Path) -> None:
 
 def test_a_column_that_is_not_measured_is_refused_with_the_nearest(folder: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"column:gain:yow.*did you mean.*column:gain:yaw"):
-        problem(folder, ERROR.replace("gain:yaw", "gain:yow"))
+        problem(folder, YAW_GAIN.replace("gain:yaw", "gain:yow"))
     with pytest.raises(UnknownNameError, match=r"column:gian:yaw.*column:gain:yaw"):
-        problem(folder, ERROR.replace("gain:yaw", "gian:yaw"))
+        problem(folder, YAW_GAIN.replace("gain:yaw", "gian:yaw"))
     with pytest.raises(UnitError, match=r"nuisance error: column:bias:yaw"):
-        problem(folder, ERROR.replace("gain:yaw", "bias:yaw").replace('"1"', '"m"'))
+        problem(folder, YAW_GAIN.replace("gain:yaw", "bias:yaw").replace('"1"', '"m"'))

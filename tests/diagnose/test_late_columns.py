@@ -15,25 +15,12 @@ from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
 from cosim.intake.example import RADIUS, drive, write_csv
 from tests.problems import simulator
-from tests.robot_logs import CLOCK, COLUMNS, START, write_system
+from tests.robot_logs import CLOCK, ROBOT, START, write_system
 
 pytestmark = pytest.mark.slow
 
 NAMES = ("one", "two", "three", "four")
-MAPPING = f"""
-system = "robot.toml"
-step = 0.01
-period = 0.01
-algorithm = "gauss_seidel"
-time = "pose.stamp_ns"
-{COLUMNS}[inputs]
-"base.w_l" = "left"
-"base.w_r" = "right"
-[channels]
-x = {{ signal = "base.x", sigma = 0.002 }}
-y = {{ signal = "base.y", sigma = 0.002 }}
-yaw = {{ signal = "base.phi", sigma = 0.004 }}
-[[parameter]]
+MAPPING = f"""{ROBOT}[[parameter]]
 name = "r"
 unit = "m"
 nominal = {RADIUS}

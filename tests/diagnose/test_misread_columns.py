@@ -15,20 +15,12 @@ from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
 from tests.diagnose.test_late_columns import MAPPING, written
 from tests.problems import simulator
+from tests.robot_logs import YAW_GAIN
 
 pytestmark = pytest.mark.slow
 
 YAW = 2
 """Column of the yaw among x, y and yaw."""
-DECLARED = """
-[[nuisance]]
-name = "error"
-unit = "1"
-nominal = 0.0
-min = -0.5
-max = 0.5
-targets = "column:gain:yaw"
-"""
 
 
 def wrong(problem: Problem, error: float, column: int = YAW) -> Problem:
@@ -77,7 +69,7 @@ def test_a_bias_that_a_run_begins_with_is_the_start_of_the_run(tmp_path: Path) -
 
 
 def test_a_declared_gain_is_not_named_again(tmp_path: Path) -> None:
-    problem = wrong(written(tmp_path, 0.0, MAPPING + DECLARED), 0.03)
+    problem = wrong(written(tmp_path, 0.0, MAPPING + YAW_GAIN), 0.03)
     few = {c.label for c in misread(problem)}
     assert "gain at log.yaw" not in few and {"bias at log.yaw", "gain at log.x"} <= few
 
