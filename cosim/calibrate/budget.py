@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
 class StoppedError(Exception):
@@ -39,9 +41,14 @@ class Budget:
         """End the work before the next simulated run."""
         self.stopped = self.stopped or why
 
-    def lift(self) -> None:
-        """End nothing any more: what is left to do is the report on what was found."""
-        self._lifted = True
+    @contextmanager
+    def lifted(self) -> Iterator[None]:
+        """End nothing meanwhile: what is done is the report on what was found."""
+        before, self._lifted = self._lifted, True
+        try:
+            yield
+        finally:
+            self._lifted = before
 
     def spend(self) -> None:
         """Count a run.

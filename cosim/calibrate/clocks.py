@@ -62,7 +62,8 @@ class Shift:
             problem: with these channels and inputs.
             prefix: of the parameter's name.
         """
-        reach = min(LONGEST, PART * min(float(run.times[-1]) for run in problem.runs))
+        shortest = min(float(run.times[-1] - run.times[0]) for run in problem.runs)
+        reach = min(LONGEST, PART * shortest)
         count = max(1, math.ceil(math.log(reach / SHORTEST) / math.log(APART)))
         sizes = [SHORTEST * (reach / SHORTEST) ** (k / count) for k in range(count + 1)]
         if self.grows:

@@ -50,6 +50,7 @@ class Problem:
         step: communication step [s].
         search: coarser way for thousands of simulations; it holds where `step` is its step.
         constants: full variable name -> value for all runs.
+        held: name of what was a parameter -> value at which it is held (`constants` have it, too).
         algorithm, options: of the master; a search may have further options.
         period: time between recorded points [s]; the sample interval if not given.
         tick: period of the rig's own fastest loop [s], which `step` divides: no finer exchange than
@@ -72,6 +73,7 @@ class Problem:
     step: float
     search: Coarse
     constants: Mapping[str, float] = field(default_factory=dict)
+    held: Mapping[str, float] = field(default_factory=dict)
     algorithm: str = "jacobi"
     options: Mapping[str, Any] = field(default_factory=dict)
     period: float | None = None
@@ -299,7 +301,10 @@ class Problem:
             else:
                 constants.update(items)
         kept = [p for p in self.parameters if p.name not in values]
-        return self.changed(parameters=kept, constants=constants, runs=list(runs.values()))
+        return self.changed(
+            parameters=kept, constants=constants, runs=list(runs.values()),
+            held={**self.held, **values},
+        )  # fmt: skip
 
     def only(self, runs: Iterable[str]) -> Problem:
         """The problem with some of its runs."""

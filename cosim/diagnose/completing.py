@@ -80,5 +80,5 @@ def _whole(fitter: Fitter, base: Fitted, fitted: Fitted) -> Fitted:
 def _held(fitted: Fitted, winner: Fitted) -> bool:
     """Whether another law than the winner's has parameters that are held."""
     last = fitted.effects[-1]
-    held = any(name.startswith(last.prefix) for name in fitted.problem.constants)
+    held = any(name.startswith(last.prefix) for name in fitted.problem.held)
     return last != winner.effects[-1] and held

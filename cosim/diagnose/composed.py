@@ -23,15 +23,15 @@ def composed(declared: Problem, fitted: Fitted, effects: Sequence[Candidate]) ->
     mine = fitted.problem
     kept = {p.name: p for p in mine.parameters}
     problem = mine.changed(
-        model=declared.model, constants=declared.constants,
+        model=declared.model, constants=declared.constants, held=declared.held,
         parameters=[p for p in mine.parameters if p.role != "effect"],
     )  # fmt: skip
     for effect in effects:
         problem = effect.added_to(problem)
-    held = {
-        name: mine.constants.get(name, value)
-        for p in problem.parameters if p.name not in kept
-        for name, value in p.set(p.nominal).items()
-    }  # fmt: skip
-    parameters = [kept[p.name] for p in problem.parameters if p.name in kept]
-    return problem.changed(parameters=parameters, constants={**problem.constants, **held})
+    problem = problem.hold(
+        {
+            p.name: mine.held.get(p.name, p.nominal)
+            for p in problem.parameters if p.name not in kept
+        }
+    )  # fmt: skip
+    return problem.with_parameters([kept[name] for name in problem.names])

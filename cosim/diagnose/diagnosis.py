@@ -137,7 +137,7 @@ def _diagnosed(
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, task)
-            further, notes = looked(problem, calibrated, simulator.workers)
+            further, notes = looked(problem, calibrated, simulator)
             whole, why = (None, "") if task.asked else _shown(further, problem, "before", task.say)
             named: set[str] = set()
             result = None
@@ -174,7 +174,8 @@ def _smaller(
     """What one system says, judged in larger ones."""
     result = _searched(search, base, findings, task)
     result.further = further
-    _look_further(result)
+    with task.budget.lifted():
+        _look_further(result)
     return result
 
 
@@ -226,15 +227,15 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
             result.law = unnamed(search, lacking, result.located, asked, result.single)
     except StoppedError as stopped:
         why = str(stopped)
-    search.simulator.budget.lift()
-    if why:
-        _stopped(result, search, why)
-    assert result.after is not None
-    cut = result.ended and result.after is base  # runs were ended since it was fitted: it lacks
-    if not cut and not search.lacking(result.after):
-        sudden = bursts(search.fit_data - result.after.fit, search.fitting)
-        result.bursts = times(sudden, list(search.fitting.runs))
-    left_over(result)
+    with task.budget.lifted():
+        if why:
+            _stopped(result, search, why)
+        assert result.after is not None
+        cut = result.ended and result.after is base  # runs were ended since it was fitted: it lacks
+        if not cut and not search.lacking(result.after):
+            sudden = bursts(search.fit_data - result.after.fit, search.fitting)
+            result.bursts = times(sudden, list(search.fitting.runs))
+        left_over(result)
     return result
 
 
@@ -296,13 +297,15 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
         if best.labels != current.labels:
             known = search.memo.get(best.labels)
             assert known is not None
-            current = all_told(search, search.sharpened(known, declared))
+            current = all_told(search, search.recalled(known, declared))
         elif above(best) and best.labels not in forces:
             search.say("does a force at a port explain what is left?")
             ranked = [s.candidate for s in rounds[0].signatures]
             forces[best.labels] = localise(search, current, ranked, search.say)
         else:
             break
+    else:  # a force was asked last, or another set proposed
+        result.table = table_of(search, rounds, forces, ended)
     result.answer = answer = decide(result.table)
     result.after = current if answer.laws else result.before
     if answer.rivals:

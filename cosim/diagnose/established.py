@@ -226,7 +226,7 @@ def freed(search: LateValueFitter, less: Fitted, fitted: Fitted) -> Fitted:
     held = [p for p in whole.parameters if p.name not in problem.names]
     if not held:
         return less
-    values = {**problem.constants, **fitted.estimate.values}
+    values = {**problem.held, **fitted.estimate.values}
     spans = {p.name: p.span for p in problem.parameters}
     whole = whole.with_parameters(
         [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]

@@ -59,12 +59,13 @@ class Fitter(Judge):
         say: told what is done.
 
     Attributes:
+        declared: the declared problem, errors of the exchange removed once they are known.
         evaluations: simulated runs so far.
     """
 
     def __init__(self, simulator: Simulator, check: str, say: Say) -> None:
         super().__init__(simulator.problem, check)
-        self.simulator = simulator
+        self.simulator, self.declared = simulator, simulator.problem
         self.say = say
         self.evaluations = 0
         self._own: dict[str, Sensitivity] | None = None
@@ -401,7 +402,8 @@ class Fitter(Judge):
                 theta[place] = nearest * lattice
                 whole = replace(winner, estimate=replace(winner.estimate, theta=theta))
                 found = self.sharpened(whole, base)
-                winner = found if self.gain(winner, found) > -GATE else winner
+                if found is not whole and self.gain(winner, found) > -GATE:
+                    winner = found
         return winner
 
     def held(self, fitted: Fitted, name: str, value: float) -> Fitted | None:

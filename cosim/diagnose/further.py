@@ -13,10 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.budget import StoppedError
 from ..calibrate.checks.examine import check_data
 from ..calibrate.checks.finding import passed
 from ..calibrate.deferred import step_error
 from ..calibrate.nuisance import late_estimated, released, settled
+from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, ScenarioError, VariantError
@@ -119,13 +121,13 @@ class Further:
         }
 
 
-def looked(raw: Problem, base: Fitted, workers: int) -> tuple[list[Further], list[str]]:
+def looked(raw: Problem, base: Fitted, simulator: Simulator) -> tuple[list[Further], list[str]]:
     """The declared model on the runs of other systems, and why some are not judged.
 
     Args:
         raw: the system that is diagnosed, as declared.
         base: the declared model, calibrated.
-        workers: threads.
+        simulator: of that system; others work as it does, on its budget.
     """
     found, warnings = [], []
     for read in raw.further:
@@ -137,11 +139,14 @@ def looked(raw: Problem, base: Fitted, workers: int) -> tuple[list[Further], lis
                      if f.run and f.severity == "error"]  # fmt: skip
             if wrong:
                 raise ScenarioError("; ".join(map(str, wrong)))
-            item = Further(Simulator(problem, workers=workers))
+            pool = SessionPool(simulator.budget)
+            item = Further(Simulator(problem, workers=simulator.workers, pool=pool))
             item.judge("before", raw, base)
             found.append(item)
         except CosimError as error:  # they are an extra: the verdict stands without them
             warnings.append(f"further runs are not judged: {error}")
+        except StoppedError as stopped:  # what is left to do says what there is
+            warnings.append(f"further runs are not judged: stopped {stopped}")
     return found, warnings
 
 

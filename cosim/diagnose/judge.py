@@ -117,7 +117,7 @@ class Judge:
             )
             for i, p in own
         )  # fmt: skip
-        names = {n for n in (*problem.names, *problem.constants) if n.startswith(prefix)}
+        names = {n for n in (*problem.names, *problem.held) if n.startswith(prefix)}
         rest = fitted.labels - {candidate.label}
         # a model that cannot be simulated without it misses it as much as all effects together
         less = self.memo.get(frozenset() if rest in self.memo.failed else rest)

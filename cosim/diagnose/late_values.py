@@ -84,6 +84,16 @@ class LateValueFitter(Fitter):
             return self.judged(fit(simulator, theta, effort=DRAFT))
         return self.judged(fit(held, values, known=known))
 
+    def recalled(self, known: Fitted, base: Fitted) -> Fitted:
+        """A fit of the memo with derivatives again; thorough, if its model can be simulated so.
+
+        Args:
+            known: what the memo has.
+            base: what its gain counts from.
+        """
+        found = self.sharpened(known, base)
+        return self.cut(known) if found is known else found
+
     def cut(self, fitted: Fitted) -> Fitted:
         """A model judged by runs that end where they do now."""
         sizes = {run.name: run.times.size for run in self.raw.runs}
@@ -104,6 +114,7 @@ class LateValueFitter(Fitter):
         """
         before = self.fitting, self.checking
         self._measured(ended(self.raw, sizes))
+        self.declared = ended(self.declared, sizes)
         self.memo.cut(before, (self.fitting, self.checking))
         self._own = None
         found = self.cut(fitted)

@@ -175,7 +175,8 @@ def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) 
                 continue
             try:
                 less = composed(search.raw, fitted, rest)
-                trial = exchanged(search, present, unscored(item.probe), None, less, share=0.0)
+                same = replace(unscored(item.probe), second=item.second, fixed=item.fixed)
+                trial = exchanged(search, present, same, None, less, share=0.0)
                 if search.total(declared, trial) > least:
                     trial = search.approached(trial, present, fitted)
             except CosimError as error:
@@ -407,7 +408,7 @@ def exchanged(
         old, new = fitted.effects[-1].prefix, item.candidate.prefix
         mine = {n.removeprefix(old): v for n, v in fitted.estimate.values.items()}
         values |= {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
-        mine = {n.removeprefix(old): v for n, v in fitted.problem.constants.items()}
+        mine = {n.removeprefix(old): v for n, v in fitted.problem.held.items()}
         held = {n: mine[n.removeprefix(new)] for n in names if n.removeprefix(new) in mine}
     fixed = {
         p.name: item.fixed.get(p.name, held.get(p.name, p.nominal))

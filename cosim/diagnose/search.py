@@ -82,7 +82,7 @@ class Search(LateValueFitter):
         without: Iterable[str] = (),
     ) -> None:
         super().__init__(simulator, CHECK, say)
-        self.declared = problem = simulator.problem
+        problem = self.declared
         self.whole, self.narrow = only is None, False
         self.withheld = frozenset(without)
         self.known = candidates(problem) if only is None else only
@@ -239,9 +239,8 @@ class Search(LateValueFitter):
         ]
         stack = self.telling(base)
         bench = self.bench(base, stack)
-        begun = bench.begun(chosen, thorough=stack is not self.fitting)
-        failed = {t.probe.candidate.label: t.error for t in begun if t.best is None}
-        signatures = bench.followed(begun)
+        signatures = bench.followed(bench.begun(chosen, thorough=self.lacking(base)))
+        failed = dict(bench.failed)
         self.evaluations += bench.evaluations
         probes = {s.candidate: s.probe for s in signatures}
         aside: tuple[str, ...] = ()
@@ -255,6 +254,7 @@ class Search(LateValueFitter):
             )
             bench = self.bench(base, self.fitting)
             signatures = bench.continued(kept)
+            failed |= bench.failed
             self.evaluations += bench.evaluations
         # of laws that are one to first order the one with fewer parameters of its own stands first
         signatures = merge(sorted(signatures, key=lambda s: (s.tuned, len(s.probe.others))))

@@ -297,6 +297,7 @@ class Bench:
             return group
 
         self._spread(pursued, by_problem(begun))
+        self.failed = {t.probe.candidate.label: t.error for t in begun if t.best is None}
         return [t.best for t in begun if t.best is not None]
 
     def _hopeful(self, trials: Trials, least: float) -> bool:

@@ -125,8 +125,9 @@ def _marks(facts: Facts) -> tuple[dict[str, list[str]], list[tuple[str, Html]]]:
             (str(n + 1), effect["component"], label(effect["effect"], effect["place"]))
         )  # fmt: skip
     for n, rival in enumerate(facts.rivals):
-        text = join("or ", label(rival["effect"], rival["place"]))
-        entries.append((LETTERS[n % len(LETTERS)], rival["place"].partition(".")[0], text))
+        for k, law in enumerate(rival):
+            text = join("and " if k else "or ", label(law["effect"], law["place"]))
+            entries.append((LETTERS[n % len(LETTERS)], law["place"].partition(".")[0], text))
     where = likely_place(facts) if facts.verdict == "unexplained" else None
     if where is not None:
         text = join("most likely place: ", tag("code", f"{where['component']}.{where['port']}"))

@@ -64,8 +64,10 @@ def test_a_budget_ends_all_work_but_the_report() -> None:
     for _ in range(2):
         with pytest.raises(StoppedError, match="after 2 simulated runs"):
             budget.spend()
-    budget.lift()
-    budget.spend()
+    with budget.lifted():
+        budget.spend()
+    with pytest.raises(StoppedError, match="after 2 simulated runs"):  # a larger system is asked
+        budget.spend()
     assert budget.spent == 3 and budget.stopped == "after 2 simulated runs"
     endless = Budget()
     endless.spend()

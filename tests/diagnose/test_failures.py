@@ -58,6 +58,28 @@ def test_candidates_that_cannot_be_simulated_are_named(
     assert found.unasked in said
 
 
+def test_candidates_that_cannot_be_simulated_in_all_runs_are_named(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One run may choose candidates, and another be too much for them."""
+    simulated = Bench.at
+    chosen = [c for c in candidates(problem) if c.label in (DRAG, DRY)]
+    search = Search(simulator(problem), only=chosen)
+    base = search.calibrated()
+    assert search.telling(base) is not search.fitting
+
+    def at(self: Bench, changed: Problem, values: Mapping[str, float]) -> Vector:
+        if self.stack is search.fitting and any("coulomb" in name for name in values):
+            raise CosimError("run stopped at t = 2 s")
+        return simulated(self, changed, values)
+
+    monkeypatch.setattr(Bench, "at", at)
+    found = search.scored(base)
+    search.close()
+    assert found.failed == {DRY: "run stopped at t = 2 s"}
+    assert DRY not in {s.candidate.label for s in found.signatures}
+
+
 def test_a_model_that_is_unstable_around_nominal_values_ends_nothing(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:

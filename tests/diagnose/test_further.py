@@ -159,7 +159,7 @@ def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
     def broken() -> Problem:
         raise ScenarioError("warm.toml: there is no entry 'x'")
 
-    found, warnings = looked(replace_further(raw, broken), base, 1)
+    found, warnings = looked(replace_further(raw, broken), base, simulator(raw))
     assert found == []
     assert warnings == ["further runs are not judged: warm.toml: there is no entry 'x'"]
 
@@ -168,7 +168,7 @@ def test_the_verdict_stands_where_they_cannot_be_judged(raw: Problem) -> None:
         stuck = {run.name: np.where(np.isnan(run.data), np.nan, 0.5) for run in other.runs}
         return other.with_data(stuck)
 
-    found, warnings = looked(replace_further(raw, frozen), base, 1)
+    found, warnings = looked(replace_further(raw, frozen), base, simulator(raw))
     assert found == []
     assert "further runs are not judged: error: run MX1 speed:" in warnings[0]
 
@@ -177,7 +177,7 @@ def test_they_are_judged_before_and_after(raw: Problem) -> None:
     said: list[str] = []
     before: Any = model(raw)
     search: Any = SimpleNamespace(say=said.append)
-    found, warnings = looked(raw, before, 1)
+    found, warnings = looked(raw, before, simulator(raw))
     result = Diagnosis(raw, Verdict("nothing_missing"), search=search, before=before, after=before)
     result.further = found
     _look_further(result)
@@ -197,7 +197,7 @@ def test_they_are_judged_before_and_after(raw: Problem) -> None:
 def test_only_what_shows_most_in_channels_of_its_own_is_unseen(raw: Problem) -> None:
     """Channels that both systems have are what the smaller one is judged by."""
     base: Any = model(raw)
-    (item,), _ = looked(raw, base, 1)
+    (item,), _ = looked(raw, base, simulator(raw))
     smaller = raw.changed(channels=[c for c in raw.channels if c.name != "angle"])
     column = [c.name for c in raw.channels].index("angle")
     (key,) = item.residuals

@@ -12,10 +12,12 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
+from cosim.diagnose.completing import _held
 from cosim.diagnose.composed import composed
 from cosim.diagnose.models import GATE, Fitted
 from cosim.diagnose.rivals import simplified
 from cosim.diagnose.search import Search
+from cosim.installation import places
 from tests.diagnose import disc
 from tests.problems import simulator
 
@@ -81,3 +83,17 @@ def test_what_was_held_of_another_law_is_forgotten_and_of_its_own_kept(tmp_path:
     # held as a dead law, it would have come back as sharp as it was
     dead = fitted.problem.hold({"load.flange.coulomb.tau_c": 0.0})
     assert dead.constants["load.flange.coulomb.w_0"] == SHARP
+
+
+def test_what_is_held_of_a_fidelity_is_known_as_its_own() -> None:
+    """Its parameters are those of the component, whose names say nothing of the law."""
+    problem = read_problem(places.scenarios() / "motor_bench" / "data" / "MB-12")
+    (yielding,) = [c for c in candidates(problem) if c.label == "elastic at gearbox"]
+    damping, value = "gearbox.elastic.d", 0.3
+    model = yielding.added_to(problem).hold({damping: value})
+    assert model.held == {damping: value} and model.constants["gearbox.d"] == value
+    fitted: Any = SimpleNamespace(problem=model, effects=(yielding,))
+    assert _held(fitted, SimpleNamespace(effects=(None,)))  # type: ignore[arg-type]
+    again = composed(problem, fitted, [yielding])
+    assert again.held == model.held and again.constants == model.constants
+    assert composed(problem, fitted, []).held == {}

@@ -54,6 +54,16 @@ def test_what_a_technician_needs_comes_first() -> None:
     assert -1 not in places and places == sorted(places)
 
 
+def test_a_rival_of_two_laws_is_told_with_both() -> None:
+    content = table("confounded")
+    rivals = (["coulomb at load.flange", "cogging at x.shaft"], ["unbalance at load.flange",
+              "cogging at x.shaft"])  # fmt: skip
+    content["alternatives"] = [{"effects": names, "score": 0.0} for names in rivals]
+    text = Marked(str(told(Facts(content)).headline)).text
+    for effect in ("coulomb", "unbalance"):
+        assert f"{effect}, at the flange of the load and cogging, at " in text
+
+
 def test_more_that_is_missing_is_said_only_where_it_is() -> None:
     content = table("effect_found")
     said = "More is missing"

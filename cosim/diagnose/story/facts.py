@@ -123,14 +123,14 @@ class Facts:
         return list(self.table["effects"])
 
     @property
-    def rivals(self) -> list[Mapping[str, str]]:
-        """Other explanations that do as well: the last effect of each."""
-        found = {}
-        for item in self.table["alternatives"]:
-            effect, _, place = item["effects"][-1].partition(" at ")
-            text = item.get("text", effect.replace("_", " "))
-            found[effect, place] = {"effect": effect, "place": place, "text": text}
-        return list(found.values())
+    def rivals(self) -> list[list[Mapping[str, str]]]:
+        """Other explanations that do as well: the effects of each that were not found."""
+
+        def told(label: str) -> Mapping[str, str]:
+            effect, _, place = label.partition(" at ")
+            return {"effect": effect, "place": place, "text": effect.replace("_", " ")}
+
+        return [[told(label) for label in item["effects"]] for item in self.table["alternatives"]]
 
     @cached_property
     def purpose(self) -> str:

@@ -201,7 +201,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
 def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     effects = facts.effects
     first = words([named(facts, effect) for effect in effects])
-    others = [named(facts, rival) for rival in facts.rivals]
+    others = [words([named(facts, e) for e in rival], "and") for rival in facts.rivals]
     headline = join(
         "The machine has something that the model lacks, and these runs fit more than one "
         "explanation: ", first, "; or ", words(others, "or"), ".",
@@ -210,7 +210,8 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         join("Either of them would leave the same traces in these runs. A wrong one may predict "
              "other motions badly, so measure before you repair.")
     ]  # fmt: skip
-    causes = [*effects, *facts.rivals]
+    others_named = {(e["effect"], e["place"]): e for rival in facts.rivals for e in rival}
+    causes = [*effects, *others_named.values()]
     meaning += [
         join(label(e["effect"], e["place"]), ": ", _meant(e["effect"], e["text"])) for e in causes
     ]

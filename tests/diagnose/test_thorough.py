@@ -1,0 +1,78 @@
+"""What a thorough fit that cannot be made leaves behind, and fits that come back from the memo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.calibrate.simulator import Simulator
+from cosim.diagnose import fitter
+from cosim.diagnose.localise import localise
+from cosim.errors import CosimError
+from cosim.spec.hints import SearchHints
+from tests.diagnose import built
+
+LATTICE = 1.7e-3
+"""A grid [N.m] on which no fit of the friction ends by itself."""
+
+
+def rubbing(w: float, theta: float, t: float) -> float:
+    return 0.05 * math.copysign(1.0, w) + 0.02 * w * abs(w)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[built.Rig]:
+    """A disc with friction and drag that nobody has declared."""
+    with built.rig(tmp_path_factory.mktemp("disc"), rubbing) as found:
+        yield found
+
+
+@pytest.fixture
+def unstable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps finer than the search's cannot be simulated."""
+
+    def corrected(*args: object) -> Simulator:
+        raise CosimError("unstable at this step")
+
+    monkeypatch.setattr(fitter, "corrected", corrected)
+
+
+def test_a_fit_of_the_memo_comes_back_with_derivatives(rig: built.Rig, unstable: None) -> None:
+    """Without them no force at a port can be asked for."""
+    rig.added(rig.base, "coulomb", {"tau_c": 0.03})
+    (known,) = (f for f in rig.search.memo if f.effects)
+    assert known.estimate.jacobian == []
+    found = rig.search.recalled(known, rig.base)
+    assert found.labels == known.labels and len(found.estimate.jacobian) == 2
+    assert rig.search.gain(known, found) == pytest.approx(0.0, abs=0.1)  # the last steps of a fit
+    assert localise(rig.search, found, [rig.candidate("coulomb")], rig.said.append)
+
+
+def test_no_model_takes_values_of_a_grid_at_which_it_was_not_fitted(
+    rig: built.Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = rig.added(rig.base, "coulomb", {"tau_c": 0.03})
+    on_grid = [
+        replace(p, hints=SearchHints(lattice=LATTICE)) if p.name.endswith("tau_c") else p
+        for p in free.problem.parameters
+    ]
+    simulator = free.simulator.of(free.problem.with_parameters(on_grid))
+    free = replace(free, estimate=replace(free.estimate, simulator=simulator))
+    monkeypatch.setattr(fitter, "GATE", np.inf)  # any value of the grid does as well
+    assert rig.search.snapped(free, rig.base) is not free
+    monkeypatch.setattr(rig.search, "sharpened", lambda quick, base, *, draft=False: quick)
+    assert rig.search.snapped(free, rig.base) is free
+
+
+def test_runs_that_end_earlier_do_so_for_forces_too(tmp_path: Path) -> None:
+    with built.rig(tmp_path, rubbing, unstable=True) as rig:
+        model = rig.added(rig.base, "coulomb", {"tau_c": 0.03})
+        half = {run.name: run.times.size // 2 for run in rig.search.raw.runs}
+        cut = rig.search.shortened(model, half)
+        assert [run.times.size for run in rig.search.declared.runs] == list(half.values())
+        assert localise(rig.search, cut, [rig.candidate("coulomb")], rig.said.append)
