@@ -36,7 +36,7 @@ FELT = 0.3
 SHORTEST, LONGEST = 1e-4, 0.1
 """Such steps at least (below, what a solver's tolerance leaves is in the differences) and at most
 [spans]: so far, a model is still nearly linear in what it hardly depends on."""
-ROOM = 0.3
+BOTH_SIDES = 0.3
 """Share of a step that bounds must leave on both sides for both to be taken: else one side, as long
 as it is wanted, has less of a jump in it than two short ones."""
 CALMER, SHORTER = 0.5, 0.1
@@ -242,7 +242,7 @@ def _sides(way: Vector, length: float, low: Vector, high: Vector) -> tuple[float
     with np.errstate(divide="ignore", invalid="ignore"):
         above = float(np.min(np.where(way > 0, high / way, np.where(way < 0, low / way, np.inf))))
         below = float(np.min(np.where(way > 0, -low / way, np.where(way < 0, -high / way, np.inf))))
-    if min(above, below) >= ROOM * length:
+    if min(above, below) >= BOTH_SIDES * length:
         length = min(length, above, below)
         return -length, length
     if max(above, below) < SHORTEST:

@@ -90,9 +90,9 @@ class Normal:
                 self.gradient[i] -= ratio * (theta[i] - p.nominal) / p.prior
 
 
-def block_length(times: Sequence[Vector], most: float = BLOCK) -> float:
+def block_length(times: Sequence[Vector]) -> float:
     """Length of blocks for runs at these times [s], shorter where there would be too few."""
-    return min(most, sum(float(each[-1] - each[0]) for each in times) / BLOCKS)
+    return min(BLOCK, sum(float(each[-1] - each[0]) for each in times) / BLOCKS)
 
 
 def _reliable(matrix: Vector, bend: Vector) -> tuple[Vector, Vector | None]:

@@ -24,12 +24,12 @@ from .parts import BIAS, COLUMN, GAIN, Parameter
 if TYPE_CHECKING:
     from .problem import Problem
 
-MOST = 1.0
+GAIN_REACH = 1.0
 """Greatest error of a gain: beyond it a column would have the other sign, or twice what is there,
 which is no sensor's error but another column."""
-TYPICAL = 0.02
+TRIED_GAIN = 0.02
 """Error of a gain that is tried: sensors of currents and speeds are right to a few per cent."""
-FAR = 1000.0
+BIAS_REACH = 1000.0
 """Greatest bias, over the noise: where more shows, a column has another zero."""
 
 
@@ -54,11 +54,11 @@ class Reading:
         """
         if self.effect == "gain":
             name, unit, text = "error", "1", "relative error, 0 = absent"
-            most, span, target = MOST, TYPICAL, COLUMN + GAIN + self.channel
+            most, span, target = GAIN_REACH, TRIED_GAIN, COLUMN + GAIN + self.channel
         else:
             own = next(c for c in problem.channels if c.name == self.channel)
             name, unit, text = "bias", own.unit, "constant error, 0 = absent"
-            most, span, target = FAR * own.sigma, own.sigma, COLUMN + BIAS + self.channel
+            most, span, target = BIAS_REACH * own.sigma, own.sigma, COLUMN + BIAS + self.channel
         error = Parameter(
             prefix + name, unit, 0.0, -most, most, ((target, 1.0),), "effect", strength=True,
             span=span, text=text,

@@ -165,7 +165,7 @@ def needed(search: LateValueFitter, base: Fitted, stage: Round) -> None:
     if search.gain(base, less) > GATE:
         found = search.sharpened(less, base)
         found.effects, found.signature = base.effects, base.signature
-        found.gate, found.p_value = base.gate, base.p_value
+        found.gate = base.gate
         stage.base = found
 
 

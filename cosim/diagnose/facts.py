@@ -122,7 +122,6 @@ class Left:
         rms: residual over noise.
         lasting: the same without the few worst windows (`whiteness.BURST`).
         p_value: that noise alone has such slow parts.
-        run, run_rms: in which it is largest, and how large.
     """
 
     channel: str
@@ -130,8 +129,6 @@ class Left:
     rms: float
     lasting: float
     p_value: float
-    run: str
-    run_rms: float
 
 
 @dataclass(frozen=True)
@@ -139,20 +136,14 @@ class Force:
     """A free curve of an unknown force at a place, of what a model leaves in one run.
 
     Attributes:
-        component, port, element, unit: where it enters: instance, balance, element of a vector.
-        driver, run: what it is a curve of, and of which run if that is time.
+        component, port, element: where it enters: instance, balance, element of a vector.
         explained: share of the run's excess over the noise that it takes away.
-        evidence: log evidence against none [nats].
     """
 
     component: str
     port: str
     element: str
-    unit: str
-    driver: str
-    run: str
     explained: float
-    evidence: float
 
     @property
     def label(self) -> str:

@@ -121,7 +121,6 @@ class Fitter(Judge):
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""
         result.effects, result.signature = first.effects, first.signature
-        result.p_value = first.p_value
         result.gate = compare(self.check_data, base.check, result.check, self.checking)
         self.note(result)
         return result

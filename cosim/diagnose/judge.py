@@ -14,15 +14,10 @@ from .candidates import SKEW, Candidate
 from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
-from .models import GATE, Fitted, Gate, compare, more_general
+from .models import GATE, GATE_Z, Fitted, Gate, compare, is_open, more_general
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
-RIVAL_Z = 2.0
-"""Below this many standard deviations two explanations count as equal."""
-FAR = 4.0
-"""Mean square over the noise's from which a model is far off: its parameters then stand where they
-made the best of a wrong law, and a fit from their nominal values may end at a better minimum."""
 ALIKE = 1e-5
 """Share of what they explain by which models may differ that are one to first order."""
 OFF = 400.0
@@ -217,7 +212,7 @@ class Judge:
         """Whether the runs tell two models apart."""
 
         def told(gate: Gate) -> bool:
-            return abs(gate.z) > RIVAL_Z and abs(gate.gain) > GATE
+            return abs(gate.z) > GATE_Z and abs(gate.gain) > GATE
 
         # what has been simulated first
         return told(compare(self.check_data, first.check, second.check, self.checking)) or told(
@@ -230,9 +225,11 @@ class Judge:
         return self.gain(first, second) + unused, unused
 
     def far(self, base: Fitted) -> bool:
-        """Whether a model is far off the data, with parameters driven to their bounds."""
-        estimate = base.estimate
-        return 2.0 * estimate.robust > FAR * estimate.count and bool(estimate.at_bound)
+        """Whether a model lacks much, and parameters stand at their bounds to make the best of it.
+
+        A fit from their nominal values may then end at a better minimum.
+        """
+        return is_open(base.estimate) and bool(base.estimate.at_bound)
 
     def explained(self, base: Fitted, fitted: list[Fitted]) -> bool:
         """Whether one of these models explains nearly all that the base leaves beyond noise."""

@@ -121,6 +121,6 @@ class LateValueFitter(Fitter):
         if self.lacking(found):
             found = self.judged(fit(found.simulator, fitted.estimate.theta, effort=CORRECTION))
         found.effects, found.signature = fitted.effects, fitted.signature
-        found.gate, found.p_value = fitted.gate, fitted.p_value
+        found.gate = fitted.gate
         self.note(found)
         return found

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import ndtri, stdtr
 
 from ..calibrate.loss import WINDOW, concentrated, trust
-from ..calibrate.normal import BLOCK, block_length
+from ..calibrate.normal import block_length
 from ..calibrate.parts import MeasuredRun, Sensitivity
 from ..calibrate.problem import Problem
 from ..errors import CosimError
@@ -24,6 +24,8 @@ ABSORBED = 1e-3
 """A signature of whose energy less than this share is left may have no direction of its own: what
 calibration can do is known to a hundredth, from differences over steps that bend."""
 
+BAND = float(ndtri(0.975))
+"""Standard deviations of a 95 % interval."""
 MATERIAL = 0.15
 """Least RMS over noise that an effect must add to a channel of a run. It raises the residual by
 1 %: sheets do not give the noise more exactly, nor do solvers agree better, so a smaller difference
@@ -36,12 +38,10 @@ class SampleStack:
     Args:
         problem: whose channels.
         runs: in order.
-        block: length of the blocks over which residuals may be correlated [s]; shorter where that
-            leaves too few (`normal.BLOCKS`).
     """
 
-    def __init__(self, problem: Problem, runs: Sequence[MeasuredRun], block: float = BLOCK) -> None:
-        block = block_length([run.times for run in runs], block)
+    def __init__(self, problem: Problem, runs: Sequence[MeasuredRun]) -> None:
+        block = block_length([run.times for run in runs])
         self.problem, self.runs = problem, tuple(runs)
         self.names = [run.name for run in runs]
         self.good = [np.isfinite(run.data).ravel() for run in runs]

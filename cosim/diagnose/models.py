@@ -41,7 +41,6 @@ class Fitted:
         values: what it gives in all runs.
         signature: score of the effect that was added last.
         gate: gain on unused runs against the model of the round before.
-        p_value: of the score test, corrected for the number of candidates.
     """
 
     effects: tuple[Candidate, ...]
@@ -49,7 +48,6 @@ class Fitted:
     values: Values
     signature: Signature | None = None
     gate: Gate | None = None
-    p_value: float = 1.0
 
     @property
     def fit(self) -> Vector:

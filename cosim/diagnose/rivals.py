@@ -98,7 +98,6 @@ def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
-            trial.p_value = stage.corrected.get(item.candidate.label, 1.0)
             gain = search.total(present, trial)
             search.say(f"{item.candidate.label} instead: {gain:.0f} nats on all runs")
             trials.append((trial, known))
@@ -261,7 +260,6 @@ def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
             except CosimError as error:
                 search.say(f"{item.candidate.label} instead: {error}")
                 continue
-            trial.p_value = min(stage.corrected.get(item.candidate.label, 1.0), winner.p_value)
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
             if search.total(base, trial) > HOPEFUL * search.total(base, winner):
                 trial = search.refined(base, trial, quick=True, share=0.0)
@@ -454,7 +452,6 @@ def restarted(
     if not found.estimate.robust < near.estimate.robust - GATE:
         return fitted
     search.say(f"{name}: a better minimum from {near.effects[-1].label}")
-    found.p_value = fitted.p_value
     found.gate = compare(search.check_data, base.check, found.check, search.checking)
     return found
 

@@ -450,7 +450,6 @@ class Search(LateValueFitter):
         if fitted is None:
             return
         fitted = freed(self, current, fitted)
-        fitted.p_value = current.corrected[item.candidate.label]
         fitted.gate = compare(self.check_data, base.check, fitted.check, self.checking)
         current.fitted.append(fitted)
         self.note(fitted)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .judge import Judge
-from .linear import SampleStack
+from .linear import BAND
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
@@ -29,8 +29,6 @@ fitted, with the search's exchange: what that adds was a thirtieth of what the b
 where a model did worst at it (play instead of an elastic gear)."""
 FIRST_ORDERS = 3
 """Candidates without a fit that are kept as hints."""
-NORMAL = 1.96
-"""Standard deviations of a 95 % interval."""
 
 
 def table_of(
@@ -117,34 +115,16 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
     if judge.unused:
         parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
     for purpose, stack, residual in parts:
-        farthest = _farthest(stack, residual)
-        for test in whiteness_tests(residual, stack):
-            run, size = farthest[test.channel]
-            found.append(
-                Left(test.channel, purpose, test.rms, test.lasting, test.p_value, run, size)
-            )
+        found += [
+            Left(test.channel, purpose, test.rms, test.lasting, test.p_value)
+            for test in whiteness_tests(residual, stack)
+        ]
     return tuple(found)
-
-
-def _farthest(stack: SampleStack, residual: Vector) -> dict[str, tuple[str, float]]:
-    """Channel -> run in which its RMS over noise is largest, and that."""
-    found: dict[str, tuple[str, float]] = {}
-    for run, rows in zip(stack.runs, stack.by_run(residual), strict=True):
-        for channel, values in zip(stack.problem.channels, rows.T, strict=True):
-            good = values[np.isfinite(values)]
-            if good.size:
-                size = float(np.sqrt(np.mean(good**2)))
-                if size >= found.get(channel.name, ("", 0.0))[1]:
-                    found[channel.name] = run.name, size
-    return found
 
 
 def _force(place: Place) -> Force:
     best = max(place.curves, key=lambda curve: curve.explained)
-    return Force(
-        place.instance, place.port, place.element, place.unit, best.driver, best.run,
-        best.explained, place.evidence,
-    )  # fmt: skip
+    return Force(place.instance, place.port, place.element, best.explained)
 
 
 def comparable(table: Table) -> list[int]:
@@ -172,7 +152,7 @@ def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:
         if item.unseen or item.candidate.label in known or not item.score.gain > 0.0:
             continue
         p, prefix = item.strength, item.candidate.prefix
-        value, half = item.value * item.score.amplitude, NORMAL * item.score.spread
+        value, half = item.value * item.score.amplitude, BAND * item.score.spread
         half *= abs(item.value) / item.score.size
         size = Value(
             p.name.removeprefix(prefix), p.unit, value, max(value - half, p.minimum),

@@ -40,7 +40,7 @@ def law(
 
 def left(rms: float, channel: str = "speed", purpose: str = "validation") -> Left:
     """What is left of a channel; noise if it is not above it."""
-    return Left(channel, purpose, rms, rms, 0.5 if rms < 1.05 else 1e-9, "MS", rms)
+    return Left(channel, purpose, rms, rms, 0.5 if rms < 1.05 else 1e-9)
 
 
 def model(*laws: Law, rms: float = 1.0, force: float | None = None, gain: float = 0.0) -> Model:
@@ -53,7 +53,7 @@ def model(*laws: Law, rms: float = 1.0, force: float | None = None, gain: float 
         gain: log likelihood besides.
     """
     cost = 0.5 * rms**2 * COUNT - 0.5 * gain
-    unknown = Force("motor", "shaft", "", "N.m", "time", "MS", force or 0.0, 9.0)
+    unknown = Force("motor", "shaft", "", force or 0.0)
     gains = [item.missed for item in laws if item.missed is not None]
     better = Gain(
         sum(g.fitted for g in gains), sum(g.unused for g in gains), 20.0,

@@ -9,11 +9,10 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from ...errors import CosimError
 from ...files import make_folder
-from ..linear import SampleStack
+from ..linear import BAND, SampleStack
 from ..models import Fitted, compare
 from ..search import Search
 from .basis import ALONG_X, ALONG_Y
@@ -24,8 +23,6 @@ from .trial import Law, Maker
 Vector = NDArray[np.float64]
 POINTS, ACROSS = 121, (41, 25)
 """Of a curve, and of a surface along both signals."""
-BAND = float(ndtri(0.975))
-"""Standard deviations of a 95 % interval."""
 
 
 @runtime_checkable
