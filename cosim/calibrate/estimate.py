@@ -21,6 +21,9 @@ from .valley import profiled, stretch
 from .weak import WEAK, confirmed
 
 Vector = NDArray[np.float64]
+ROUNDED = 1e-6
+"""Share of the variance for white residuals below which that over blocks is rounding: blocks that
+seem to agree by chance take away a hundredth at most."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +159,12 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     spread = max(2.0 * counted / max(count - int(np.sum(~poor)), 1), 1.0)
     # a few blocks can seem to agree by chance: never below what white residuals give
     white, correlated = np.diag(inverse) * spread, np.diag(sandwich)
-    factor = np.sqrt(np.maximum(white, correlated) / np.maximum(correlated, 1e-300))
+    variance = np.maximum(white, correlated)
+    # where blocks tell nothing of a parameter its row is rounding, of any sign
+    told = correlated > ROUNDED * white
+    factor = np.sqrt(variance / np.where(told, correlated, np.inf))
     known = sandwich * np.outer(factor, factor)
+    np.fill_diagonal(known, variance)
     unknown = spread * _open(values[poor], turned[:, poor], widths(problem))
     wider = spread * np.diag(_open(values[poor], turned[:, poor], WIDER * widths(problem)))
     scaled = known + unknown
