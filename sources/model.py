@@ -263,13 +263,17 @@ class Model:
 
     # -- effects ---------------------------------------------------------------------------------
 
-    def balance(self, name: str, kind: str, *, unit: str = "", **signals: SX) -> Balance:
+    def balance(
+        self, name: str, kind: str, *, unit: str = "", sensor: bool = False, **signals: SX
+    ) -> Balance:
         """Open a balance to effects and return what the variant's effects add to it.
 
         Args:
             name: e.g. `shaft`; effects find it as `effect@shaft`.
             kind: one of `effect.KINDS`.
             unit: unit of the added effort where the kind leaves it open.
+            sensor: whether a signal is the reading of a sensor; gains and biases are asked of
+                columns that none gives.
             signals: what the effects may read; the kind says which names are obligatory.
         """
         root = self._root
@@ -292,8 +296,9 @@ class Model:
         else:
             effort = ca.SX.zeros(expressions["value"].numel())
         balance = Balance(
-            full, kind, unit or declared.effort_unit, expressions, effort, self._group(name)
-        )
+            full, kind, unit or declared.effort_unit, expressions, effort, self._group(name),
+            sensor,
+        )  # fmt: skip
         balance.lean = ca.SX.zeros(3)
         balance.first_moment = ca.SX.zeros(3)
         balance.inertia = ca.SX.zeros(3, 3)

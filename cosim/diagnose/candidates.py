@@ -30,8 +30,8 @@ READS: dict[Literal["gain", "bias"], str] = {
     "gain": "Gain error of what was logged: nothing else reads it.",
     "bias": "Constant error of what was logged: nothing else reads it.",
 }
-SENSORS = ("signal", "point", "scale")
-"""Kinds of balances at which a sensor of the system is wrong."""
+POINTS = ("point", "scale")
+"""Kinds of balances that are readings by what they are: a place that is seen, a picture's scale."""
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -213,7 +213,7 @@ def misread(problem: Problem) -> list[Candidate]:
         (name, str(balance["unit"]) if balance["kind"] == "signal" else "")
         for name, member in system.members.items()
         for balance in member.description.extra.get("balances", ())
-        if balance["kind"] in SENSORS
+        if balance.get("sensor", balance["kind"] in POINTS)
     }
     found = []
     for channel in problem.channels:

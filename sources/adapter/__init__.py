@@ -32,7 +32,7 @@ SIGN = Quantity(
 
 def pass_on(m: Model, unit: str, value: SX) -> SX:
     """The value with what effects on the signal add to it."""
-    return value + m.balance("value", "signal", unit=unit, value=value).effort
+    return value + m.balance("value", "signal", unit=unit, value=value, sensor=True).effort
 
 
 def push(

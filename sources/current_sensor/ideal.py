@@ -19,5 +19,5 @@ FIDELITY = Fidelity(level=0)
 def equations(m: Model) -> None:
     """Collect the equations."""
     u = m.inputs(qs.I)
-    current = u.i + m.balance("current", "signal", unit="A", value=u.i).effort
+    current = u.i + m.balance("current", "signal", unit="A", value=u.i, sensor=True).effort
     m.output(qs.I_MEAS, current)

@@ -139,12 +139,16 @@ def constant(m: Model, name: str, value: SX, current: SX) -> SX:
     return values + each(m, name, "N.m/A", values, "coefficient", current=current)
 
 
-def each(m: Model, name: str, unit: str, value: SX, kind: str = "signal", **others: SX) -> SX:
-    """Open a balance for a signal of all three axles and one for each; what effects add."""
-    together = m.balance(name, kind, unit=unit, value=value, **others)
+def each(m: Model, name: str, unit: str, value: SX, kind: str = "", **others: SX) -> SX:
+    """Open a balance for a sensor of all three axles and one for each; what effects add.
+
+    Another kind is no sensor.
+    """
+    sensor, kind = not kind, kind or "signal"
+    together = m.balance(name, kind, unit=unit, sensor=sensor, value=value, **others)
     single = [
         m.balance(
-            f"{name}_{i + 1}", kind, unit=unit, value=value[i],
+            f"{name}_{i + 1}", kind, unit=unit, sensor=sensor, value=value[i],
             **{key: signal[i] for key, signal in others.items()},
         ).effort
         for i in range(3)

@@ -23,12 +23,18 @@ class Servo(NamedTuple):
     speed: SX
 
 
-def effort(m: Model, name: str, kind: str, unit: str = "", **signals: SX) -> SX:
+def effort(
+    m: Model, name: str, kind: str, unit: str = "", *, sensor: bool = False, **signals: SX
+) -> SX:
     """Open a balance for all six joints and one for each; what effects add to them."""
-    together = m.balance(name, kind, unit=unit, **signals)
+    together = m.balance(name, kind, unit=unit, sensor=sensor, **signals)
     single = [
         m.balance(
-            f"{name}_{i + 1}", kind, unit=unit, **{key: value[i] for key, value in signals.items()}
+            f"{name}_{i + 1}",
+            kind,
+            unit=unit,
+            sensor=sensor,
+            **{key: value[i] for key, value in signals.items()},
         ).effort
         for i in range(6)
     ]
@@ -41,8 +47,8 @@ def read(m: Model) -> Servo:
     m.input_rate(u.q, u.qd)
     command = ca.vertcat(u.q_set, u.qd_set)
     command = command + m.balance("command", "bundle", value=command).effort
-    reading = u.q + effort(m, "encoder", "signal", "rad", value=u.q)
-    speed = u.qd + effort(m, "speed_sensor", "signal", "rad/s", value=u.qd)
+    reading = u.q + effort(m, "encoder", "signal", "rad", sensor=True, value=u.q)
+    speed = u.qd + effort(m, "speed_sensor", "signal", "rad/s", sensor=True, value=u.qd)
     m.output(qs.Q_MEASURED, reading)
     return Servo(command[:6], command[6:], reading, speed, u.q, u.qd)
 
@@ -88,7 +94,8 @@ def output_current(m: Model, current: SX) -> None:
     p = m.parameters(qs.F_SENSOR)
     x = m.states(qs.SENSED)
     m.derivative(x.sensed, 2 * math.pi * p.f_sensor * (current - x.sensed))
-    m.output(qs.I_MEASURED, x.sensed + effort(m, "current_sensor", "signal", "A", value=x.sensed))
+    error = effort(m, "current_sensor", "signal", "A", sensor=True, value=x.sensed)
+    m.output(qs.I_MEASURED, x.sensed + error)
 
 
 def gear(

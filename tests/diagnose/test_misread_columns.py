@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from cosim.diagnose.adding import made_of
 from cosim.diagnose.candidates import Candidate, misread
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.search import Search
+from cosim.installation import places
 from tests.diagnose.test_late_columns import MAPPING, written
 from tests.problems import simulator
 from tests.robot_logs import YAW_GAIN
@@ -54,6 +56,17 @@ def test_a_yaw_that_reads_too_much_is_named_with_its_error(tmp_path: Path, error
     # nothing of it is in the system: the model runs as it did
     table = made_of(problem, winner)
     assert table["variants"] == {} and not any("column:" in name for name in table["values"])
+
+
+def test_a_path_of_the_same_unit_is_no_sensor(tmp_path: Path) -> None:
+    """A base whose turn may be wrong has no gyro for that; a controller has a speed sensor."""
+    problem = written(tmp_path, 0.0)
+    turning = problem.changed(
+        channels=[replace(c, signal="base.w_z") if c.name == "yaw" else c for c in problem.channels]
+    )
+    assert {c.label for c in misread(turning)} >= {"bias at log.yaw", "gain at log.yaw"}
+    bench = read_problem(places.scenarios() / "motor_bench" / "data" / "MB-12")
+    assert {c.label for c in misread(bench)} == {"bias at log.voltage", "gain at log.voltage"}
 
 
 def test_columns_that_read_rightly_are_not_named(tmp_path: Path) -> None:
