@@ -129,7 +129,10 @@ def _print(result: Diagnosis) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
+    from ..diagnose.story.verdicts import in_words
+
+    # files are not 80 wide; what is in square brackets is said, and no markup
+    console = Console(width=None if sys.stdout.isatty() else 120, markup=False)
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
@@ -137,7 +140,9 @@ def _print(result: Diagnosis) -> None:
         if found := effect["other_places"]:
             others = " or ".join(o if " at " in o else f"at {o}" for o in found)
             text = f"    or {others}: these runs do not tell which"
-            console.print(text, soft_wrap=True, markup=False, highlight=False)
+            console.print(text, soft_wrap=True, highlight=False)
+    if result.verdict == "confounded":
+        console.print(f"  to tell them apart: {in_words(result.experiment)}", soft_wrap=True)
     for hint in result.answer.hints:
         console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
     if (law := result.to_dict()["law_from_data"]) is not None:

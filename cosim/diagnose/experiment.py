@@ -25,6 +25,10 @@ FACTORS = (1.0, -1.0, 0.3, 1.5)
 ENOUGH = 4.0
 """Distance in standard deviations at which two explanations are told apart reliably (2 for the
 decision plus 2 for its power)."""
+REPEATED, TRIED = 20, 4
+"""Times at most that a run is to be repeated (explanations then differ by 0.9 deviations in each,
+which is about what one shows), and runs whose distance is asked for, each for a fit's derivatives:
+calibration takes back most of the largest difference if one is an offset of the other."""
 
 
 def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
@@ -43,15 +47,16 @@ def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
 def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
     """The run of the library in which two fitted models differ most, and by how much per channel.
 
-    It is chosen by what they differ by as they are. The distance leaves out what calibration of the
-    first model could take back in that run without doing worse in the runs at hand.
+    It is the first of those in which they differ most, as they are, that tells them apart if it is
+    repeated `REPEATED` times or less. The distance leaves out what calibration of the first model
+    could take back in that run without doing worse in the runs at hand.
 
     Args:
         first, second: models fitted to the same runs.
 
     Returns:
         run, input_factor, distance [standard deviations], repetitions, and channels: what the
-        models differ by in each, as they are; None if no run could be simulated with both.
+        models differ by in each, as they are; None if no run would do.
     """
     found: list[tuple[float, MeasuredRun, float, SampleStack, Vector]] = []
     for run in first.problem.runs:
@@ -64,10 +69,13 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
             except (CosimError, ValueError):  # not a run for these models
                 continue
             found.append((float(np.linalg.norm(change)), changed, factor, stack, change))
-    for _, run, factor, stack, change in sorted(found, key=lambda item: -item[0]):
+    for _, run, factor, stack, change in sorted(found, key=lambda item: -item[0])[:TRIED]:
         try:
             distance = _left(first, run, stack, change)
         except CosimError:  # one that few parameter values can go through
+            continue
+        repetitions = max(math.ceil(min((ENOUGH / max(distance, 1e-9)) ** 2, 1e9)), 1)
+        if repetitions > REPEATED:
             continue
         squares = np.bincount(stack.channel, change**2, stack.channels)
         names = [c.name for c in first.problem.channels]
@@ -75,7 +83,7 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
             "run": run.name,
             "input_factor": factor,
             "distance": distance,
-            "repetitions": max(int(np.ceil((ENOUGH / max(distance, 1e-9)) ** 2)), 1),
+            "repetitions": repetitions,
             "channels": dict(zip(names, np.sqrt(squares).tolist(), strict=True)),
         }
     return None

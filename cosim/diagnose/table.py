@@ -154,9 +154,10 @@ def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:
         p, prefix = item.strength, item.candidate.prefix
         value, half = item.value * item.score.amplitude, BAND * item.score.spread
         half *= abs(item.value) / item.score.size
+        low, value, high = np.clip([value - half, value, value + half], p.minimum, p.maximum)
         size = Value(
-            p.name.removeprefix(prefix), p.unit, value, max(value - half, p.minimum),
-            min(value + half, p.maximum), p.minimum, p.maximum, True,
+            p.name.removeprefix(prefix), p.unit, float(value), float(low), float(high),
+            p.minimum, p.maximum, True,
         )  # fmt: skip
         law = Law(
             item.candidate.effect, item.candidate.instance, item.candidate.port, size.name, (size,),

@@ -66,6 +66,8 @@ def test_slow_runs_do_not_tell_two_frictions_apart_and_the_proposed_one_does(
     proposal = propose(first.winner, rival)
     assert proposal is not None and proposal["distance"] > 4.0
 
+    assert propose(first.winner, first.winner) is None  # no run tells a model from itself
+
     run = next(run for run in slow if run.name == proposal["run"])
     more = [
         varied(run, proposal["input_factor"], f"P{i}", "identification")

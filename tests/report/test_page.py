@@ -64,6 +64,14 @@ def test_a_rival_of_two_laws_is_told_with_both() -> None:
         assert f"{effect}, at the flange of the load and cogging, at " in text
 
 
+def test_where_no_run_tells_them_apart_none_is_proposed() -> None:
+    content = table("confounded")
+    said = "None of these runs, as it is, reversed, gentler or stronger, tells them apart"
+    assert said not in "".join(told(Facts(content)).steps)
+    content["proposed_experiment"] = None
+    assert said in "".join(told(Facts(content)).steps)
+
+
 def test_more_that_is_missing_is_said_only_where_it_is() -> None:
     content = table("effect_found")
     said = "More is missing"

@@ -70,6 +70,15 @@ def named(facts: Facts, effect: Mapping[str, Any]) -> Html:
     return join(inside(effect["text"]), ", ", facts.places_in_words(effect))
 
 
+def in_words(proposal: Mapping[str, Any] | None) -> str:
+    """What is to be measured."""
+    if proposal is None:
+        return "none of these runs, as it is, reversed, gentler or stronger, tells them apart"
+    factor = proposal["input_factor"]
+    how = "as it was" if factor == 1.0 else f"with its inputs times {factor:g}"
+    return f"run {proposal['run']} {how}, {proposal['repetitions']} time(s)"
+
+
 def label(effect: str, place: str) -> Html:
     """An effect with its place, as the tables name it."""
     return tag("code", f"{effect} at {place}" if place else effect)
@@ -220,14 +229,13 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     steps = []
     proposal = facts.at("proposed_experiment")
     if proposal:
-        factor = proposal["input_factor"]
-        how = "as it was" if factor == 1.0 else f"with its inputs times {factor:g}"
         steps.append(
-            join(tag("b", "Measure"), f" run {proposal['run']} {how}, "
-                 f"{proposal['repetitions']} time(s): there the explanations stay ",
+            join(tag("b", "Measure"), f" {in_words(proposal)}: there the explanations stay ",
                  facts.number("proposed_experiment", "distance"), " σ apart after calibration.")
         )  # fmt: skip
         steps.append(_again("with these runs added to the data set"))
+    else:
+        steps.append(join(in_words(None).capitalize(), ": measure what only one of them changes."))
     steps += [_check(facts, e) for e in causes]
     steps += _add(facts)
     return headline, _some(meaning), steps
