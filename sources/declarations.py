@@ -71,7 +71,7 @@ class Balance:
     Attributes:
         group: name shared with the like balances of parts that share parameters
             (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
-        sensor: whether it is the reading of a sensor.
+        sensor: output that is the reading of a sensor, if it is one that may be wrong.
         effort: what the attached effects add (scalar or vector SX; 0 without effects).
         lean: what effects add to gravity (3), body axes [m/s2]; only of kind `body`. Its wrench on
             the mass that the balance names, and on what effects add, is part of `effort`.
@@ -85,7 +85,7 @@ class Balance:
     signals: dict[str, SX]
     effort: SX
     group: str = ""
-    sensor: bool = False
+    sensor: str = ""
     lean: SX = None
     mass: SX = 0.0
     first_moment: SX = None

@@ -264,7 +264,7 @@ class Model:
     # -- effects ---------------------------------------------------------------------------------
 
     def balance(
-        self, name: str, kind: str, *, unit: str = "", sensor: bool = False, **signals: SX
+        self, name: str, kind: str, *, unit: str = "", sensor: Quantity | None = None, **signals: SX
     ) -> Balance:
         """Open a balance to effects and return what the variant's effects add to it.
 
@@ -272,8 +272,8 @@ class Model:
             name: e.g. `shaft`; effects find it as `effect@shaft`.
             kind: one of `effect.KINDS`.
             unit: unit of the added effort where the kind leaves it open.
-            sensor: whether a signal is the reading of a sensor; gains and biases are asked of
-                columns that none gives.
+            sensor: output that is a sensor's reading, where a signal is one; columns of a log that
+                show something else may have a gain and a bias of their own.
             signals: what the effects may read; the kind says which names are obligatory.
         """
         root = self._root
@@ -297,7 +297,7 @@ class Model:
             effort = ca.SX.zeros(expressions["value"].numel())
         balance = Balance(
             full, kind, unit or declared.effort_unit, expressions, effort, self._group(name),
-            sensor,
+            sensor.name if sensor else "",
         )  # fmt: skip
         balance.lean = ca.SX.zeros(3)
         balance.first_moment = ca.SX.zeros(3)

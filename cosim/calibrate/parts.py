@@ -33,6 +33,7 @@ CLOCK, DRIFT = "clock:", "drift:"
 how late the clock of a channel, or of the column that drives an input, is [s]; and what follows
 where it is how much later it becomes in a run, per time: `clock:drift:CHANNEL`."""
 COLUMN, GAIN, BIAS = "column:", "gain:", "bias:"
+WAVE, CYCLES, PHASE = "wave:", "cycles:", "phase:"
 """The same for what a recorder makes of a column: `column:gain:CHANNEL`, `column:bias:CHANNEL`."""
 LOGGED = (CLOCK, COLUMN)
 NO_ERRORS: Mapping[str, float] = {}
@@ -162,7 +163,11 @@ class Channel:
             result = np.where(times > first, mean / width, values[0])
         gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
         offset = self.offset + errors.get(BIAS + self.name, 0.0)
-        return np.asarray(gain * result + offset, dtype=np.float64)
+        reading = gain * result + offset
+        if size := errors.get(WAVE + self.name, 0.0):
+            turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
+            reading = reading + size * np.sin(turns * reading + phase)
+        return np.asarray(reading, dtype=np.float64)
 
 
 class Sampler:

@@ -1,14 +1,20 @@
-"""What a recorder makes of a column: targets `column:gain:NAME` and `column:bias:NAME`.
+"""What a recorder makes of a column: targets `column:gain:NAME`, `column:bias:NAME` and, of an
+angle, `column:wave:NAME` with `column:cycles:NAME` and `column:phase:NAME`.
 
-    column = (1 + error) reading + bias
+    reading = (1 + error) truth + bias,   column = reading + A sin(n reading + psi)
 
 Where a system takes a reading for the truth, since no sensor of it stands between, what is wrong
-with that sensor is in the log only: no loop sees it, and nothing moves otherwise.
+with that sensor is in the log only: no loop sees it, and nothing moves otherwise. An angle's
+reading is wrong once per turn where a disc or a magnet is off its centre (a compass: beside iron),
+twice where two windings of a resolver differ in size or are not square to each other.
 
 The same quantity has two roles: declared, it is a parameter of the mapping; undeclared, it is the
-effect `gain` or `bias` at a column of the log (`Reading`).
+effect `gain`, `bias` or `angle_ripple` at a column of the log (`Reading`).
 
-Source: textbook.
+Not modelled: further harmonics; two of them are two parameters of the mapping, of one column each.
+
+Source: textbook; Hanselman, Resolver signal requirements for high accuracy resolver-to-digital
+conversion, IEEE Trans. Ind. Electron. 37(6), 1990.
 """
 
 from __future__ import annotations
@@ -18,8 +24,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from ..errors import UnknownNameError, listing
+from ..spec.hints import NO_HINTS, SearchHints
 from ..spec.units import Unit, parse
-from .parts import BIAS, COLUMN, GAIN, Parameter
+from .parts import BIAS, COLUMN, CYCLES, GAIN, PHASE, WAVE, Parameter
 
 if TYPE_CHECKING:
     from .problem import Problem
@@ -31,19 +38,29 @@ TRIED_GAIN = 0.02
 """Error of a gain that is tried: sensors of currents and speeds are right to a few per cent."""
 BIAS_REACH = 1000.0
 """Greatest bias, over the noise: where more shows, a column has another zero."""
+GREATEST_WAVE, TRIED_WAVE = 1.0, 0.01
+"""Amplitude of an angle's wave at most [rad], from which the reading goes back while the shaft goes
+on, and the one that is tried: half a degree, of a disc some tenths of a millimetre off its centre.
+"""
+FEWEST, MOST_CYCLES, WINDING = 0.1, 200.0, 100.0
+"""Cycles per turn, of the slow side of a gear or of all lines that an absolute track has, and the
+phase [rad], which winds without changing anything."""
+UNITS = {GAIN: "1", CYCLES: "1", PHASE: "rad"}
+KINDS = (GAIN, BIAS, WAVE, CYCLES, PHASE)
+"""Errors of a column, and the units of those that have not their column's."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A gain's error, or a bias, of a column of the log that nobody declared.
+    """An error of a column of the log that nobody declared.
 
     Attributes:
         channel: the column.
-        effect: `gain` or `bias`, as in the system.
+        effect: `gain` or `bias`, as in the system, or `angle_ripple`.
     """
 
     channel: str
-    effect: Literal["gain", "bias"]
+    effect: Literal["gain", "bias", "angle_ripple"]
 
     def added_to(self, problem: Problem, prefix: str) -> Problem:
         """The problem with the error as a parameter, 0 at its nominal value.
@@ -52,50 +69,67 @@ class Reading:
             problem: with this channel.
             prefix: of the parameter's name.
         """
+        own = next(c for c in problem.channels if c.name == self.channel)
+
+        def free(
+            name: str, target: str, low: float, high: float, start: float = 0.0,
+            span: float = 1.0, unit: str = "1", text: str = "", hints: SearchHints = NO_HINTS,
+        ) -> Parameter:  # fmt: skip
+            targets = ((COLUMN + target + self.channel, 1.0),)
+            return Parameter(
+                prefix + name, unit, start, low, high, targets, "effect",
+                strength=target in (GAIN, BIAS, WAVE), span=span, text=text, hints=hints,
+            )  # fmt: skip
+
         if self.effect == "gain":
-            name, unit, text = "error", "1", "relative error, 0 = absent"
-            most, span, target = GAIN_REACH, TRIED_GAIN, COLUMN + GAIN + self.channel
+            added = [free("error", GAIN, -GAIN_REACH, GAIN_REACH, span=TRIED_GAIN,
+                          text="relative error, 0 = absent")]  # fmt: skip
+        elif self.effect == "bias":
+            most = BIAS_REACH * own.sigma
+            added = [free("bias", BIAS, -most, most, span=own.sigma, unit=own.unit,
+                          text="constant error, 0 = absent")]  # fmt: skip
         else:
-            own = next(c for c in problem.channels if c.name == self.channel)
-            name, unit, text = "bias", own.unit, "constant error, 0 = absent"
-            most, span, target = BIAS_REACH * own.sigma, own.sigma, COLUMN + BIAS + self.channel
-        error = Parameter(
-            prefix + name, unit, 0.0, -most, most, ((target, 1.0),), "effect", strength=True,
-            span=span, text=text,
-        )  # fmt: skip
-        return problem.with_parameters([*problem.parameters, error])
+            added = [
+                free("A", WAVE, -GREATEST_WAVE, GREATEST_WAVE, span=TRIED_WAVE, unit=own.unit,
+                     text="amplitude of the error, 0 = absent"),
+                free("n", CYCLES, FEWEST, MOST_CYCLES, start=1.0, text="cycles per turn",
+                     hints=SearchHints(cycles=own.signal)),
+                free("psi", PHASE, -WINDING, WINDING, unit="rad", text="phase at angle 0",
+                     hints=SearchHints(mix="turn")),
+            ]  # fmt: skip
+        return problem.with_parameters([*problem.parameters, *added])
 
 
 def recorded(parameters: Iterable[Parameter]) -> set[str]:
-    """`gain:CHANNEL` and `bias:CHANNEL` for what a parameter sets."""
+    """`gain:CHANNEL`, `bias:CHANNEL`, `wave:CHANNEL` for what a parameter sets."""
     return {
         n.removeprefix(COLUMN) for p in parameters for n, _ in p.targets if n.startswith(COLUMN)
     }
 
 
 def check_column(target: str, channels: Iterable[str], where: str) -> None:
-    """Refuse a gain or a bias of what is no channel.
+    """Refuse an error of what is no channel.
 
     Raises:
         UnknownNameError: with the nearest names.
     """
-    known = [kind + name for name in channels for kind in (GAIN, BIAS)]
+    known = [kind + name for name in channels for kind in KINDS]
     if target.removeprefix(COLUMN) not in known:
         raise UnknownNameError(
-            f"{where}: {target!r}: a recorder's gain and bias are those of a channel that is "
+            f"{where}: {target!r}: what a recorder makes of a column is told of a channel that is "
             f"measured; {listing([COLUMN + name for name in known], target)}"
         )
 
 
 def column_unit(target: str, columns: Mapping[str, str]) -> Unit | None:
-    """Of a gain's error, or of a bias: that of its column, None where nobody says it.
+    """Of an error of a column; of a bias and a wave its column's, None where nobody says it.
 
     Args:
-        target: `column:gain:NAME` or `column:bias:NAME`.
+        target: `column:KIND:NAME`.
         columns: unit of each channel's column that has one.
     """
-    name = target.removeprefix(COLUMN)
-    if name.startswith(GAIN):
-        return parse("1")
-    unit = columns.get(name.removeprefix(BIAS), "")
+    kind, _, name = target.removeprefix(COLUMN).partition(":")
+    if kind + ":" in UNITS:
+        return parse(UNITS[kind + ":"])
+    unit = columns.get(name, "")
     return parse(unit) if unit else None

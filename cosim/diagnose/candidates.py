@@ -26,12 +26,14 @@ giver takes its own friction off before."""
 SHOWS = "Late sensor or clock of what was logged."
 FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 DRIFTS = "Clock that runs slow against that of the inputs; negative: fast."
-READS: dict[Literal["gain", "bias"], str] = {
-    "gain": "Gain error of what was logged: nothing else reads it.",
-    "bias": "Constant error of what was logged: nothing else reads it.",
+READS: dict[Literal["gain", "bias", "angle_ripple"], tuple[str, str]] = {
+    "gain": ("gain", "Gain error of what was logged: nothing else reads it."),
+    "bias": ("bias", "Constant error of what was logged: nothing else reads it."),
+    "angle_ripple": ("wave", "Error of a logged angle that repeats with it."),
 }
+"""Errors of columns: what targets call them, and what they are."""
 POINTS = ("point", "scale")
-"""Kinds of balances that are readings by what they are: a place that is seen, a picture's scale."""
+"""Kinds of balances that are readings by what they are, of all that their component measures."""
 _ELEMENT = re.compile(r"(.+)_(\d+)")
 
 
@@ -203,28 +205,30 @@ def drifts(problem: Problem) -> list[Candidate]:
 
 
 def misread(problem: Problem) -> list[Candidate]:
-    """Gains and biases of columns that show what no sensor of the system gives.
+    """Gains and biases of columns that show what no sensor of the system gives, waves of angles.
 
-    A sensor of the same unit in the instance may be wrong as well, for the log and for what reads
-    it. What a mapping declares is not asked again.
+    Sensors of the system may be wrong themselves, for the log and for what reads them. What a
+    mapping declares is not asked again.
     """
     declared, system = recorded(problem.parameters), problem.system()
-    sensors = {
-        (name, str(balance["unit"]) if balance["kind"] == "signal" else "")
-        for name, member in system.members.items()
-        for balance in member.description.extra.get("balances", ())
-        if balance.get("sensor", balance["kind"] in POINTS)
-    }
+    given: set[str] = set()
+    for name, member in system.members.items():
+        for balance in member.description.extra.get("balances", ()):
+            if balance["kind"] in POINTS:
+                given.add(name)
+            elif "sensor" in balance:
+                given.add(f"{name}.{balance['sensor']}")
     found = []
     for channel in problem.channels:
-        name = channel.signal.partition(".")[0]
-        variable = system.variables(channel.signal)[1][0]
-        if {(name, ""), (name, variable.symbol)} & sensors or channel.by:
+        instance, shown = channel.signal.partition(".")[0], channel.signal.partition("[")[0]
+        if {instance, shown} & given or channel.by:
             continue
-        for effect, text in READS.items():
-            if f"{effect}:{channel.name}" not in declared:
-                reading = Reading(channel.name, effect)
-                found.append(Candidate(LOG, LOG, effect, channel.name, text, column=reading))
+        angle = system.variables(channel.signal)[1][0].symbol == "rad"
+        for effect, (kind, text) in READS.items():
+            if f"{kind}:{channel.name}" in declared or (effect == "angle_ripple" and not angle):
+                continue
+            reading = Reading(channel.name, effect)
+            found.append(Candidate(LOG, LOG, effect, channel.name, text, column=reading))
     return found
 
 

@@ -30,9 +30,9 @@ SIGN = Quantity(
 )
 
 
-def pass_on(m: Model, unit: str, value: SX) -> SX:
+def pass_on(m: Model, taken: Quantity, value: SX) -> SX:
     """The value with what effects on the signal add to it."""
-    return value + m.balance("value", "signal", unit=unit, value=value, sensor=True).effort
+    return value + m.balance("value", "signal", unit=taken.unit, value=value, sensor=taken).effort
 
 
 def push(
@@ -52,4 +52,4 @@ def push(
     name = "angle" if kind == "rotation" else "position"
     signals = {"velocity": speed, name: place, "load": sign * value}
     inside = m.balance("inside", kind, **signals)
-    m.output(taken, pass_on(m, effort.unit, value) + sign * inside.effort)
+    m.output(taken, pass_on(m, taken, value) + sign * inside.effort)

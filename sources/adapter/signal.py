@@ -22,4 +22,5 @@ FIDELITY = Fidelity(level=0)
 def equations(m: Model) -> None:
     """Collect the equations."""
     value = m.input(Quantity("u", UNIT, "value as it is given", start=1.0))
-    m.output(Quantity("y", UNIT, "value as it is taken"), pass_on(m, UNIT, value))
+    taken = Quantity("y", UNIT, "value as it is taken")
+    m.output(taken, pass_on(m, taken, value))

@@ -37,5 +37,5 @@ def equations(m: Model) -> None:
         m, "charge", x.Q, unit="C", period=p.window / SAMPLES, slots=SAMPLES + 2, slope=current
     )
     mean = (x.Q - past.at(p.window)) / p.window
-    mean += m.balance("current", "signal", unit="A", value=mean, sensor=True).effort
+    mean += m.balance("current", "signal", unit="A", value=mean, sensor=qs.I_MEAS).effort
     m.output(qs.I_MEAS, mean)

@@ -23,5 +23,5 @@ def equations(m: Model) -> None:
     """Collect the equations."""
     u = m.inputs(qs.I)
     current = low_pass(m, u.i)
-    current += m.balance("current", "signal", unit="A", value=current, sensor=True).effort
+    current += m.balance("current", "signal", unit="A", value=current, sensor=qs.I_MEAS).effort
     m.output(qs.I_MEAS, current)

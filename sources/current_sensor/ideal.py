@@ -19,5 +19,5 @@ FIDELITY = Fidelity(level=0)
 def equations(m: Model) -> None:
     """Collect the equations."""
     u = m.inputs(qs.I)
-    current = u.i + m.balance("current", "signal", unit="A", value=u.i, sensor=True).effort
+    current = u.i + m.balance("current", "signal", unit="A", value=u.i, sensor=qs.I_MEAS).effort
     m.output(qs.I_MEAS, current)

@@ -34,7 +34,7 @@ def equations(m: Model) -> None:
     x = m.states(qs.SET_SPEED)
     w_set = x.set_speed
 
-    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=u.w, sensor=True)
+    sensor = m.balance("speed_sensor", "signal", unit="rad/s", value=u.w)
     link = m.balance("command", "signal", unit="rad/s", value=u.w_ref)
     m.derivative(
         w_set,

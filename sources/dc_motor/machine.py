@@ -9,11 +9,12 @@ from ..model import SX, Model
 def sensors(m: Model, current: SX, speed: SX, command: SX) -> tuple[SX, SX, SX]:
     """What the loops see of current, speed and command, with the effects on these signals."""
     sensed_current = (
-        current + m.balance("current_sensor", "signal", unit="A", value=current, sensor=True).effort
+        current
+        + m.balance(
+            "current_sensor", "signal", unit="A", value=current, sensor=qs.I_MEASURED
+        ).effort
     )
-    sensed_speed = (
-        speed + m.balance("speed_sensor", "signal", unit="rad/s", value=speed, sensor=True).effort
-    )
+    sensed_speed = speed + m.balance("speed_sensor", "signal", unit="rad/s", value=speed).effort
     command = command + m.balance("command", "signal", unit="rad/s", value=command).effort
     return sensed_current, sensed_speed, command
 

@@ -62,8 +62,8 @@ def equations(m: Model) -> None:
         return ca.floor(angle / count + p.phase)
 
     speed = count * (counts(x.theta) - counts(past.at(p.window))) / p.window
-    speed += m.balance("speed", "signal", unit="rad/s", value=speed, sensor=True).effort
+    speed += m.balance("speed", "signal", unit="rad/s", value=speed, sensor=qs.W_MEAS).effort
     angle = count * counts(u.phi)
-    angle += m.balance("angle", "signal", unit="rad", value=angle, sensor=True).effort
+    angle += m.balance("angle", "signal", unit="rad", value=angle, sensor=qs.PHI_MEAS).effort
     m.output(qs.W_MEAS, speed)
     m.output(qs.PHI_MEAS, angle)

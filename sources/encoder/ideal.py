@@ -19,7 +19,7 @@ FIDELITY = Fidelity(level=0)
 def equations(m: Model) -> None:
     """Collect the equations."""
     u = m.inputs(qs.PHI, qs.W)
-    w = u.w + m.balance("speed", "signal", unit="rad/s", value=u.w, sensor=True).effort
-    phi = u.phi + m.balance("angle", "signal", unit="rad", value=u.phi, sensor=True).effort
+    w = u.w + m.balance("speed", "signal", unit="rad/s", value=u.w, sensor=qs.W_MEAS).effort
+    phi = u.phi + m.balance("angle", "signal", unit="rad", value=u.phi, sensor=qs.PHI_MEAS).effort
     m.output(qs.W_MEAS, w)
     m.output(qs.PHI_MEAS, phi)

@@ -98,7 +98,7 @@ def component_json(variant: Variant) -> bytes:
         ],
         "balances": [
             {"name": balance.name, "kind": balance.kind, "unit": balance.unit}
-            | ({"sensor": True} if balance.sensor else {})
+            | ({"sensor": balance.sensor} if balance.sensor else {})
             for balance in model.balances.values()
         ],
         "slots": model.slots,

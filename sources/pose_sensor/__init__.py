@@ -37,6 +37,6 @@ def body_pose(m: Model) -> tuple[SX, SX]:
     pose = ca.vertcat(u.x, u.y, u.phi)
     pose += m.balance("pose", "pose", value=pose).effort
     pose[:2] += m.balance("position", "point", unit="m", value=pose[:2]).effort
-    pose[2] += m.balance("yaw", "signal", unit="rad", value=pose[2], sensor=True).effort
-    z = u.z + m.balance("height", "signal", unit="m", value=u.z, sensor=True).effort
+    pose[2] += m.balance("yaw", "signal", unit="rad", value=pose[2], sensor=PHI_MEAS).effort
+    z = u.z + m.balance("height", "signal", unit="m", value=u.z, sensor=Z_MEAS).effort
     return pose, z

@@ -41,7 +41,7 @@ def equations(m: Model) -> None:
     p = m.parameters(qs.T_LOOP, K_V, U_MAX, K_P, K_U)
     z = m.discretes(qs.U_HELD, BEFORE, BEFORE_LAST)
     q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
-    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi, sensor=True).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
     tick = m.clock("loops", p.T_loop)
 
     w_m = (phi - z.phi_before_last) / (2 * p.T_loop)

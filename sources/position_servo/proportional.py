@@ -41,7 +41,7 @@ def equations(m: Model) -> None:
     z = m.discretes(qs.U_HELD)
     m.input_rate(u.phi, u.w)
     q_ref = u.q_ref + m.balance("command", "signal", unit="rad", value=u.q_ref).effort
-    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi, sensor=True).effort
+    phi = u.phi + m.balance("angle_sensor", "signal", unit="rad", value=u.phi).effort
     tick = m.clock("loops", p.T_loop)
     d = ca.fmax(-1, ca.fmin(p.k_d * (q_ref - phi), 1))
     m.update(tick, z.u_held, d * u.u_supply)

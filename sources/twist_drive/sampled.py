@@ -91,8 +91,8 @@ def equations(m: Model) -> None:
     forward += m.balance("forward", "signal", unit="m/s", value=forward).effort
     left += m.balance("sideways", "signal", unit="m/s", value=left).effort
     turn += m.balance("turn", "signal", unit="rad/s", value=turn).effort
-    beta = u.beta + each(m, "steering_encoder", "rad", u.beta)
-    angle = -u.phi + each(m, "rolling_encoder", "rad", -u.phi)
+    beta = u.beta + each(m, "steering_encoder", "rad", u.beta, sensor=qs.BETA_MEASURED)
+    angle = -u.phi + each(m, "rolling_encoder", "rad", -u.phi, sensor=qs.P_MEASURED)
 
     v_x = forward - turn * p.l_A * ca.sin(p.alpha_A)
     v_y = left + turn * p.l_A * ca.cos(p.alpha_A)
@@ -105,8 +105,8 @@ def equations(m: Model) -> None:
     set_s = ca.fmax(-p.i_s_max, ca.fmin(steering, p.i_s_max))
     free = ca.fabs(wanted) < p.i_d_max
     share = -ca.expm1(-p.T / p.T_i) * p.T_i / p.T
-    error_d = each(m, "rolling_current", "A", x.current_d)
-    error_s = each(m, "steering_current", "A", x.current_s)
+    error_d = each(m, "rolling_current", "A", x.current_d, sensor=qs.I_D_MEASURED)
+    error_s = each(m, "steering_current", "A", x.current_s, sensor=qs.I_S_MEASURED)
     goal_d, goal_s = set_d - error_d, set_s - error_s
 
     tick = m.clock("loops", p.T)
@@ -139,12 +139,17 @@ def constant(m: Model, name: str, value: SX, current: SX) -> SX:
     return values + each(m, name, "N.m/A", values, "coefficient", current=current)
 
 
-def each(m: Model, name: str, unit: str, value: SX, kind: str = "", **others: SX) -> SX:
-    """Open a balance for a sensor of all three axles and one for each; what effects add.
-
-    Another kind is no sensor.
-    """
-    sensor, kind = not kind, kind or "signal"
+def each(
+    m: Model,
+    name: str,
+    unit: str,
+    value: SX,
+    kind: str = "signal",
+    *,
+    sensor: Quantity | None = None,
+    **others: SX,
+) -> SX:
+    """Open a balance for a signal of all three axles and one for each; what effects add."""
     together = m.balance(name, kind, unit=unit, sensor=sensor, value=value, **others)
     single = [
         m.balance(

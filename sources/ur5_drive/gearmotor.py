@@ -10,6 +10,7 @@ import casadi as ca
 
 from .. import ur5_drive as qs
 from ..model import SX, Model
+from ..quantity import Quantity
 
 
 class Servo(NamedTuple):
@@ -24,7 +25,7 @@ class Servo(NamedTuple):
 
 
 def effort(
-    m: Model, name: str, kind: str, unit: str = "", *, sensor: bool = False, **signals: SX
+    m: Model, name: str, kind: str, unit: str = "", *, sensor: Quantity | None = None, **signals: SX
 ) -> SX:
     """Open a balance for all six joints and one for each; what effects add to them."""
     together = m.balance(name, kind, unit=unit, sensor=sensor, **signals)
@@ -47,8 +48,8 @@ def read(m: Model) -> Servo:
     m.input_rate(u.q, u.qd)
     command = ca.vertcat(u.q_set, u.qd_set)
     command = command + m.balance("command", "bundle", value=command).effort
-    reading = u.q + effort(m, "encoder", "signal", "rad", sensor=True, value=u.q)
-    speed = u.qd + effort(m, "speed_sensor", "signal", "rad/s", sensor=True, value=u.qd)
+    reading = u.q + effort(m, "encoder", "signal", "rad", sensor=qs.Q_MEASURED, value=u.q)
+    speed = u.qd + effort(m, "speed_sensor", "signal", "rad/s", value=u.qd)
     m.output(qs.Q_MEASURED, reading)
     return Servo(command[:6], command[6:], reading, speed, u.q, u.qd)
 
@@ -94,7 +95,7 @@ def output_current(m: Model, current: SX) -> None:
     p = m.parameters(qs.F_SENSOR)
     x = m.states(qs.SENSED)
     m.derivative(x.sensed, 2 * math.pi * p.f_sensor * (current - x.sensed))
-    error = effort(m, "current_sensor", "signal", "A", sensor=True, value=x.sensed)
+    error = effort(m, "current_sensor", "signal", "A", sensor=qs.I_MEASURED, value=x.sensed)
     m.output(qs.I_MEASURED, x.sensed + error)
 
 

@@ -54,6 +54,17 @@ def test_a_channel_reads_its_gain_and_bias_and_no_other_ones() -> None:
     assert np.array_equal(channel.of(sampler, times), 2.0 * times + 0.5)
 
 
+def test_an_angle_reads_its_wave() -> None:
+    channel = Channel("phi", "rad", 0.01, "base.phi", offset=0.5)
+    times = np.linspace(0.0, 7.0, 9)
+    wave = {"wave:phi": 0.02, "cycles:phi": 3.0, "phase:phi": 0.4}
+    read = channel.of(Sampler(times, times), times, wave)
+    reading = times + 0.5
+    assert read == pytest.approx(reading + 0.02 * np.sin(3.0 * reading + 0.4), rel=1e-12)
+    once = channel.of(Sampler(times, times), times, {"wave:phi": 0.02, "wave:x": 9.0})
+    assert once == pytest.approx(reading + 0.02 * np.sin(reading), rel=1e-12)  # rounding
+
+
 def test_declared_gain_and_bias_are_recovered(folder: Path) -> None:
     it = problem(folder, START + YAW_GAIN)
     run = it.runs[0]
@@ -76,6 +87,18 @@ def test_a_bias_has_the_unit_of_its_column(folder: Path) -> None:
     assert read[:, :2] == pytest.approx(clean[:, :2])
     assert read[:, 2] - clean[:, 2] == pytest.approx(np.pi / 18.0)
     simulator.close()
+
+
+def test_a_wave_has_the_units_of_an_angle(folder: Path) -> None:
+    more = BIAS.replace("bias:yaw", "wave:yaw") + BIAS.replace("zero", "where").replace(
+        "bias:yaw", "phase:yaw"
+    )
+    it = problem(folder, more)
+    names = [p.targets[0] for p in it.parameters]
+    turned = pytest.approx(np.pi / 180.0)
+    assert names == [("column:wave:yaw", turned), ("column:phase:yaw", turned)]
+    with pytest.raises(UnitError, match="column:cycles:yaw"):
+        problem(folder, BIAS.replace("bias:yaw", "cycles:yaw"))
 
 
 def test_nothing_is_simulated_again_for_another_gain(folder: Path) -> None:
