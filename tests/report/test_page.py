@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.diagnose.candidates import READS
 from cosim.diagnose.story.facts import Facts, inside, place_in_words
 from cosim.diagnose.story.verdicts import ADVICE, LABELS, run_line, told
 from cosim.report import page as pages
@@ -211,7 +212,8 @@ def test_clocks_that_were_estimated_are_told() -> None:
 def test_every_effect_has_advice_and_no_advice_is_for_nothing() -> None:
     known = tomllib.loads(ADVICE.read_text("utf-8"))
     asked = {name for name, module in effects().items() if not module.EFFECT.probe}
-    assert set(known) == asked | {"elastic"}  # a fidelity that is looked for like an effect
+    # a fidelity that is looked for like an effect, and what only columns of a log have
+    assert set(known) == asked | {"elastic"} | set(READS)
     for name, entry in known.items():
         assert set(entry) == {"means", "check"}, name
         assert all(text.endswith(".") and len(text) < 260 for text in entry.values()), name
