@@ -62,9 +62,7 @@ def calibrate_command(
     Example: `cosim calibrate MB-12 --out out/MB-12`
     """
     from ..calibrate.calibration import calibrated
-    from ..calibrate.checks.examine import examine
-    from ..calibrate.checks.finding import passed
-    from ..calibrate.checks.late import check_late
+    from ..calibrate.checks.examine import check_fit, examine
     from ..calibrate.input_noise import propagated
     from ..calibrate.mapping import read_problem
     from ..calibrate.sensitivity import correlation_index, tornado
@@ -84,7 +82,7 @@ def calibrate_command(
             findings += counted
             stage = "fitting"
             estimate, exchange = calibrated(simulator)
-            findings += _usable(problem, passed(check_late(estimate), problem.source.allow))
+            findings += _usable(problem, check_fit(estimate))
             stage = "what the runs tell of each parameter"
             correlation = (
                 correlation_index(simulator, estimate.theta, samples, everywhere=figures)

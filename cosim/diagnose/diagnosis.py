@@ -10,9 +10,8 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.budget import Budget, StoppedError
-from ..calibrate.checks.examine import examine
-from ..calibrate.checks.finding import Finding, lines, passed
-from ..calibrate.checks.late import check_late
+from ..calibrate.checks.examine import check_fit, examine
+from ..calibrate.checks.finding import Finding, lines
 from ..calibrate.input_noise import propagated
 from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
@@ -133,7 +132,7 @@ def _diagnosed(
         search.prepare()
         try:
             calibrated = search.calibrated(None if base is None else base.estimate.values)
-            late = passed(check_late(calibrated.estimate), problem.source.allow)
+            late = check_fit(calibrated.estimate)
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, task)

@@ -1,4 +1,4 @@
-"""All checks in their order: what is wrong with a data set, before anything is fitted."""
+"""All checks in their order: what is wrong with a data set, before and after a fit."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from .copies import check_columns, check_copies
 from .finding import Finding, passed
 from .gaps import check_gaps
 from .lags import check_lags
+from .late import check_late
 from .scale import check_scale
-from .smooth import check_smooth
+from .smooth import check_smooth, check_stated
 from .spiking import check_spikes
 from .starts import check_starts
 from .still import check_still
@@ -23,6 +24,7 @@ from .times import check_times
 from .wraps import check_wraps
 
 if TYPE_CHECKING:
+    from ..estimate import Estimate
     from ..problem import Problem
     from ..simulator import Simulator
 
@@ -58,6 +60,12 @@ def check_data(problem: Problem) -> list[Finding]:
     for check in (check_times, check_still, check_gaps, check_copies, check_columns, check_smooth):
         found += check(problem)
     return found
+
+
+def check_fit(estimate: Estimate) -> list[Finding]:
+    """Problems that show in what a fit leaves; errors that the mapping allows are warnings."""
+    found = [*check_late(estimate), *check_stated(estimate)]
+    return passed(found, estimate.problem.source.allow)
 
 
 def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Finding]:

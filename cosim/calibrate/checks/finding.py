@@ -27,7 +27,7 @@ KINDS = {
     "held": "a column whose values stand for several samples each",
     "jitter": "sample times that are not even",
     "mixed": "a column that two runs have in common",
-    "noise": "a column with more noise than it is said to have",
+    "noise": "a column with more noise than it is said to have, or with far less",
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",
     "reading": "what was assumed in reading",

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimate import channel_rms
 from .finding import Finding
 from .still import held
 
 if TYPE_CHECKING:
+    from ..estimate import Estimate
     from ..problem import Problem
 
 Vector = NDArray[np.float64]
@@ -25,6 +27,8 @@ QUIET = 0.5
 FALLS = 0.6
 """Ratio of the noise by differences of twice the order to that by `ORDER` below which it falls
 towards half the sample rate; of white noise, however small, it is 1."""
+WHITE = 0.8
+"""The same ratio above which noise is white: 1 less twice its deviation of a tenth (`ENOUGH`)."""
 LOUD = 2.0
 """Times the stated noise from which a column carries more than it is said to."""
 
@@ -68,6 +72,53 @@ def noise(columns: Sequence[Vector]) -> float | None:
     return float(np.median(sizes))
 
 
+def _carried(problem: Problem, index: int) -> tuple[float, float] | None:
+    """A channel's noise over what is stated, and how it falls (`FALLS`), in the median of the runs.
+
+    None where that cannot be told: the mapping filters the column, or no run is long enough, moves,
+    and is not held.
+    """
+    channel, sizes, falls = problem.channels[index], [], []
+    if channel.name in problem.source.made:
+        return None
+    for run in problem.runs:
+        values = run.data[:, index]
+        values = values[np.isfinite(values)]
+        moving = values.size > ENOUGH and np.mean(np.diff(values) != 0.0) > 0.5
+        if not moving or held(values, channel.sigma):
+            continue
+        own, twice = roughness(values, ORDER), roughness(values, 2 * ORDER)
+        sizes.append(own / channel.sigma)
+        falls.append(twice / own if own > 0.0 else 0.0)
+    return (float(np.median(sizes)), float(np.median(falls))) if sizes else None
+
+
+def check_stated(estimate: Estimate) -> Iterator[Finding]:
+    """Channels of which neither the noise nor what a fit leaves comes near what is stated.
+
+    A sigma that is too large hides what is smaller than it. The white noise of a column alone does
+    not tell: what is stated may hold slow errors of a sensor as well, or of a model (a pose from
+    scans or cameras is off by ten times what it trembles). Those are in what a fit leaves. Where
+    both are below `QUIET` of what is stated, there is nothing that it could be: of n residuals of
+    that deviation their root mean square has one of 1 / sqrt(2 n), 0.05 of `ENOUGH` samples. What a
+    fit leaves counts over all runs that were fitted.
+    """
+    problem = estimate.problem
+    left = channel_rms(problem, estimate.residuals)
+    for index, channel in enumerate(problem.channels):
+        carried = _carried(problem, index)
+        if carried is None or channel.name not in left:
+            continue
+        (size, falls), rest = carried, left[channel.name]
+        if size < QUIET and falls > WHITE and rest < QUIET:
+            text = (
+                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit}, "
+                f"and the fit leaves {rest:.2g} of it: what is smaller than that stays hidden, and "
+                f"intervals come out too wide; state sigma = {size * channel.sigma:.3g}"
+            )
+            yield Finding("warning", "noise", "", channel.name, text)
+
+
 def check_smooth(problem: Problem) -> Iterator[Finding]:
     """Channels whose noise near half the sample rate is below what they are said to carry.
 
@@ -83,31 +134,20 @@ def check_smooth(problem: Problem) -> Iterator[Finding]:
     quiet: list[tuple[str, str, bool]] = []
     count = 0
     for index, channel in enumerate(problem.channels):
-        if channel.name in problem.source.made:
-            continue
-        sizes, falls = [], []
-        for run in problem.runs:
-            values = run.data[:, index]
-            values = values[np.isfinite(values)]
-            moving = values.size > ENOUGH and np.mean(np.diff(values) != 0.0) > 0.5
-            if not moving or held(values, channel.sigma):
-                continue
-            own, twice = roughness(values, ORDER), roughness(values, 2 * ORDER)
-            sizes.append(own / channel.sigma)
-            falls.append(twice / own if own > 0.0 else 0.0)
-        if not sizes:
+        carried = _carried(problem, index)
+        if carried is None:
             continue
         count += 1
-        size = float(np.median(sizes))
+        size, falls = carried
         instrument = channel.name in problem.source.instruments
-        if size > LOUD and float(np.median(falls)) > 0.8:
+        if size > LOUD and falls > WHITE:
             text = (
                 f"carries {size:.3g} times its stated noise of {channel.sigma:.4g} {channel.unit}: "
                 "intervals come out too narrow, and noise may be taken for physics; state "
                 f"sigma = {size * channel.sigma:.3g}"
             )
             yield Finding("warning", "noise", "", channel.name, text)
-        if size < QUIET and (instrument or float(np.median(falls)) < FALLS):
+        if size < QUIET and (instrument or falls < FALLS):
             text = (
                 f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit} "
                 "near half the sample rate: it was low-passed or interpolated, or its noise is "

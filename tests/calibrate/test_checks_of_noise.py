@@ -1,0 +1,59 @@
+"""A stated noise that is too large for anything that a column carries or a fit leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.calibrate import Problem
+from cosim.calibrate.checks.finding import NO_SOURCE, Finding
+from cosim.calibrate.checks.smooth import check_stated
+
+
+def after_a_fit(
+    problem: Problem, exact: Mapping[str, np.ndarray], slow: float = 0.0
+) -> list[Finding]:
+    """Findings where the fit ends at the truth, beside a slow error of so many stated noises."""
+    index = [c.name for c in problem.channels].index("current")
+    data = {run.name: run.data.copy() for run in problem.runs}
+    for run in problem.runs:
+        error = np.sqrt(2.0) * slow * problem.sigma[index]
+        data[run.name][:, index] += error * np.sin(2.0 * np.pi * 0.5 * run.times)
+    problem = problem.with_data(data)
+    residuals = [
+        (run.name, (run.data - exact[run.name]) / problem.sigma)
+        for run in problem.chosen("identification")
+    ]
+    estimate: Any = SimpleNamespace(problem=problem, residuals=residuals)
+    return list(check_stated(estimate))
+
+
+def stated(problem: Problem, factor: float) -> Problem:
+    """The current's noise is said to be so many times as large as it is."""
+    channels = [
+        replace(c, sigma=factor * c.sigma) if c.name == "current" else c for c in problem.channels
+    ]
+    return problem.changed(channels=channels, source=NO_SOURCE)
+
+
+def test_a_noise_that_is_stated_too_large_is_named(noisy, exact) -> None:
+    problem = noisy(0)
+    true = next(c.sigma for c in problem.channels if c.name == "current")
+    [found] = after_a_fit(stated(problem, 10.0), exact)
+    assert (found.severity, found.kind, found.column) == ("warning", "noise", "current")
+    assert "carries 0.1 of its stated noise" in found.text
+    # the estimate of the noise has a deviation of a tenth in a run of 200 samples (`ENOUGH`)
+    assert float(found.text.partition("sigma = ")[2]) == pytest.approx(true, rel=0.1)
+    # an effect of a third of it is hidden, and the noise is named all the same
+    assert [f.column for f in after_a_fit(stated(problem, 10.0), exact, 0.3)] == ["current"]
+
+
+def test_a_noise_that_holds_slow_errors_too_is_no_fault(noisy, exact) -> None:
+    """A pose from scans trembles by a tenth of what it is off; then a fit leaves what is stated."""
+    assert after_a_fit(stated(noisy(0), 10.0), exact, 1.0) == []
+    assert after_a_fit(stated(noisy(0), 1.0), exact) == []
