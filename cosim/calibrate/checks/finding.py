@@ -38,7 +38,7 @@ KINDS = {
     "smoothed": "columns without the noise that they are said to have",
     "spikes": "single samples that stand out",
     "start": "a run that begins where the model does not",
-    "step": "a communication step that does not divide the sample interval",
+    "step": "a communication step that does not divide the sample interval, or the period",
     "swapped": "columns that are exchanged",
     "unit": "a column in another unit",
     "wrapped": "an angle that begins anew at a turn",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -50,6 +51,33 @@ def check_times(problem: Problem) -> Iterator[Finding]:
         yield from _run(problem, run, least)
     if problem.source.rate is None:  # else each clock has been compared with that
         yield from _units(problem)
+    yield from _recorded(problem)
+
+
+def _recorded(problem: Problem) -> Iterator[Finding]:
+    """A stated time between recorded points that is no whole number of communication steps."""
+    if problem.period is None:
+        return
+    for key, step in {"step": problem.step, "search_step": problem.search.step}.items():
+        count = problem.period / step
+        near = max(round(count), 1)
+        if abs(count - near) > COINCIDENT * near and (key == "step" or step != problem.step):
+            text = (
+                f"period = {problem.period:g} s is no whole number of communication steps of "
+                f"{step:g} s ({count:.4g}): points would be recorded every {near * step:g} s; take "
+                f"{key} = {_dividing(problem.period, count):.6g}, or another period"
+            )
+            yield Finding("error", "step", "", "time", text)
+
+
+def _dividing(period: float, count: float) -> float:
+    """The longest step that divides a period into as many parts or more, and has few digits."""
+    least = math.ceil(count)
+    for parts in range(least, 10 * least):  # a power of ten, one of which is among them, divides it
+        step = period / parts
+        if math.isclose(step, float(f"{step:.3g}"), rel_tol=1e-9):
+            return step
+    return period / least
 
 
 def _units(problem: Problem) -> Iterator[Finding]:
