@@ -15,7 +15,7 @@ from ..data.logs import Log
 from ..errors import ScenarioError, UnitError
 from ..spec.units import Unit, parse
 from .parts import COINCIDENT
-from .scales import known, per_second, scaled
+from .scales import known, per_second, scaled, zeroed
 
 Vector = NDArray[np.float64]
 GAP = 3.0
@@ -88,7 +88,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
                 log, item, clocks, time, clock, turn, where
             )  # fmt: skip
             values = _filtered(time, values, entry, where)
-            offset += float(entry.get("offset", 0.0))
+            offset = zeroed(offset, float(entry.get("offset", 0.0)))
             columns[name] = values * gain + offset
             if (held := _held(log, item, clocks)) is not None and "resample" not in table:
                 own[name] = held[0], held[1] * gain + offset

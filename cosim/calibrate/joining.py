@@ -30,7 +30,7 @@ from .named import named, readings
 from .parts import CLOCK, COINCIDENT, COLUMN, Channel, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .recorder import check_column, column_unit
-from .scales import known, per_second, scaled
+from .scales import known, per_second, scaled, zeroed
 from .steps import steps
 
 Vector = NDArray[np.float64]
@@ -229,7 +229,7 @@ class Joined(MappedLogs):
             sigma,
             str(entry["signal"]),
             gain,
-            offset + float(entry.get("offset", 0.0)),
+            zeroed(offset, float(entry.get("offset", 0.0))),
             str(entry.get("transform", "sample")),
             float(entry.get("window", 0.0)),
             float(entry.get("shift", 0.0)),
