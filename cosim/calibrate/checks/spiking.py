@@ -19,6 +19,9 @@ NEAR = 3
 """Samples before and after within which a jolt shows in another column."""
 SHOWS = 4.0
 """Deviations by which it bends there."""
+BEYOND = 100.0
+"""Times the largest bend that the command gives a column, by the model, which no jolt that comes of
+the same command passes: a play that ends or a force that lets go strikes by tens of it."""
 HARM = 0.1
 """Mean square over the noise's, of a column of a run, to which spikes must add to stop anything:
 with less, a model that leaves noise still passes for one, whether they are faults or small jolts of
@@ -34,11 +37,20 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
     beyond 4 deviations); so columns are named of whose spikes most are alone. A jolt moves
     something: columns that stand out at the very same sample and go on as if nothing had been are a
     row that was written or sent wrongly. So bends are those of the columns without their spikes.
+    Other columns also bend where a command switches, with or without a jolt. What the model
+    foretells of a bend (times one number for a run, since its parameters are not known yet) is none
+    of a jolt, where the sample stands out by `BEYOND` times the bend that the model has there.
     """
-    bends = {
-        (run.name, index): _bend(_without(run.data[:, index], channel.sigma), channel.sigma)
-        for run in problem.runs for index, channel in enumerate(problem.channels)
-    }  # fmt: skip
+    bends, rests = {}, {}
+    for run in problem.runs:
+        for index, channel in enumerate(problem.channels):
+            bent = _bent(_without(run.data[:, index], channel.sigma))
+            bends[run.name, index] = _size(bent, channel.sigma)
+            if run.name in models:
+                model = _bent(models[run.name][:, index])
+                rests[run.name, index] = np.minimum(
+                    bends[run.name, index], _size(_unlike(bent, model), channel.sigma)
+                )
     for index, channel in enumerate(problem.channels):
         for run in problem.runs:
             values = run.data[:, index]
@@ -46,7 +58,10 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             if run.name in models:
                 found &= spikes(values - models[run.name][:, index], channel.sigma)
             at = np.flatnonzero(found)
-            alone = [k for k in at if not _shows(bends, run.name, index, int(k))]
+            alone = [k for k in at if not _shows(
+                rests if _beyond(problem, models, run.name, index, int(k)) else bends,
+                run.name, index, int(k),
+            )]  # fmt: skip
             if not len(alone) > 0.5 * at.size:
                 continue
             worst = at[int(np.argmax(np.abs(values[at] - values[at - 1])))]
@@ -68,19 +83,43 @@ def _without(values: Vector, sigma: float) -> Vector:
     return np.where(spikes(values, sigma), np.nan, values)
 
 
-def _bend(values: Vector, sigma: float) -> Vector:
-    """How far samples are from the middle of their neighbours, over the deviation of that."""
-    bend = np.zeros(values.shape)
-    bend[1:-1] = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-    bend[~np.isfinite(bend)] = 0.0
-    return bend / max(float(np.median(bend)) / 0.6745, sigma * float(np.sqrt(1.5)))
+def _bent(values: Vector) -> Vector:
+    """How far samples are from the middle of their neighbours; 0 where that is not known."""
+    bent = np.zeros(values.shape)
+    bent[1:-1] = values[1:-1] - 0.5 * (values[:-2] + values[2:])
+    bent[~np.isfinite(bent)] = 0.0
+    return bent
+
+
+def _size(bent: Vector, sigma: float) -> Vector:
+    """Size of bends over their usual one, or that of the noise where that is larger."""
+    size = np.abs(bent)
+    return size / max(float(np.median(size)) / 0.6745, sigma * float(np.sqrt(1.5)))
+
+
+def _unlike(bent: Vector, model: Vector) -> Vector:
+    """Bends without the multiple of the model's that leaves least."""
+    power = float(model @ model)
+    return bent - (float(bent @ model) / power if power > 0.0 else 0.0) * model
+
+
+def _beyond(problem: Problem, models: Mapping[str, Vector], run: str, index: int, at: int) -> bool:
+    """Whether a sample stands out beyond all that the command does to its column about there."""
+    if run not in models:
+        return False
+    bent = float(np.max(np.abs(_bent(models[run][:, index])[_about(at)])))
+    return abs(float(_bent(problem.run(run).data[:, index])[at])) > BEYOND * bent
+
+
+def _about(at: int) -> slice:
+    """The samples within which a jolt shows."""
+    return slice(max(at - NEAR, 0), at + NEAR + 1)
 
 
 def _shows(bends: Mapping[tuple[str, int], Vector], run: str, index: int, at: int) -> bool:
     """Whether another column of the run bends at about this sample."""
-    span = slice(max(at - NEAR, 0), at + NEAR + 1)
     return any(
-        float(np.max(bend[span])) > SHOWS
+        float(np.max(bend[_about(at)])) > SHOWS
         for (name, other), bend in bends.items()
         if name == run and other != index
     )
