@@ -8,6 +8,7 @@ import pytest
 
 from cosim.calibrate import Problem
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding
+from cosim.calibrate.checks.scale import check_scale
 from cosim.calibrate.checks.times import check_times
 
 
@@ -35,3 +36,52 @@ def test_a_step_must_divide_the_period(
     found = of_kind(problem, "step")
     assert [f.severity for f in found] == (["error"] if named else [])
     assert all(f"({named})" in f.text and way in f.text for f in found)
+
+
+@pytest.mark.parametrize(
+    ("factor", "period", "severity", "said"),
+    [
+        (1e3, 1e-3, "error", "samples are 1 s apart, but period = 0.001 s, 1000 times less"),
+        (1e3, 2e-3, "", ""),  # no other unit makes that of it
+        (1.0, 1e-3, "", ""),
+        (1e3, None, "warning", "1000 communication steps"),
+    ],
+)
+def test_a_clock_in_thousandths_contradicts_the_period(
+    noisy, factor: float, period: float | None, severity: str, said: str
+) -> None:
+    problem = noisy(0)
+    runs = [replace(run, times=run.times * factor) for run in problem.runs]
+    step = 1e-3 if period is None else 2.5e-4
+    problem = problem.changed(runs=runs, period=period, step=step, source=NO_SOURCE)
+    found = of_kind(problem, "rate")
+    assert [f.severity for f in found] == ([severity] if severity else [])
+    assert all(said in f.text and 'write the unit into its head ("time [ms]")' in f.text
+               for f in found)  # fmt: skip
+
+
+def test_a_clock_that_is_estimated_wants_points_close_together(noisy) -> None:
+    problem = noisy(0)
+    late = replace(
+        problem.parameters[0], name="late", targets=(("clock:speed", 1.0),), role="nuisance"
+    )
+    runs = [replace(run, times=run.times * 1e3) for run in problem.runs]
+    problem = problem.changed(runs=runs, period=1e-3, step=2.5e-4, source=NO_SOURCE)
+    assert of_kind(problem, "rate")
+    assert not of_kind(problem.with_parameters([*problem.parameters, late]), "rate")
+
+
+@pytest.mark.parametrize("factor", [4e3, 1.0])
+def test_a_scale_that_is_wrong_names_the_clock_where_samples_are_far_apart(
+    noisy, factor: float
+) -> None:
+    """Four steps to a sample: the interval over the step is no power of a thousand."""
+    problem = noisy(0)
+    models = {run.name: run.data for run in problem.runs}
+    index = [c.name for c in problem.channels].index("speed")
+    data = {run.name: run.data.copy() for run in problem.runs}
+    for values in data.values():
+        values[:, index] *= 1e-3
+    problem = problem.with_data(data).changed(step=problem.runs[0].interval / factor)
+    [found] = check_scale(problem, models, index)
+    assert ("4000 communication steps apart: if the clock counts" in found.text) == (factor > 1e3)

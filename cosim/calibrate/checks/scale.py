@@ -20,6 +20,8 @@ FOLLOWS = 0.9
 STRANGE = 8.0
 """A column that is so many times too large is no measurement of the signal. By less, it may be
 what the model lacks, unless the factor is one of those below: cold grease triples a current."""
+LONG = 1e3
+"""Communication steps between samples from which the clock may count thousandths of a second."""
 FORETOLD = 0.2
 """Share of a column's power by which the model may miss it and still foretell its sign."""
 FACTORS = {
@@ -125,5 +127,11 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
         text = f"is {size:.4g} times what the model has{unit}; {reason}"
         if _all_alike(problem, models, size):
             text += ". All columns are, so look at the units of the inputs and of the clock first"
+        apart = min((run.interval for run in problem.runs if run.times.size > 1), default=0.0)
+        if (steps := apart / problem.step) >= LONG:
+            text += (
+                f". Samples are {steps:.6g} communication steps apart: if the clock counts "
+                "thousandths of a second, that is the reason"
+            )
         sure = known or not 1.0 / STRANGE < size < STRANGE
         yield Finding("error" if sure else "warning", "unit", "", channel.name, text)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks import clocked
 from ..parts import COINCIDENT, MeasuredRun
 from .finding import Finding
 
@@ -81,7 +82,11 @@ def _dividing(period: float, count: float) -> float:
 
 
 def _units(problem: Problem) -> Iterator[Finding]:
-    """Clocks that count in thousandths of the unit that the other runs or the step are in."""
+    """Clocks that count in thousandths of the unit that the other runs, period or step are in.
+
+    A period that is a thousandth of the interval to 2 % (`EVEN`) contradicts it. Only where a clock
+    is estimated are points wanted so close together: what is measured lies between them then.
+    """
     each = {run.name: interval(run.times) for run in problem.runs if run.times.size > 1}
     if not each or min(each.values()) <= 0.0:
         return
@@ -94,11 +99,21 @@ def _units(problem: Problem) -> Iterator[Finding]:
                 'unit into the head ("time [ms]"), or give scale of the clock in [columns]'
             )
             yield Finding("error", "rate", name, "time", text)
-    if _thousands(least / problem.step):
+    way = (
+        'if the clock counts thousandths of a second, write the unit into its head ("time [ms]"), '
+        "or give its scale in [columns]"
+    )
+    period = None if clocked(problem.parameters) else problem.period
+    if period is not None and _thousands(least / period):
         text = (
-            f"samples are {least:.6g} s apart, {least / problem.step:.6g} communication steps: if "
-            'the clock counts thousandths of a second, write the unit into its head ("time [ms]"), '
-            "or give its scale in [columns]"
+            f"samples are {least:.6g} s apart, but period = {period:g} s, {least / period:.6g} "
+            f"times less: {way}; else mend period"
+        )
+        yield Finding("error", "rate", "", "time", text)
+    elif _thousands(least / problem.step):
+        text = (
+            f"samples are {least:.6g} s apart, {least / problem.step:.6g} communication steps: "
+            f"{way}"
         )
         yield Finding("warning", "rate", "", "time", text)
 
