@@ -65,13 +65,16 @@ def _follow(
     return found
 
 
-def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: str) -> bool:
+def _foretold(
+    problem: Problem, models: Mapping[str, Vector], index: int, name: str, factor: float = -1.0
+) -> bool:
     """Whether the model foretells this column elsewhere, and this run's other columns.
 
     A model that lacks something may turn the other way in one run: a base that pivots about another
     wheel comes back on another side, and a pose in world axes follows the model mirrored. Only what
     the model gets right everywhere else (to `FORETOLD` of its power, in the median) can be said to
-    be turned round here by the log and not by the machine; and turned back it must be as right.
+    be turned round here by the log and not by the machine, or to be so many times as large; and
+    turned back it must be as right.
     """
 
     def off(run: MeasuredRun, column: int, side: float = 1.0) -> float:
@@ -79,11 +82,17 @@ def _foretold(problem: Problem, models: Mapping[str, Vector], index: int, name: 
         power = float(measured @ measured)
         return float(np.sum((measured - side * simulated) ** 2)) / power if power > 0.0 else 0.0
 
-    if off(problem.run(name), index, -1.0) >= FORETOLD:
+    if off(problem.run(name), index, factor) >= FORETOLD:
         return False
     here = [off(run, index) for run in problem.runs if run.name != name]
     others = [off(problem.run(name), i) for i in range(len(problem.channels)) if i != index]
     return all(not found or float(np.median(found)) < FORETOLD for found in (here, others))
+
+
+def _unit(size: float) -> str:
+    """What is wrong with the unit of a column that is so many times its signal, "" if unknown."""
+    near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
+    return near if abs(np.log(size / FACTORS[near])) < 0.2 else ""
 
 
 def _size(follow: Mapping[str, tuple[float, float]]) -> float:
@@ -98,12 +107,38 @@ def _all_alike(problem: Problem, models: Mapping[str, Vector], size: float) -> b
     return len(sizes) > 1 and all(abs(np.log(one / size)) < 0.2 for one in sizes)
 
 
+def _one_run(
+    problem: Problem,
+    models: Mapping[str, Vector],
+    index: int,
+    follow: Mapping[str, tuple[float, float]],
+) -> Iterator[Finding]:
+    """Runs in which a column is in another unit than in the others, where it has the model's size.
+
+    A factor of a unit, to 20 %, in one run alone is what the model lacks by chance only: it must
+    foretell all else, and this column with the factor, see `_foretold`.
+    """
+    channel = problem.channels[index]
+    for name, (slope, _) in follow.items():
+        others = {other: found for other, found in follow.items() if other != name}
+        near = _unit(abs(slope))
+        if not near or not others or not 0.5 < _size(others) < 2.0:
+            continue
+        factor = float(np.copysign(FACTORS[near], slope))
+        if _foretold(problem, models, index, name, factor):
+            text = (
+                f"is {abs(slope):.4g} times what the model has in this run, and "
+                f"{_size(others):.4g} times in the others; the unit looks wrong here: {near}"
+            )
+            yield Finding("error", "unit", name, channel.name, text)
+
+
 def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> Iterator[Finding]:
     """Sign and size of a column in the runs in which it follows its signal.
 
     With a correlation beyond `FOLLOWS` over hundreds of samples, sign and slope are not of chance;
     what else turns or scales a column is the model's lack, which `_foretold` and `STRANGE` leave
-    room for.
+    room for. Where runs differ, those are named whose unit is another one.
     """
     channel = problem.channels[index]
     follow = _follow(problem, models, index)
@@ -118,11 +153,12 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
             if _foretold(problem, models, index, name):
                 text = f"follows {channel.signal} with the sign turned round in this run alone"
                 yield Finding("error", "sign", name, channel.name, text)
+    alone = list(_one_run(problem, models, index, follow))
+    yield from alone
     size = _size(follow)
-    if not 0.5 < size < 2.0:
-        near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
-        known = abs(np.log(size / FACTORS[near])) < 0.2
-        reason = f"the unit looks wrong: {near}" if known else "unit or scale look wrong"
+    if not alone and not 0.5 < size < 2.0:
+        near = _unit(size)
+        reason = f"the unit looks wrong: {near}" if near else "unit or scale look wrong"
         unit = f" [{channel.unit}]" if channel.unit else ""
         text = f"is {size:.4g} times what the model has{unit}; {reason}"
         if _all_alike(problem, models, size):
@@ -133,5 +169,5 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
                 f". Samples are {steps:.6g} communication steps apart: if the clock counts "
                 "thousandths of a second, that is the reason"
             )
-        sure = known or not 1.0 / STRANGE < size < STRANGE
+        sure = bool(near) or not 1.0 / STRANGE < size < STRANGE
         yield Finding("error" if sure else "warning", "unit", "", channel.name, text)
