@@ -21,6 +21,7 @@ from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .between import Parts, between
 from .checks.finding import Finding, Source, check_allowed
+from .checks.undriven import check_undriven, mappings
 from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
 from .counts import steady
@@ -108,12 +109,20 @@ class Joined(MappedLogs):
         check_parameters(stated)
         self.late = {name: bounds(stated, name) for name in self.logs}
         parameters = [p for p in stated if not p.late]
+        runs = [self.run(name, present) for name in self.logs]
+        settled = {*constants, *(n for p in stated for n, _ in p.targets)}.union(
+            *(run.starts for run in runs)
+        )
+        self.findings += check_undriven(
+            self.system, [target for target, _, _ in self.drivers()], settled, self.logs,
+            self.units, mappings(self.table, self.path),
+        )  # fmt: skip
         return Problem(
             self.data.name,
             model,
             parameters,
             present,
-            [self.run(name, present) for name in self.logs],
+            runs,
             float(table["step"]),
             search,
             constants=constants,

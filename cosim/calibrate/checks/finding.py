@@ -40,6 +40,7 @@ KINDS = {
     "start": "a run that begins where the model does not",
     "step": "a communication step that does not divide the sample interval, or the period",
     "swapped": "columns that are exchanged",
+    "undriven": "an input that no column drives, though one may be it",
     "unit": "a column in another unit",
     "wrapped": "an angle that begins anew at a turn",
 }
