@@ -99,6 +99,9 @@ def find_system(path: Path, name: str) -> SystemFile:
         if is_file(file):
             return read_system(file)
     known = [item.stem for item in sorted((places.scenarios() / "systems").glob("*.toml"))]
+    beside = [item.name for item in sorted(path.parent.glob("*.toml")) if item != path]
+    # a path means a file: what comes with cosim is no help where there are files
+    known = beside if beside and name.endswith(".toml") else [*beside, *known]
     raise UnknownNameError(f"{path}: there is no system {name!r}; {listing(known, name)}")
 
 
@@ -159,6 +162,7 @@ def read_joined(
         joined = Joined(path, table, data, only or {})
         problem = joined.problem(file, provider).changed(further=further)
         _set_once(problem)
+        _outputs(problem)
     return joined, problem
 
 
@@ -183,6 +187,18 @@ def _set_once(problem: Problem) -> None:
                         "take it out of the targets of one"
                     )
             setting[target].append(parameter)
+
+
+def _outputs(problem: Problem) -> None:
+    """Refuse channels whose signal is an open input: the model would be compared with its cause."""
+    system = problem.plain()
+    inputs = set(system.open_inputs())
+    for channel in problem.channels:
+        if channel.signal in inputs:
+            raise ScenarioError(
+                f"channel {channel.name}: signal {channel.signal} is an input of the system, which "
+                f"tells what drives it and nothing of the model; {listing(system.signals(), '')}"
+            )
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .finding import Finding
+from .finding import Finding, quantity
 from .smooth import noise
 from .times import SHORT
 
@@ -52,9 +52,10 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
                 continue
             runs = [name for name, a in at.items() if a.any()]
             text = (
-                f"stands at its {word} value of {edge:.6g} {channel.unit} for {count} samples, "
-                f"without the noise that it has elsewhere, where the model goes beyond it (runs "
-                f"{', '.join(runs)}): the sensor or its number ends there; make gaps of them with "
+                f"stands at its {word} value of {quantity(edge, channel.unit, '.6g')} for {count} "
+                f"samples, without the noise that it has elsewhere, where the model goes beyond "
+                f"it (runs {', '.join(runs)}): the sensor or its number ends there; make "
+                "gaps of them with "
                 f"limit = {(1.0 - 1e-6) * abs(edge):.7g} in [columns]"
             )
             yield Finding("error", "clipped", "", channel.name, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import CosimError
 from .clipped import check_clipped
 from .copies import check_columns, check_copies
-from .finding import Finding, passed
+from .finding import Finding, passed, quantity
 from .gaps import check_gaps
 from .lags import check_lags
 from .late import check_late
@@ -87,7 +88,7 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
             )
         )
     except CosimError as error:
-        return [Finding("error", "simulation", "", "", f"the model does not run: {error}")]
+        return [Finding("error", "simulation", "", "", _stopped(problem, error))]
     found += check_spikes(problem, models)
     found += check_wraps(problem, models)
     found += check_clipped(problem, models)
@@ -104,3 +105,14 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
     if not any(f.severity == "error" for f in found):
         found += check_starts(simulator, models)
     return found
+
+
+def _stopped(problem: Problem, error: CosimError) -> str:
+    """Why the model does not run, with the parameters of the mapping whose variables it names."""
+    named = [
+        f"{p.name} ({quantity(p.nominal, p.unit)})"
+        for p in (*problem.parameters, *problem.late)
+        if any(re.search(rf"{re.escape(target)}(?![\w.\[])", str(error)) for target, _ in p.targets)
+    ]
+    by = f" with parameter {', '.join(named)} of {problem.source.path}" if named else ""
+    return f"the model does not run{by}: {error}"

@@ -117,6 +117,11 @@ NO_SOURCE = Source()
 """Of data that no mapping was read for."""
 
 
+def quantity(value: float, unit: str, digits: str = ".4g") -> str:
+    """A number with its unit, if it has one."""
+    return f"{value:{digits}} {unit}".rstrip()
+
+
 def check_allowed(kinds: Iterable[str], path: Path) -> frozenset[str]:
     """Kinds that a mapping lets pass.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimate import channel_rms
-from .finding import Finding
+from .finding import Finding, quantity
 from .still import held
 
 if TYPE_CHECKING:
@@ -112,8 +112,9 @@ def check_stated(estimate: Estimate) -> Iterator[Finding]:
         (size, falls), rest = carried, left[channel.name]
         if size < QUIET and falls > WHITE and rest < QUIET:
             text = (
-                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit}, "
-                f"and the fit leaves {rest:.2g} of it: what is smaller than that stays hidden, and "
+                f"carries {size:.2g} of its stated noise of "
+                f"{quantity(channel.sigma, channel.unit)}, and the fit leaves {rest:.2g} of it: "
+                "what is smaller than that stays hidden, and "
                 f"intervals come out too wide; state sigma = {size * channel.sigma:.3g}"
             )
             yield Finding("warning", "noise", "", channel.name, text)
@@ -142,16 +143,18 @@ def check_smooth(problem: Problem) -> Iterator[Finding]:
         instrument = channel.name in problem.source.instruments
         if size > LOUD and falls > WHITE:
             text = (
-                f"carries {size:.3g} times its stated noise of {channel.sigma:.4g} {channel.unit}: "
-                "intervals come out too narrow, and noise may be taken for physics; state "
+                f"carries {size:.3g} times its stated noise of "
+                f"{quantity(channel.sigma, channel.unit)}: intervals come out too narrow, and "
+                "noise may be taken for physics; state "
                 f"sigma = {size * channel.sigma:.3g}"
             )
             yield Finding("warning", "noise", "", channel.name, text)
         if size < QUIET and (instrument or falls < FALLS):
             text = (
-                f"carries {size:.2g} of its stated noise of {channel.sigma:.4g} {channel.unit} "
-                "near half the sample rate: it was low-passed or interpolated, or its noise is "
-                "another; take the raw column, or state its noise as sigma"
+                f"carries {size:.2g} of its stated noise of "
+                f"{quantity(channel.sigma, channel.unit)} near half the sample rate: it was "
+                "low-passed or interpolated, or its noise is another; take the raw column, or "
+                "state its noise as sigma"
             )
             quiet.append((channel.name, text, instrument))
     whole = len(quiet) == count

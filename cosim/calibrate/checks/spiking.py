@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..columns import spikes
-from .finding import Finding
+from .finding import Finding, quantity
 
 if TYPE_CHECKING:
     from ..problem import Problem
@@ -69,9 +69,10 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             harm = float(np.nansum(((values[at] - beside) / channel.sigma) ** 2)) / values.size
             text = (
                 f"has {at.size} single samples that stand out, the first at "
-                f"{run.logged[at[0]]:.6g} s, the largest {values[worst]:.6g} {channel.unit} at "
-                f"{run.logged[worst]:.6g} s between {values[worst - 1]:.6g} and "
-                f"{values[worst + 1]:.6g}: faults of the log; make gaps of them with "
+                f"{run.logged[at[0]]:.6g} s, the largest "
+                f"{quantity(values[worst], channel.unit, '.6g')} at {run.logged[worst]:.6g} s "
+                f"between {values[worst - 1]:.6g} and {values[worst + 1]:.6g}: "
+                "faults of the log; make gaps of them with "
                 "despike = true (or limit) in [columns]"
             )
             severity = "error" if harm > HARM else "warning"

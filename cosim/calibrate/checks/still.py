@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parts import Channel, MeasuredRun
-from .finding import Finding
+from .finding import Finding, quantity
 from .times import SHORT
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def check_still(problem: Problem) -> Iterator[Finding]:
         values = np.concatenate([run.data[:, index] for run in problem.runs])
         values = values[np.isfinite(values)]
         if values.size and np.ptp(values) == 0.0:
-            text = f"is {values[0]:g} {channel.unit} in all runs: a constant channel says nothing"
+            value = quantity(values[0], channel.unit, "g")
+            text = f"is {value} in all runs: a constant channel says nothing"
             yield Finding("error", "constant", "", channel.name, text)
 
 
@@ -61,7 +62,7 @@ def _column(channel: Channel, run: MeasuredRun, data: Vector) -> Iterator[Findin
         return
     changes = np.flatnonzero(np.diff(values) != 0.0)
     if not changes.size:
-        text = f"is {values[0]:g} {channel.unit} throughout: a constant channel"
+        text = f"is {quantity(values[0], channel.unit, 'g')} throughout: a constant channel"
         yield Finding("error", "constant", run.name, channel.name, text)
         return
     if period := held(values, channel.sigma):
@@ -78,7 +79,7 @@ def _column(channel: Channel, run: MeasuredRun, data: Vector) -> Iterator[Findin
         return
     start = int(edges[int(np.argmax(np.diff(edges)))]) + 1
     text = (
-        f"stands at {values[start]:.6g} {channel.unit} for {longest} samples from "
+        f"stands at {quantity(values[start], channel.unit, '.6g')} for {longest} samples from "
         f"{run.logged[good][start]:.4g} s on, "
     )
     # rounding hides noise that is smaller than the quantum: a machine at rest reads so, too; and it

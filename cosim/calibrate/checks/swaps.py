@@ -113,8 +113,8 @@ def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Findi
                 continue  # none, or whole runs
             channel = problem.channels[crossed.index(True)]
             text = (
-                f"and run {second.name}: each follows {channel.signal} as it is in the other one, "
-                "and no other column does: exchanged between the runs"
+                f"is exchanged with that of run {second.name}: each follows {channel.signal} as it "
+                "is in the other one, and no other column does"
             )
             yield Finding("error", "swapped", first.name, channel.name, text)
 
@@ -173,8 +173,8 @@ def check_inputs(
                 trial.close()
             if _cost(problem, run, model) < 0.1 * straight:
                 columns = [run.inputs[n].text.rpartition(":")[2] for n in (first, second)]
-                text = f"and {columns[1]} explain the data far better exchanged: swapped columns"
-                yield Finding("error", "swapped", "", columns[0], text)
+                text = "explain the data far better exchanged: the two columns look swapped"
+                yield Finding("error", "swapped", "", " and ".join(columns), text)
 
 
 def _cost(problem: Problem, run: MeasuredRun, model: Vector) -> float:
