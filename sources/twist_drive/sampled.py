@@ -96,12 +96,18 @@ def equations(m: Model) -> None:
 
     v_x = forward - turn * p.l_A * ca.sin(p.alpha_A)
     v_y = left + turn * p.l_A * ca.cos(p.alpha_A)
+    # what each wheel's own node on the bus is told, row by row
+    told = ca.horzcat(v_x, v_y, ca.repmat(turn, 3))
+    told += ca.vertcat(
+        *(m.balance(f"node_{i + 1}", "bundle", value=told[i, :].T).effort.T for i in range(3))
+    )
+    v_x, v_y, turns = ca.horzsplit(told)
     along = ca.cos(beta) * v_x + ca.sin(beta) * v_y
     across = ca.cos(beta) * v_y - ca.sin(beta) * v_x
     error = along / p.r_c + u.phid
     wanted = p.Kp_d * error + z.integral
     set_d = ca.fmax(-p.i_d_max, ca.fmin(wanted, p.i_d_max))
-    steering = p.Kp_s * (across / p.e_c - turn - u.betad)
+    steering = p.Kp_s * (across / p.e_c - turns - u.betad)
     set_s = ca.fmax(-p.i_s_max, ca.fmin(steering, p.i_s_max))
     free = ca.fabs(wanted) < p.i_d_max
     share = -ca.expm1(-p.T / p.T_i) * p.T_i / p.T

@@ -196,3 +196,18 @@ def test_a_current_loop_believes_its_sensor() -> None:
     np.testing.assert_allclose(vector(after, "i_d"), shown / [1.0, 1.0 + g, 1.0], rtol=1e-12)
     torque = vector(after, "tau_phi") / vector(before, "tau_phi")
     np.testing.assert_allclose(torque, [1.0, 1.0 / (1.0 + g), 1.0], rtol=3e-3)
+
+
+def test_a_wheel_whose_node_is_late_does_what_it_would_have_done() -> None:
+    """Some ticks later, with steering and rolling; the other wheels know nothing of it."""
+    late = 7
+    plain = Stepper("twist_drive/sampled")
+    one = Stepper("twist_drive/sampled+delay@node_3", {"node_3.delay.t_d": late * TICK})
+    twists = [{"vx_set": 0.002 * k, "vy_set": 0.001 * k, "w_set": 0.003 * k} for k in range(40)]
+    before, after = ([d.step(twist, TICK) for twist in twists] for d in (plain, one))
+    for name in ("i_d", "i_s"):
+        now, then = (np.array([vector(row, name) for row in rows]) for rows in (before, after))
+        np.testing.assert_allclose(then[:, :2], now[:, :2], rtol=1e-14)  # rounding
+        # the delay reads between its own samples: rounding of their times
+        np.testing.assert_allclose(then[late:, 2], now[:-late, 2], atol=1e-9)
+        assert np.all(np.abs(now[5:, 2]) > 1e-3)
