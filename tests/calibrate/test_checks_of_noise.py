@@ -1,4 +1,4 @@
-"""A stated noise that is too large for anything that a column carries or a fit leaves."""
+"""A stated noise that is too large, and noise that is absent at a limit of short peaks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate import Problem
+from cosim.calibrate.checks.clipped import check_clipped
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding
 from cosim.calibrate.checks.smooth import check_stated
 
@@ -57,3 +58,24 @@ def test_a_noise_that_holds_slow_errors_too_is_no_fault(noisy, exact) -> None:
     """A pose from scans trembles by a tenth of what it is off; then a fit leaves what is stated."""
     assert after_a_fit(stated(noisy(0), 10.0), exact, 1.0) == []
     assert after_a_fit(stated(noisy(0), 1.0), exact) == []
+
+
+@pytest.mark.parametrize(
+    ("peaks", "limit", "named"),
+    [(6, 8.0, True), (6, 99.0, False), (2, 8.0, False)],
+    ids=["short stretches at a limit", "no limit", "too few to tell"],
+)
+def test_a_sensor_that_ends_in_short_peaks(peaks: int, limit: float, named: bool) -> None:
+    """Five samples of each peak are at the limit: 30 in all, or ten and less."""
+    times = np.arange(3000)
+    true = sum(12.0 * np.exp(-(((times - 400 * k - 200) / 4.0) ** 2)) for k in range(peaks))
+    noise = 0.02 * np.random.default_rng(4).standard_normal(times.size)
+    data = np.minimum(true + noise, limit)
+    assert np.sum(data == 8.0) == (0 if limit > 8.0 else 5 * peaks)
+    if peaks == 2:  # one of five within the noise: 9 of 10, by chance once in 30 000
+        data[np.flatnonzero(data == 8.0)[0]] -= 0.03
+    run: Any = SimpleNamespace(name="A", data=data[:, None])
+    channel = SimpleNamespace(name="current", unit="A", sigma=0.02)
+    problem: Any = SimpleNamespace(runs=[run], channels=[channel])
+    found = list(check_clipped(problem, {"A": np.asarray(true)[:, None]}))
+    assert [f.text.split()[3] for f in found] == (["largest"] if named else [])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from .finding import Finding, quantity
 from .smooth import noise
@@ -20,6 +21,11 @@ BAND = 3.0
 """Deviations of the noise below its largest value in which a column is looked at."""
 MOST = 0.5
 """Share of these samples that have the largest value itself, from which it is a limit."""
+TOP = 0.25
+"""Share of them that have it by chance, at most."""
+CHANCE = 1e-6
+"""Probability of so many by chance below which fewer than `SHORT` samples tell, too: ten of ten, or
+20 of 28. A sensor that ends during short peaks has no more."""
 
 
 def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
@@ -28,9 +34,10 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
     A column with noise finer than its resolution has ever fewer samples towards its largest value:
     noise is unimodal, and so is what a smooth signal adds to it near its top. Half of all samples
     within three deviations having that very value is no noise: the top one of four or more steps of
-    a falling histogram has a quarter at most, so half of `SHORT` (50) samples and more have a
-    probability below 1e-4. And the model must go beyond the value at most of them: a machine that
-    stops at a limit which its model has as well is no such case, nor is a command without noise.
+    a falling histogram has a quarter at most (`TOP`), so half of `SHORT` (50) samples and more have
+    a probability of 1e-4, and fewer must have one below `CHANCE`. And the model must go beyond the
+    value at most of them: a machine that stops at a limit which its model has as well is no such
+    case, nor is a command without noise.
     """
     for index, channel in enumerate(problem.channels):
         columns = {run.name: run.data[:, index] for run in problem.runs}
@@ -42,7 +49,8 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
             at = {name: v == edge for name, v in columns.items()}
             count = sum(int(np.sum(a)) for a in at.values())
             near = sum(int(np.sum(side * (edge - v) <= BAND * sigma)) for v in columns.values())
-            if count < SHORT or count < MOST * near:
+            by_chance = float(bdtrc(count - 1, near, TOP)) if 0 < count < near else TOP**count
+            if count < MOST * near or (count < SHORT and by_chance > CHANCE):
                 continue
             beyond = [
                 side * (models[name][a, index] - edge) > BAND * channel.sigma
