@@ -5,8 +5,9 @@ from -a to a. Its ground point slides with u, the floor answers with f:
 
     u = (v_x - y_t w_z - r w_t,  v_y + x_i w_z),   f = -N_i (mu u_x, mu_lat u_y)/max(|u|, u_0)
 
-(linear below u_0). The loads N_i carry the weight and what effects add, quasi-statically and
-linear in x and y over the road wheels:
+(linear below u_0). A track that stands askew (its `toe` about its middle, an effect's) has these
+in axes of its own: its road wheels lie along it, its belt moves along it. The loads N_i carry the
+weight and what effects add, quasi-statically and linear in x and y over the road wheels:
 
     N_i = P/(2n) + x_i T_x/(2 sum x_i^2) + y_t T_y/(2n (B/2)^2)
     P = m g - F_z,  T_x = m g x_G + M_y,  T_y = m g y_G - M_x
@@ -90,6 +91,12 @@ def equations(m: Model) -> None:
     side = ca.vertcat(-ca.DM.ones(count), ca.DM.ones(count))
     across = side * p.B / 2
     belt = p.r * ca.vertcat(ca.repmat(speeds.w2, count), ca.repmat(speeds.w3, count))
+    toe: SX = ca.vertcat(
+        *(
+            ca.repmat(m.balance(name, "coefficient", unit="rad", value=0).effort, count)
+            for name in ("toe_right", "toe_left")
+        )
+    )
 
     load = m.balance("load", "position", value=ca.vertcat(p.x_G, p.y_G, p.z_G))
     centre = ca.vertcat(p.x_G, p.y_G, p.z_G) + load.effort
@@ -117,13 +124,16 @@ def equations(m: Model) -> None:
         across,
         count,
     )
-    forward = v_x - across * w_z
-    slide_x, slide_y = forward - belt, v_y + along * w_z
+    # in the axes of each track, which stand askew by its toe about its middle
+    ahead, beside = along * ca.cos(toe), across + along * ca.sin(toe)
+    forward, slide_y = _turned(toe, v_x - beside * w_z, v_y + ahead * w_z)
+    slide_x = forward - belt
     sliding = ca.sqrt(slide_x**2 + slide_y**2 + 1e-24)  # the floor keeps the slope at rest
-    mu_long, mu_lat = _friction(m, p.mu, side, pose, along, across, sliding)
+    mu_long, mu_lat = _friction(m, p.mu, side, pose, ahead, beside, sliding)
     scale = normal / ca.fmax(sliding, p.u_0)
-    f_x, f_y = -mu_long * scale * slide_x, -mu_lat * scale * slide_y
+    grip, across_grip = -mu_long * scale * slide_x, -mu_lat * scale * slide_y
     rolling = -p.f_r * normal * ca.tanh(forward / p.v_r)
+    f_x, f_y = _turned(-toe, grip + rolling, across_grip)
     pivot = m.balance(
         "pivot", "pivot", spin=w_z, rolling=ca.sqrt(v_x**2 + 1e-12), normal=ca.sum1(normal)
     )
@@ -133,9 +143,9 @@ def equations(m: Model) -> None:
         first[0],
         first[1],
         about_origin,
-        ca.sum1(f_x + rolling) + body.effort[0],
+        ca.sum1(f_x) + body.effort[0],
         ca.sum1(f_y) + body.effort[1],
-        ca.dot(along, f_y) - ca.dot(across, f_x + rolling) + body.effort[5] + pivot.effort,
+        ca.dot(ahead, f_y) - ca.dot(beside, f_x) + body.effort[5] + pivot.effort,
         w_z,
     )
     m.derivative(v_x, a_x + w_z * v_y)
@@ -148,7 +158,7 @@ def equations(m: Model) -> None:
     m.output(V_Y, v_y)
     m.output(X_AXIS, -v_y * w_z / (w_z**2 + YAW_RATE_FLOOR**2))
 
-    pull2, pull3 = p.r * ca.sum1(f_x[:count]), p.r * ca.sum1(f_x[count:])
+    pull2, pull3 = p.r * ca.sum1(grip[:count]), p.r * ca.sum1(grip[count:])
     right = m.balance("sprocket_right", "rotation", velocity=speeds.w2_in, load=pull2)
     left = m.balance("sprocket_left", "rotation", velocity=speeds.w3_in, load=pull3)
     m.port(qs.SPROCKET_RIGHT, m.output(qs.TAU2, pull2 - right.effort), speeds.w2_in)
@@ -159,8 +169,13 @@ def equations(m: Model) -> None:
     m.stored_energy(
         planar_body.kinetic_energy(total, first[0], first[1], about_origin, v_x, v_y, w_z)
     )
-    m.loss("sliding", -ca.dot(f_x, slide_x) - ca.dot(f_y, slide_y))
+    m.loss("sliding", -ca.dot(grip, slide_x) - ca.dot(across_grip, slide_y))
     m.loss("rolling", -ca.dot(rolling, forward))
+
+
+def _turned(angle: SX, x: SX, y: SX) -> tuple[SX, SX]:
+    """Vectors in axes that are turned to the left by an angle each."""
+    return ca.cos(angle) * x + ca.sin(angle) * y, ca.cos(angle) * y - ca.sin(angle) * x
 
 
 def _loads(weight: SX, pitch: SX, roll: SX, along: SX, across: SX, count: int) -> SX:

@@ -53,5 +53,6 @@ def test_effect(name: str) -> None:
     check_energy(name)
     check_absence(name)
     check_rest(name)
-    if "track_contact" in name:
+    # a curve over a toe is one over what is 0
+    if "track_contact" in name and "fitted_law@toe" not in name:
         check_presence(name)

@@ -305,3 +305,39 @@ def test_turning_friction_is_the_same_at_every_speed_along(speed: float) -> None
         assert some["vel_x"] == bare["vel_x"] and some["vel_y"] == bare["vel_y"]
         out = model.outputs({**state, "turning_friction.M_t": 1.5})
         assert out["turning_friction.P_loss"] == pytest.approx(-torque * rate, rel=1e-12)
+
+
+@pytest.mark.parametrize("toes", [(0.0, 0.0), (0.05, 0.0), (0.03, -0.08)])
+def test_tracks_that_stand_askew_push_along_their_own_axes(toes: tuple[float, float]) -> None:
+    """Road wheel by road wheel, with forces as complex numbers in world axes."""
+    values = {name: origin.value for name, origin in device_values("crawler", "lab").items()}
+    r, width, a, mu, mass, inertia = (
+        float(values[n]) for n in ("r", "B", "a", "mu", "mass", "yaw_inertia")
+    )
+    count, gravity, f_r = int(values["road_wheels"]), 9.81, 0.04
+    v_x, v_y, w_z, speeds = 0.12, 0.03, 0.4, (3.0, 1.5)
+    force, moment = 0j, 0.0
+    for side, speed, toe in zip((-1, 1), speeds, toes, strict=True):
+        way = complex(math.cos(toe), math.sin(toe))
+        for k in range(count):
+            place = 1j * side * width / 2 + a * (2 * k / (count - 1) - 1) * way
+            moving = complex(v_x, v_y) + 1j * w_z * place
+            slide = moving - r * speed * way
+            along = (moving * way.conjugate()).real
+            load = mass * gravity / (2 * count)
+            push = -mu * load * slide / max(abs(slide), 1e-3)
+            push -= f_r * load * math.tanh(along / 5e-3) * way
+            force += push
+            moment += (place.conjugate() * push).imag
+    names = ("toe_right", "toe_left")
+    variant = "".join(f"+toe_angle@{name}" for name in names)
+    given = {f"{n}.toe_angle.delta": d for n, d in zip(names, toes, strict=True)}
+    found = oracle(f".lab/track_contact{variant}").derivatives(
+        {"vel_x": v_x, "vel_y": v_y, "yaw_rate": w_z, "w2": speeds[0], "w3": speeds[1],
+         "f_r": f_r, "x_G": 0.0, "y_G": 0.0, **given}
+    )  # fmt: skip
+    turned = complex(found["vel_x"], found["vel_y"]) + 1j * w_z * complex(v_x, v_y)
+    # the component keeps sliding from 0 by 1e-12 m/s, and tabulates nothing: rounding
+    assert mass * turned.real == pytest.approx(force.real, rel=1e-9)
+    assert mass * turned.imag == pytest.approx(force.imag, rel=1e-9)
+    assert inertia * found["yaw_rate"] == pytest.approx(moment, rel=1e-9)
