@@ -79,3 +79,20 @@ def test_a_sensor_that_ends_in_short_peaks(peaks: int, limit: float, named: bool
     problem: Any = SimpleNamespace(runs=[run], channels=[channel])
     found = list(check_clipped(problem, {"A": np.asarray(true)[:, None]}))
     assert [f.text.split()[3] for f in found] == (["largest"] if named else [])
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_value_that_is_held_where_a_log_ends_is_no_limit(again: bool) -> None:
+    """Of an angle that rises; it is one where the motion meets it three times."""
+    times = np.arange(3000)
+    true = np.abs(np.mod(times, 1000.0) if again else times) / 100.0
+    noise = 0.02 * np.random.default_rng(4).standard_normal(times.size)
+    data = true + noise
+    top = float(np.max(data)) + 0.01
+    for end in (1000, 2000, 3000) if again else (3000,):
+        data[end - 12 : end] = top
+    run: Any = SimpleNamespace(name="A", data=data[:, None])
+    channel = SimpleNamespace(name="angle", unit="rad", sigma=0.02)
+    problem: Any = SimpleNamespace(runs=[run], channels=[channel])
+    found = list(check_clipped(problem, {"A": (true + 1.0)[:, None]}))
+    assert len(found) == again

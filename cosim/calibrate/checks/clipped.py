@@ -26,6 +26,9 @@ TOP = 0.25
 CHANCE = 1e-6
 """Probability of so many by chance below which fewer than `SHORT` samples tell, too: ten of ten, or
 20 of 28. A sensor that ends during short peaks has no more."""
+TIMES = 3
+"""Stretches at a limit that fewer samples than `SHORT` must make: a value that is held for a while,
+where a log ends or a message is lost, is the largest once, and does not come again."""
 
 
 def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
@@ -35,9 +38,9 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
     noise is unimodal, and so is what a smooth signal adds to it near its top. Half of all samples
     within three deviations having that very value is no noise: the top one of four or more steps of
     a falling histogram has a quarter at most (`TOP`), so half of `SHORT` (50) samples and more have
-    a probability of 1e-4, and fewer must have one below `CHANCE`. And the model must go beyond the
-    value at most of them: a machine that stops at a limit which its model has as well is no such
-    case, nor is a command without noise.
+    a probability of 1e-4, and fewer must have one below `CHANCE`, at several times (`TIMES`). And
+    the model must go beyond the value at most of them: a machine that stops at a limit which its
+    model has as well is no such case, nor is a command without noise.
     """
     for index, channel in enumerate(problem.channels):
         columns = {run.name: run.data[:, index] for run in problem.runs}
@@ -50,7 +53,8 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
             count = sum(int(np.sum(a)) for a in at.values())
             near = sum(int(np.sum(side * (edge - v) <= BAND * sigma)) for v in columns.values())
             by_chance = float(bdtrc(count - 1, near, TOP)) if 0 < count < near else TOP**count
-            if count < MOST * near or (count < SHORT and by_chance > CHANCE):
+            often = sum(int(np.sum(a & ~np.append(False, a[:-1]))) for a in at.values())
+            if count < MOST * near or (count < SHORT and (by_chance > CHANCE or often < TIMES)):
                 continue
             beyond = [
                 side * (models[name][a, index] - edge) > BAND * channel.sigma
