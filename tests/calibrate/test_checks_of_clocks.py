@@ -53,6 +53,20 @@ def test_stamps_that_are_off_by_a_fifth_of_the_interval_jitter(
     assert [f.run for f in found] == ([run.name for run in runs] if named else [])
 
 
+@pytest.mark.parametrize("off", [0.0, 0.2])
+def test_lost_rows_are_no_jitter_of_what_is_even(noisy, off: float) -> None:
+    """Of 2000 rows each 20th is lost: the intervals deviate by 0.22 of the usual one."""
+    problem, random = noisy(0), np.random.default_rng(8)
+    runs = []
+    for run in problem.runs:
+        kept = np.arange(run.times.size) % 20 != 10
+        times = run.times + off * 1e-3 * random.uniform(-1.0, 1.0, run.times.size)
+        runs.append(replace(run, times=times[kept], data=run.data[kept]))
+    problem = problem.changed(runs=runs, source=NO_SOURCE)
+    assert bool(of_kind(problem, "jitter")) == (off > 0.0)
+    assert bool(of_kind(problem, "gap")) == (off == 0.0)
+
+
 @pytest.mark.parametrize(
     ("factor", "period", "severity", "said"),
     [
