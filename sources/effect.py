@@ -122,6 +122,7 @@ KINDS: dict[str, Kind] = {
     "position": Kind("m", "", _names(value="the undisturbed position, body axes [m], 3")),
     "pose": Kind("", "", _names(value="the undisturbed planar pose x [m], y [m], yaw [rad], 3")),
     "point": Kind("m", "", _names(value="the undisturbed point in a fixed frame [m], 2 or 3")),
+    "picture": Kind("m", "", _names(value="points in a picture [m]: x of all, then y of all")),
     "scale": Kind("1", "", _names(value="the undisturbed scale of a picture")),
     "bundle": Kind("", "", _names(value="signals of several units that travel together")),
     "gravity": Kind("m/s2", "", _names(value="gravity, in axes taken as level [m/s2], 3")),

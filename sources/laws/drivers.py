@@ -14,7 +14,9 @@ from ..quantity import Quantity
 STATIC = ("position", "gravity")
 """Kinds of balances that a component takes as constant in time: a mass centre that moves would have
 to be accelerated, which no equation accounts for."""
-MOVING = tuple(kind for kind in KINDS if kind not in STATIC)
+MANY = ("picture",)
+"""Kinds of many points, each of which would have a curve of its own."""
+MOVING = tuple(kind for kind in KINDS if kind not in (*STATIC, *MANY))
 """The other kinds."""
 SIDE = ("longitudinal", "side", "radius", "resistance", "emf_constant", "stiffness", "mass")
 """Signals that hardly vary or mean a configuration."""

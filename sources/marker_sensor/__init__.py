@@ -44,4 +44,6 @@ def markers(m: Model) -> tuple[SX, SX]:
     x, y = rotated(p.phi_frame, pose[0] + x, pose[1] + y)
     x, y = x + p.x_frame, y + p.y_frame
     scale = 1 + m.balance("scale", "scale", unit="1", value=ca.SX(1)).effort
-    return scale * x, scale * y
+    seen = scale * ca.vertcat(x, y)
+    seen += m.balance("picture", "picture", value=seen).effort
+    return seen[:MARKERS], seen[MARKERS:]

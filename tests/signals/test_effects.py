@@ -211,6 +211,26 @@ def test_share_selects_an_element_of_a_vector() -> None:
     assert out["w_r_ref"] == pytest.approx(1.1 * 101.67, rel=1e-14)
 
 
+@pytest.mark.parametrize("k", [2e-3, -5e-3])
+def test_a_lens_moves_markers_along_their_rays(k: float) -> None:
+    """With the square of how far they are from the axis; the axis itself stands."""
+    at = {"x": 2.0, "y": 1.0, "phi": 0.5}
+    lens = {"lens_distortion.k": k, "lens_distortion.centre[1]": 0.4,
+            "lens_distortion.centre[2]": -0.3}  # fmt: skip
+    plain = outputs("marker_sensor/ideal", at)
+    found = outputs("marker_sensor/ideal+lens_distortion", at | lens)
+    seen = outputs("pose_sensor/ideal+lens_distortion@position", at | {
+        name.replace("lens", "position.lens"): value for name, value in lens.items()
+    })  # fmt: skip
+    pairs = [(plain, found, f"x_m[{i}]", f"y_m[{i}]") for i in range(1, 6)]
+    pairs.append((outputs("pose_sensor/ideal", at), seen, "x_meas", "y_meas"))
+    for before, after, x, y in pairs:
+        ray = complex(before[x], before[y]) - (0.4 - 0.3j)
+        moved = complex(after[x], after[y]) - (0.4 - 0.3j)
+        # some ten operations of 1e-16 on metres
+        assert moved == pytest.approx(ray * (1.0 + k * abs(ray) ** 2), rel=1e-13)
+
+
 def test_scale_error_stretches_way_and_body() -> None:
     """All distances between measured points grow alike, from the frame's origin on."""
     values = {"x": 2.0, "y": 1.0, "phi": 0.5, "scale_error.error": 0.01}
