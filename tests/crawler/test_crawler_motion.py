@@ -341,3 +341,21 @@ def test_tracks_that_stand_askew_push_along_their_own_axes(toes: tuple[float, fl
     assert mass * turned.real == pytest.approx(force.real, rel=1e-9)
     assert mass * turned.imag == pytest.approx(force.imag, rel=1e-9)
     assert inertia * found["yaw_rate"] == pytest.approx(moment, rel=1e-9)
+
+
+def test_what_is_dragged_pulls_against_the_motion_of_its_point() -> None:
+    values = {name: origin.value for name, origin in device_values("crawler", "lab").items()}
+    force, place, moving, w_z = 2.0, complex(-0.21, 0.04), complex(0.08, -0.02), 0.3
+    model = oracle(".lab/track_contact+towed_friction@body")
+    state = {"vel_x": moving.real, "vel_y": moving.imag, "yaw_rate": w_z, "w2": 2.0, "w3": 1.0}
+    law = {"body.towed_friction.place[1]": place.real, "body.towed_friction.place[2]": place.imag}
+    some, none = (
+        model.derivatives(state | law | {"body.towed_friction.F": f}) for f in (force, 0.0)
+    )
+    point = moving + 1j * w_z * place
+    pull = -force * point / math.sqrt(abs(point) ** 2 + 3e-3**2)
+    change = complex(some["vel_x"] - none["vel_x"], some["vel_y"] - none["vel_y"])
+    # differences of accelerations of some m/s2
+    assert float(values["mass"]) * change == pytest.approx(pull, rel=1e-12)
+    turned = float(values["yaw_inertia"]) * (some["yaw_rate"] - none["yaw_rate"])
+    assert turned == pytest.approx((place.conjugate() * pull).imag, rel=1e-12)
