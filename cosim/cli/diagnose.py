@@ -136,6 +136,8 @@ def _print(result: Diagnosis) -> None:
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())
+        if held := ", ".join(f"{name} = {value:.4g}" for name, value in effect["held"].items()):
+            values += f"; held: {held}"
         console.print(f"  {effect['effect']} at {effect['place']}: {values}", soft_wrap=True)
         if found := effect["other_places"]:
             others = " or ".join(o if " at " in o else f"at {o}" for o in found)

@@ -164,6 +164,7 @@ class Verdict:
                 "place": law.place,
                 "text": law.text,
                 "parameters": parameters(law),
+                "held": dict(law.held),
                 "p_value": law.p_value,
                 "explained": self.shares[law.label],
                 "gain_nats": law.missed.fitted if law.missed else None,

@@ -72,6 +72,8 @@ class Law:
         missed: what the model is better by than the one without this law; None if not known.
         tick: the least strength that shifts something by a tick of the rig, 0 if it shifts nothing
             in time: a smaller one says when within a tick something is read.
+        held: its other parameters, and the values at which they were held: as they are usually, or
+            as the search has chosen them (cycles per turn).
     """
 
     effect: str
@@ -87,6 +89,7 @@ class Law:
     p_value: float | None = None
     missed: Gain | None = None
     tick: float = 0.0
+    held: tuple[tuple[str, float], ...] = ()
 
     @property
     def place(self) -> str:

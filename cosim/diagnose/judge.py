@@ -123,6 +123,8 @@ class Judge:
             p_value,
             None if less is None else self.better(less, fitted),
             tick_of(self.raw, candidate.effect, strength.unit),
+            tuple((n.removeprefix(prefix), problem.held[n])
+                  for n in sorted(names - set(problem.names))),
         )  # fmt: skip
 
     def count_in_full(self, full: bool = True) -> Problem:

@@ -12,7 +12,7 @@ from ..diagnose.story.facts import Facts, named_unit
 from ..diagnose.story.verdicts import label
 from ..diagnose.whiteness import CALIBRATED
 from ..display.document import section
-from ..display.html import Cell, Html, explained, join, number, table, tag
+from ..display.html import Cell, Html, explained, join, number, table, tag, words
 from ..display.series import Store
 from .figures import unknown_curve, used
 from .material import Material
@@ -83,6 +83,9 @@ def effects(facts: Facts, symbols: Mapping[str, str]) -> Html:
             tag("h3", label(item["effect"], item["place"])),
             tag("p", *said),
             table(_head("parameter", "value", "95 % interval"), rows, "parameters of the effect"),
+            tag("p", "Held: ", words([join(name, " = ", facts.number("effects", n, "held", name))
+                                      for name in item["held"]]), ".", class_="note")
+            if item["held"] else "",
             tag("p", f"The data do not tell it from: {places}.", class_="note")
             if places else "",
         ]  # fmt: skip

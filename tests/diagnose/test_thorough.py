@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,6 +13,8 @@ import pytest
 
 from cosim.calibrate.simulator import Simulator
 from cosim.diagnose import fitter
+from cosim.diagnose.answer import Verdict
+from cosim.diagnose.facts import Model, Table
 from cosim.diagnose.localise import localise
 from cosim.errors import CosimError
 from cosim.spec.hints import SearchHints
@@ -51,6 +54,16 @@ def test_a_fit_of_the_memo_comes_back_with_derivatives(rig: built.Rig, unstable:
     assert found.labels == known.labels and len(found.estimate.jacobian) == 2
     assert rig.search.gain(known, found) == pytest.approx(0.0, abs=0.1)  # the last steps of a fit
     assert localise(rig.search, found, [rig.candidate("coulomb")], rig.said.append)
+
+
+def test_what_was_held_of_a_law_is_said(rig: built.Rig) -> None:
+    model = rig.added(rig.base, "coulomb", {"tau_c": 0.03}, held={"w_0": 1e-3})
+    law = rig.search.law(model, model.effects[-1])
+    assert [v.name for v in law.values] == ["tau_c"] and law.held == (("w_0", 1e-3),)
+    table = Table(models=(Model((law,), 3, 1.0, 0.0, ()),))
+    assert Table.read(json.loads(json.dumps(table.to_dict()))) == table
+    (told,) = Verdict("effect_found", laws=(law,), shares={law.label: 1.0}).effects()
+    assert told["held"] == {"w_0": 1e-3}
 
 
 def test_no_model_takes_values_of_a_grid_at_which_it_was_not_fitted(

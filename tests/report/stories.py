@@ -25,7 +25,8 @@ EFFECT: dict[str, Any] = {
                   "identifiable": True},
         "w_0": {"value": 0.002, "ci95": [1e-6, 0.2], "unit": "rad/s", "identifiable": False},
     },
-    "p_value": 1e-14, "explained": 0.98765, "gain_nats": 1234.5, "validation_gain_nats": 567.89,
+    "held": {"n": 2.0}, "p_value": 1e-14, "explained": 0.98765, "gain_nats": 1234.5,
+    "validation_gain_nats": 567.89,
     "other_places": ["gearbox.flange_a"],
 }  # fmt: skip
 PLACE: dict[str, Any] = {
