@@ -11,7 +11,7 @@ twice where two windings of a resolver differ in size or are not square to each 
 The same quantity has two roles: declared, it is a parameter of the mapping; undeclared, it is the
 effect `gain`, `bias` or `angle_ripple` at a column of the log (`Reading`).
 
-Not modelled: further harmonics; two of them are two parameters of the mapping, of one column each.
+Not modelled: further harmonics.
 
 Source: textbook; Hanselman, Resolver signal requirements for high accuracy resolver-to-digital
 conversion, IEEE Trans. Ind. Electron. 37(6), 1990.
@@ -45,9 +45,10 @@ on, and the one that is tried: half a degree, of a disc some tenths of a millime
 FEWEST, MOST_CYCLES, WINDING = 0.1, 200.0, 100.0
 """Cycles per turn, of the slow side of a gear or of all lines that an absolute track has, and the
 phase [rad], which winds without changing anything."""
-UNITS = {GAIN: "1", CYCLES: "1", PHASE: "rad"}
 KINDS = (GAIN, BIAS, WAVE, CYCLES, PHASE)
-"""Errors of a column, and the units of those that have not their column's."""
+"""Errors of a column."""
+UNITS = {GAIN: "1", CYCLES: "1", PHASE: "rad"}
+"""Units of those that have not their column's."""
 
 
 @dataclass(frozen=True)

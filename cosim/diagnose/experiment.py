@@ -74,8 +74,8 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
             distance = _left(first, run, stack, change)
         except CosimError:  # one that few parameter values can go through
             continue
-        repetitions = max(math.ceil(min((ENOUGH / max(distance, 1e-9)) ** 2, 1e9)), 1)
-        if repetitions > REPEATED:
+        needed = (ENOUGH / max(distance, 1e-9)) ** 2
+        if needed > REPEATED:
             continue
         squares = np.bincount(stack.channel, change**2, stack.channels)
         names = [c.name for c in first.problem.channels]
@@ -83,7 +83,7 @@ def propose(first: Fitted, second: Fitted) -> dict[str, Any] | None:
             "run": run.name,
             "input_factor": factor,
             "distance": distance,
-            "repetitions": repetitions,
+            "repetitions": max(math.ceil(needed), 1),
             "channels": dict(zip(names, np.sqrt(squares).tolist(), strict=True)),
         }
     return None

@@ -93,6 +93,7 @@ class Bench:
         self.residual = absorber.rest(self.root * residual)
         self.seen = (stack, self.residual) if seen is None else seen
         self.evaluations = 0
+        self.failed: dict[str, str] = {}
         self._lock = threading.Lock()
 
     def at(self, problem: Problem, values: Mapping[str, float]) -> Vector:
