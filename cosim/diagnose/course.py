@@ -130,14 +130,13 @@ class Course:
         """After a round that added a law; whether there is a further one."""
         result, search = self.result, self.search
         self._taken(stage)
+        asked = stage.open and not self.proposed and share(search, stage) < HALF
         one_place = bool(result.located) and result.located[0].curves[0].explained > ALL
-        if stage.open and not self.proposed and one_place and not search.raw.late:
+        if asked and one_place and not search.raw.late:
             asked_everywhere(result)
             asked_single(result)
         one = result.single
-        if stage.open and not self.proposed and (
-            ahead(search) or (one is not None and one.enough)
-        ):  # fmt: skip
+        if asked and (ahead(search) or (one is not None and one.enough)):
             self.proposed, found = True, proposed_set(result, self.current)
             if found is not self.current and not search.lacking(found):
                 self.whole = found
@@ -181,15 +180,21 @@ def slight(search: Search, stage: Round) -> bool:
 
     It is not what is missing then, and further ones on top of it would mislead.
     """
+    estimate, winner = stage.base.estimate, stage.winner
+    assert winner is not None
+    calibrated = estimate.robust < CALIBRATED**2 * 0.5 * estimate.count
+    if search.raw.unstable or calibrated or share(search, stage) > BRINGS:
+        return False
+    taken = percent(max(share(search, stage), 0.0))
+    search.say(f"not added: {winner.effects[-1].label}, {taken} of what is left")
+    return True
+
+
+def share(search: Search, stage: Round) -> float:
+    """What a round's law takes of what the model before leaves beyond noise."""
     base, winner = stage.base, stage.winner
     assert winner is not None
-    noise = 0.5 * base.estimate.count
-    beyond, gained = base.estimate.robust - noise, search.gain(base, winner)
-    if search.raw.unstable or beyond < (CALIBRATED**2 - 1.0) * noise or gained > BRINGS * beyond:
-        return False
-    share = percent(max(gained, 0.0) / beyond)
-    search.say(f"not added: {winner.effects[-1].label}, {share} of what is left")
-    return True
+    return search.gain(base, winner) / (base.estimate.robust - 0.5 * base.estimate.count)
 
 
 def asked_everywhere(result: Diagnosis) -> None:

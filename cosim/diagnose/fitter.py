@@ -421,7 +421,9 @@ class Fitter(Judge):
     def refined(
         self, base: Fitted, fitted: Fitted, *, quick: bool = False, share: float = QUICKLY
     ) -> Fitted:
-        """The fit with all parameters of its last effect free, if unused runs want that.
+        """The fit with all parameters of its last effect free, if fitted runs want that.
+
+        Unused ones must not refuse it.
 
         Args:
             base: model without the effect.
@@ -449,18 +451,13 @@ class Fitter(Judge):
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
         result = self.again(result, fitted, base)
-        if result.estimate.unkept > GATE and not self._wanted(fitted, result):  # it has stalled
+        if result.estimate.unkept > GATE and not self.freer(fitted, result):  # it has stalled
             fitted, result = (self.sharpened(f, base, draft=True) for f in (fitted, result))
-        if not self._wanted(fitted, result):
+        if not self.freer(fitted, result):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
         result = self.again(without_redundant(self, result, others), fitted, base)
         return result if quick else self.sharpened(result, base, draft=True)
-
-    def _wanted(self, fitted: Fitted, other: Fitted) -> bool:
-        """Whether all runs want another model instead."""
-        unused = compare(self.check_data, fitted.check, other.check, self.checking)
-        return self.gain(fitted, other) > GATE and unused.passed
 
     def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
         """A model fitted with derivatives of its own, as long as another does better and it helps.

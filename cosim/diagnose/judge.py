@@ -165,6 +165,15 @@ class Judge:
         """Whether unused runs want it, and it is worth a cause."""
         return fitted.gate is not None and fitted.gate.passed and self.material(base, fitted)
 
+    def freer(self, fitted: Fitted, other: Fitted) -> bool:
+        """Whether fitted runs want the same laws with more parameters free, and unused ones agree.
+
+        Unused runs decide on laws. Of a law that is there, a parameter that is held where fitted
+        runs say that it is not bends all others, so that unused ones, too, hardly miss it.
+        """
+        unused = compare(self.check_data, fitted.check, other.check, self.checking)
+        return self.gain(fitted, other) > GATE and unused.gain > 0.0
+
     def simplest(self, base: Fitted, best: Fitted, fitted: list[Fitted]) -> Fitted:
         """What explains the data as well as the best one, by fewer parameters.
 

@@ -134,7 +134,7 @@ def together(
 def _settled(search: Search, declared: Fitted, draft: Draft) -> Fitted:
     """The set fitted until nothing is gained, what the search's step adds taken off at each end.
 
-    At last with all of its other parameters that may take any value, if unused runs want that.
+    At last with all of its other parameters that may take any value, if fitted runs want that.
     """
     fitted = draft.fitted
     for _ in range(AGAIN):
@@ -144,9 +144,8 @@ def _settled(search: Search, declared: Fitted, draft: Draft) -> Fitted:
         if gained <= GATE:
             break
     found = _again(search, Draft(fitted, draft.whole, draft.held), draft.counted, DRAFT)
-    if found is not None and search.gain(fitted, found.fitted) > GATE:
-        wanted = compare(search.check_data, fitted.check, found.fitted.check, search.checking)
-        fitted = found.fitted if wanted.passed else fitted
+    if found is not None and search.freer(fitted, found.fitted):
+        fitted = found.fitted
     return search.sharpened(fitted, declared)
 
 
@@ -260,7 +259,7 @@ def _fit(
 
 
 def _shaped(search: Search, declared: Fitted, quick: Draft) -> Draft:
-    """The fit with the laws' other parameters where the data want them, if unused runs do, too.
+    """The fit with the laws' other parameters where fitted runs want them and unused ones agree.
 
     How sharply a law sticks has no derivative to speak of from far away, so sizes are tried, each
     with all else fitted again.
@@ -275,8 +274,7 @@ def _shaped(search: Search, declared: Fitted, quick: Draft) -> Draft:
                 if found is None or search.gain(best.fitted, found.fitted) <= GATE:
                     break
                 best = found
-    wanted = compare(search.check_data, quick.fitted.check, best.fitted.check, search.checking)
-    if best is quick or not wanted.passed:
+    if not search.freer(quick.fitted, best.fitted):
         return quick
     _note(search, declared, best.fitted)
     names = ", ".join(sorted(best.fitted.labels))

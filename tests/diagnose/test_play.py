@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.bench import Bench
-from benchmarks.motor_plant import draw, write_sets
+from benchmarks.motor_plant import D_TWIST, draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.rounds import Round
@@ -21,6 +21,8 @@ pytestmark = pytest.mark.slow
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
 CHOICE = {"backlash at gearbox", "elastic at gearbox", "coulomb at gearbox.flange_b"}
 GAP, COMPLIANCE = 3e-3, 1e-3
+DECLARED = 1.1
+"""Damping of a soft gear's twist in its FMU [N.m.s/rad]."""
 
 
 @pytest.fixture(scope="module")
@@ -59,3 +61,24 @@ def test_a_soft_gear_has_no_play(sets: dict[str, Path]) -> None:
     value = winner.estimate.values["gearbox.elastic.1/k"]
     # as above
     assert value == pytest.approx(COMPLIANCE, rel=0.05)
+
+
+def test_a_damping_that_is_not_the_fmus_is_fitted(sets: dict[str, Path]) -> None:
+    """Held at the FMU's value, it bends efficiency, friction and inertia by many deviations."""
+    winner = searched(sets["elastic_gear"]).winner
+    assert winner is not None
+    # as above
+    assert winner.estimate.values["gearbox.elastic.d"] == pytest.approx(D_TWIST, rel=0.05)
+
+
+def test_a_damping_that_is_the_fmus_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held, or fitted and found there."""
+    monkeypatch.setattr("benchmarks.motor_plant.D_TWIST", DECLARED)
+    plain = draw(np.random.default_rng(3)).parameters
+    bench = Bench(plain, "elastic_gear", COMPLIANCE)
+    (folder,) = write_sets(tmp_path, [bench], SHEET, 5, 2.0, ("ST", "MS", "LW"))
+    winner = searched(folder).winner
+    assert winner is not None
+    values = {**winner.problem.held, **winner.estimate.values}
+    # as above
+    assert values["gearbox.elastic.d"] == pytest.approx(DECLARED, rel=0.05)

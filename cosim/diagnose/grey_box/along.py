@@ -121,6 +121,19 @@ class Along:
                 shapes.append(Shape("x * y", x, self.bench.folded(second)))
         return self._selected(shapes)
 
+    def share(self, trial: Trial) -> float:
+        """Of what declared parameters leave beyond noise, what a law takes as well [1]."""
+        total = np.sum([gram.matrix for gram in trial.grams], axis=0)
+        prior, free = trial.regression.prior.whole, trial.expansion.shape[1]
+
+        def left(first: int) -> float:
+            used = slice(first, -1)
+            inner, outer = total[used, used] + prior[first:, first:], total[used, -1]
+            return float(total[-1, -1] - outer @ np.linalg.solve(inner, outer))
+
+        without, noise = left(free), self._weight * self.responses.stack.size
+        return (without - left(0)) / max(without - noise, noise)
+
     def _singles(self, *widths: float) -> list[Shape]:
         found = []
         for signal in self.signals:

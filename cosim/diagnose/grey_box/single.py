@@ -32,6 +32,9 @@ friction that changes its sign, and first orders may take one signal for another
 SAME = 0.01
 """Share by which a free curve elsewhere may explain less and do as well: at two ends of a shaft
 they differ by less."""
+MOST = 0.9
+"""Share of what is missing along the log that a law must take there to be fitted, where several
+places are asked: a law that leaves noise takes all of it but for what first orders are wrong."""
 PASSES, FALL = 8, 0.1
 """Times at most that first orders are taken again where a fit has ended, and the share of what the
 model then leaves beyond noise that each must remove to be followed by another one."""
@@ -90,7 +93,8 @@ def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) 
         search: the data.
         base: the model that lacks it.
         sites: the places, and the share that a free curve explains there; where one leaves noise,
-            others that explain less are not asked.
+            others that explain less are not asked. Of several, only laws are fitted that may be all
+            that is missing.
 
     Raises:
         CosimError: it is one place, and no law can enter there.
@@ -103,12 +107,15 @@ def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) 
         found = any(b.enough for b in begun)
         return found and explained < (1.0 - SAME) * sites[0][1]
 
+    def worth(along: Along) -> Callable[[Trial], bool]:
+        return lambda trial: len(sites) == 1 or along.share(trial) > MOST
+
     for site, explained in sites:
         if needless(explained):
             continue
         try:
             along = Along(Maker(LawBench(search, base, site)))
-            one = _with(search, Begun(along.maker), along.terms())
+            one = _with(search, Begun(along.maker), along.terms(), worth(along))
         except CosimError as error:
             if len(sites) == 1:
                 raise
@@ -128,7 +135,8 @@ def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) 
             if needless(shares[number]):
                 continue
             try:
-                begun[number] = _with(search, begun[number], kind(asked[number]))
+                along = asked[number]
+                begun[number] = _with(search, begun[number], kind(along), worth(along))
             except CosimError as error:
                 search.say(f"{begun[number].label}: {error}")
             begun[number] = _settled(search, begun, number)
@@ -138,13 +146,22 @@ def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) 
     return replace(known[0], alike=tuple(b.site for b in known[1:] if b.enough))
 
 
-def _with(search: Search, before: Begun, trials: list[Trial]) -> Begun:
-    """Further laws at a place, the best of them fitted if runs that were left out want them."""
+def _with(
+    search: Search, before: Begun, trials: list[Trial], worth: Callable[[Trial], bool]
+) -> Begun:
+    """Further laws at a place, the best of them fitted if runs that were left out want them.
+
+    Args:
+        search: the data.
+        before: laws there that were asked before.
+        trials: further ones.
+        worth: whether one promises enough to be fitted.
+    """
     known = sorted([*before.trials, *trials], key=lambda t: -t.expected)
     best, maker = replace(before, trials=known), before.maker
     firsts: dict[str, Trial] = {}
     for trial in trials:
-        if trial.expected > math.log(len(known) / LEVEL):
+        if trial.expected > math.log(len(known) / LEVEL) and worth(trial):
             firsts.setdefault(trial.shape.label, trial)
     for trial in list(firsts.values())[:FITTED]:
         law = maker.sharper(maker.fitted(trial))
