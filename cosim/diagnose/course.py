@@ -12,6 +12,7 @@ from ..errors import CosimError, UnbuiltError
 from .answer import percent
 from .fitter import BRINGS
 from .grey_box import single
+from .grey_box.single import ALL
 from .localise import everywhere, localise
 from .models import Fitted, is_open
 from .power import power
@@ -24,10 +25,6 @@ from .together import ahead, together
 from .unstable import ends
 from .verdict import HALF
 from .whiteness import CALIBRATED
-
-ALL = 0.9
-"""Share of the worst run that a free curve at one place must explain for one law there to be asked
-before further rounds: nine knots follow a law no better."""
 
 
 class Course:

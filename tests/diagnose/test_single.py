@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 
 from cosim.calibrate.mapping import read_problem
-from cosim.diagnose.grey_box import Begun, single
+from cosim.diagnose.grey_box import Begun, single, site
+from cosim.diagnose.grey_box.along import Along
+from cosim.diagnose.grey_box.bench import LawBench
+from cosim.diagnose.grey_box.single import ALL
+from cosim.diagnose.grey_box.trial import Maker
 from cosim.diagnose.localise import everywhere
 from cosim.diagnose.search import Search
 from tests.diagnose import disc
@@ -70,3 +74,17 @@ def test_a_law_of_two_signals_is_found(tmp_path: Path) -> None:
 )
 def test_no_law_does_where_there_is_none(tmp_path: Path, law: disc.Law) -> None:
     assert not asked(tmp_path / "disc", law).enough
+
+
+def test_a_law_promises_a_share_of_what_is_missing(tmp_path: Path) -> None:
+    problem = read_problem(
+        disc.write(tmp_path, lambda w, theta, t: 0.03 * theta, seconds=2.0, names=RUNS)
+    )
+    search = Search(simulator(problem), only=[])
+    place = site(problem, "load.flange")
+    along = Along(Maker(LawBench(search, search.calibrated(), place)))
+    shares = {t.words: along.share(t) for t in along.terms()}
+    search.close()
+    # noise is a few per cent of what so short runs hold beyond it
+    assert shares["angle",] == pytest.approx(1.0, abs=0.05)
+    assert shares["velocity",] < ALL

@@ -32,9 +32,9 @@ friction that changes its sign, and first orders may take one signal for another
 SAME = 0.01
 """Share by which a free curve elsewhere may explain less and do as well: at two ends of a shaft
 they differ by less."""
-MOST = 0.9
-"""Share of what is missing along the log that a law must take there to be fitted, where several
-places are asked: a law that leaves noise takes all of it but for what first orders are wrong."""
+ALL = 0.9
+"""Share of what is missing that a free curve at a place explains in the worst run, or a law along
+the log, where one law there may be all: nine knots follow none better, nor do first orders."""
 PASSES, FALL = 8, 0.1
 """Times at most that first orders are taken again where a fit has ended, and the share of what the
 model then leaves beyond noise that each must remove to be followed by another one."""
@@ -108,7 +108,7 @@ def best_law(search: Search, base: Fitted, sites: Sequence[tuple[Site, float]]) 
         return found and explained < (1.0 - SAME) * sites[0][1]
 
     def worth(along: Along) -> Callable[[Trial], bool]:
-        return lambda trial: len(sites) == 1 or along.share(trial) > MOST
+        return lambda trial: len(sites) == 1 or along.share(trial) > ALL
 
     for site, explained in sites:
         if needless(explained):
