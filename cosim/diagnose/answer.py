@@ -67,6 +67,7 @@ class Verdict:
         rivals: sets that explain the data as well, by their places in the table, with their log
             likelihood over that of the named set [nats].
         others: laws of these that the named set has not, by rival.
+        replaced: laws of the named set that the rival does without, by rival.
         places: named law -> other places (or laws) with which it would do the same.
         left: channels above their noise, worst first.
         hints: nearest sets, of `unexplained`.
@@ -82,6 +83,7 @@ class Verdict:
     shares: dict[str, float] = field(default_factory=dict)
     rivals: tuple[tuple[int, float], ...] = ()
     others: tuple[tuple[str, ...], ...] = ()
+    replaced: tuple[tuple[str, ...], ...] = ()
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
     left: tuple[Left, ...] = ()
     hints: tuple[Hint, ...] = ()
@@ -109,8 +111,7 @@ class Verdict:
             )  # fmt: skip
             return text + self._elsewhere() + tail + self._ended()
         if self.kind == "confounded":
-            others = ", ".join(" and ".join(labels) for labels in self.others)
-            text = f"{names} {explain} the data, but so does {others}."
+            text = f"{names} {explain} the data, but so does {', '.join(self._instead())}."
             return text + self._elsewhere() + tail + self._ended()
         if self.kind == "nothing_missing":
             return (
@@ -174,6 +175,14 @@ class Verdict:
             for law in self.laws
         ]
 
+    def _instead(self) -> list[str]:
+        """Each rival's own laws, and which ones they replace where others stay."""
+        found = []
+        for labels, mine in zip(self.others, self.replaced, strict=True):
+            stay = len(mine) < len(self.laws)
+            found.append(" and ".join(labels) + stay * f" in place of {' and '.join(mine)}")
+        return found
+
     def to_dict(self) -> dict[str, Any]:
         """Its part of the JSON."""
         return {
@@ -181,8 +190,10 @@ class Verdict:
             "reason": self.reason,
             "effects": self.effects(),
             "alternatives": [
-                {"effects": list(labels), "score": score}
-                for labels, (_, score) in zip(self.others, self.rivals, strict=True)
+                {"effects": list(labels), "instead_of": list(mine), "score": score}
+                for labels, mine, (_, score) in zip(
+                    self.others, self.replaced, self.rivals, strict=True
+                )
             ],
             "hints": [hint.to_dict() for hint in self.hints],
             "stopped": self.stopped,

@@ -351,6 +351,7 @@ def _named(table: Table, best: int) -> Verdict:
     }
     rivals: list[tuple[int, float]] = []
     others: list[tuple[str, ...]] = []
+    replaced: list[tuple[str, ...]] = []
     for i, rival in enumerate(table.models):
         if i == best or not rival.laws or rival.rough or _apart(table, best, i):
             continue
@@ -368,6 +369,7 @@ def _named(table: Table, best: int) -> Verdict:
         elif not _one_answer(model, rival):
             rivals.append((i, rival.score - model.score))
             others.append(tuple(law.label for law in other))
+            replaced.append(tuple(law.label for law in mine))
     order = sorted(range(len(rivals)), key=lambda k: (-rivals[k][1], others[k]))
     shares = {}
     for law in model.laws:
@@ -383,6 +385,7 @@ def _named(table: Table, best: int) -> Verdict:
         shares,
         tuple(rivals[k] for k in order),
         tuple(others[k] for k in order),
+        tuple(replaced[k] for k in order),
         {label: tuple(sorted(found)) for label, found in places.items() if found},
         above(model),
         force=model.forces[0] if model.forces else None,

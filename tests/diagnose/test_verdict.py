@@ -333,6 +333,18 @@ def test_two_laws_that_the_data_do_not_tell_apart_are_confounded() -> None:
     assert decide(table(FAR, *rivals)).kind == "effect_found"
 
 
+def test_a_rival_of_one_of_two_laws_is_no_rival_of_both() -> None:
+    drift = law("delay", "motor.shaft")
+    both, other = model(law(), drift), model(law("cogging", "motor.shaft"), drift)
+    found = decide(table(FAR, both, other, alike=((1, 2),)))
+    assert found.kind == "confounded" and len(found.others) == 1
+    rival = ("cogging at motor.shaft", "coulomb at load.flange")
+    first, second = rival if found.others == (rival[:1],) else rival[::-1]
+    assert f"but so does {first} in place of {second}." in found.reason
+    (alternative,) = found.to_dict()["alternatives"]
+    assert (alternative["effects"], alternative["instead_of"]) == ([first], [second])
+
+
 def test_laws_are_compared_with_the_one_to_be_named_where_little_is_to_be_explained() -> None:
     """A better one that cannot be named, with half of the evidence, hides no rival of it."""
     found = [
