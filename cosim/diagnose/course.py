@@ -1,9 +1,9 @@
 """What a search does next: rounds, laws of one place, sets along the log's motion.
 
-The course of docs/diagnosis.md: a round adds a law; where it leaves far more than noise, a law of
-one place and sets along the log's motion are asked, once; where it leaves noise, laws are asked
-anew around the sheet's values, once. The verdict is another matter: it comes from the table of all
-fits.
+The course of docs/diagnosis.md: a round adds a law; where it leaves far more than noise and took
+less than half of what was missing, a law of one place and sets along the log's motion are asked,
+once; where it leaves noise, laws are asked anew around the sheet's values, once. The verdict is
+another matter: it comes from the table of all fits.
 """
 
 from __future__ import annotations

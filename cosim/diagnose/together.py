@@ -73,7 +73,7 @@ class Draft:
 
 
 def ahead(search: Search) -> bool:
-    """Whether sets are compared as soon as a round ends far from the noise.
+    """Whether sets are compared before the rounds end, after one that took less than half.
 
     All laws are simulated in all fitted runs for that. Where these are many, rounds go on first,
     and sets are only compared if they end with more than noise.

@@ -71,9 +71,13 @@ def test_sets_are_asked_where_a_law_takes_less_than_half(
 
 
 def test_what_a_law_takes_is_a_share_of_what_is_beyond_noise(tmp_path: Path) -> None:
-    with built.rig(tmp_path, two) as rig:
-        law = rig.added(rig.base, "unbalance", {"m_u": WEIGHT})
-        stage = Round(rig.base, [], {}, fitted=[law], winner=law)
-        estimate = rig.base.estimate
-        beyond = estimate.robust - 0.5 * estimate.count
-        assert share(rig.search, stage) == pytest.approx(rig.search.gain(rig.base, law) / beyond)
+    with built.rig(tmp_path, two, seconds=4.0) as rig:
+        one = rig.added(rig.base, "unbalance", {"m_u": WEIGHT})
+        both = rig.added(one, "quadratic_drag", {"c": DRAG})
+        shares = [
+            share(rig.search, Round(rig.base, [], {}, fitted=[law], winner=law))
+            for law in (one, both)
+        ]
+    assert 0.5 < shares[0] < 0.99
+    # noise is a thousandth of what is missing
+    assert shares[1] == pytest.approx(1.0, abs=0.01)

@@ -88,3 +88,18 @@ def test_a_law_promises_a_share_of_what_is_missing(tmp_path: Path) -> None:
     # noise is a few per cent of what so short runs hold beyond it
     assert shares["angle",] == pytest.approx(1.0, abs=0.05)
     assert shares["velocity",] < ALL
+
+
+def test_little_more_than_noise_has_shares_too(tmp_path: Path) -> None:
+    """A law that takes all of it does so where less than the noise's power is missing."""
+    problem = read_problem(
+        disc.write(tmp_path, lambda w, theta, t: 3e-4 * theta, seconds=2.0, names=RUNS)
+    )
+    search = Search(simulator(problem), only=[])
+    base = search.calibrated()
+    assert base.estimate.robust < base.estimate.count
+    along = Along(Maker(LawBench(search, base, site(problem, "load.flange"))))
+    shares = [along.share(t) for t in along.terms()]
+    search.close()
+    # what is missing is told from noise to a fifth
+    assert max(shares) == pytest.approx(1.0, abs=0.2)

@@ -132,7 +132,7 @@ class Along:
             return float(total[-1, -1] - outer @ np.linalg.solve(inner, outer))
 
         without, noise = left(free), self._weight * self.responses.stack.size
-        return (without - left(0)) / max(without - noise, noise)
+        return (without - left(0)) / max(without - noise, 1e-300)
 
     def _singles(self, *widths: float) -> list[Shape]:
         found = []

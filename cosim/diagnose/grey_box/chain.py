@@ -73,8 +73,8 @@ def law_from_data(
         CosimError: the system with a law there cannot be simulated.
     """
     say = search.say
-    known = begun is not None and begun.law is not None and begun.site == site
-    if begun is None or not known or begun.maker.bench.base is not base:
+    here = begun is not None and begun.site == site and begun.maker.bench.base is base
+    if begun is None or begun.law is None or not here:
         begun = best_law(search, base, [(site, 1.0)])
         assert begun is not None
     maker, trials, law = begun.maker, begun.trials, begun.law
