@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console
@@ -62,7 +63,8 @@ double run(void *c, Step step, Get get, Set set, const uint32_t *u, size_t nu, c
 """
 
 
-def _driver(folder: Path) -> ctypes.CDLL:
+def load_driver(folder: Path) -> ctypes.CDLL:
+    """Compile and load the loop in C."""
     source, library = folder / "driver.c", folder / "driver.so"
     source.write_text(DRIVER, encoding="utf-8")
     target = PLATFORMS[host_platform()].target
@@ -77,10 +79,19 @@ def _address(function: object) -> ctypes.c_void_p:
     return ctypes.cast(function, ctypes.c_void_p)  # type: ignore[arg-type]
 
 
-def measure(driver: ctypes.CDLL, path: Path, h: float, *, rounds: int, count: int) -> float:
+def measure(
+    driver: ctypes.CDLL,
+    path: Path,
+    h: float,
+    *,
+    rounds: int,
+    count: int,
+    parameters: Mapping[str, float] | None = None,
+) -> float:
     """Least time of one set-step-get round [µs]."""
     with Slave(path, initialize=False) as slave:
-        slave.initialize({"solver.step": h} if "solver.step" in slave.vr else {})
+        step = {"solver.step": h} if "solver.step" in slave.vr else {}
+        slave.initialize({**step, **(parameters or {})})
         raw = ctypes.CDLL(slave.fmu.dll._name)
         inputs, outputs = slave.names("input"), slave.names("output")
         start = {
@@ -124,7 +135,7 @@ def main() -> None:
     out = Path("fmus")
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        driver = _driver(Path(folder))
+        driver = load_driver(Path(folder))
         for name, (limit, h) in CASES.items():
             if options.variant and name not in options.variant:
                 continue

@@ -128,6 +128,15 @@ class Functions:
         )
 
     @cached_property
+    def updated(self) -> tuple[tuple[int, ...], ...]:
+        """Per clock the elements of z that its tick replaces."""
+        names = [v.name for v in self._roles["discrete"]]
+        return tuple(
+            tuple(index for index, name in enumerate(names) if name in clock.updates)
+            for clock in self._clocks
+        )
+
+    @cached_property
     def periods(self) -> ca.Function:
         """`p -> periods of the clocks`."""
         periods = _column([clock.period for clock in self._clocks])

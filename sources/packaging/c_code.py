@@ -2,17 +2,20 @@
 
 CasADi's own generator knows one function at a time. Here a result is computed once wherever it is
 needed: what depends on parameters only is worked out when these are set, for all functions
-together (`f_constants`), and sine and cosine come together, those of states and inputs in one
-loop. Operations are CasADi's, and no bit depends on where they are done.
+together (`f_constants`), sine and cosine come together, those of states and inputs in one loop, and
+laws of absent effects are left out (`guards`). Operations are CasADi's, and no bit depends on where
+they are done.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+
+from .guards import Chunk, chunks, guards, zeros
 
 FORMS = {
     ca.OP_ADD: "{0} + {1}",
@@ -75,6 +78,7 @@ class Value:
         constant: of a constant.
         parameters: whether it depends on parameters only, and takes computing.
         depth: how many sines or cosines lie one inside the other up to here.
+        zero: the values that make it zero where one of them is zero.
     """
 
     operation: int
@@ -82,6 +86,7 @@ class Value:
     constant: float
     parameters: bool
     depth: int
+    zero: frozenset[int]
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ class Wanted:
     Attributes:
         function: of CasADi.
         arguments: C names of its arguments.
-        results: C name and, per element, the place in it; None: one after the other.
+        results: C name and, per element, the place in it (-1: nowhere); None: one after the other.
     """
 
     function: ca.Function
@@ -104,10 +109,12 @@ class Writer:
 
     Args:
         parameters: name of the argument that holds them.
+        strengths: the elements of it whose 0 means that an effect is absent.
     """
 
-    def __init__(self, parameters: str = "p") -> None:
+    def __init__(self, parameters: str = "p", strengths: Collection[int] = ()) -> None:
         self._parameters = parameters
+        self._strengths = frozenset(strengths)
         self._values: list[Value] = []
         self._numbers: dict[tuple[object, ...], int] = {}
         self._kept: dict[int, int] = {}
@@ -129,25 +136,61 @@ class Writer:
         """
         function, body = wanted.function, _Body(self, wanted.arguments, not sharing)
         numbers, results = self._read(function, wanted.arguments)
-        angles = {
-            self._values[n].of[0]
-            for n in dict.fromkeys(numbers)
-            if self._values[n].operation in _TRIGONOMETRIC
-            and self._values[n].depth == 1
-            and not self._values[n].parameters
-        }
-        if len(angles) >= BATCH:
-            body.batch([n for n in dict.fromkeys(numbers) if n in angles])
-        for number in numbers:
+        order = list(dict.fromkeys(numbers))
+        if sharing:
+            self._guarded(body, order, [number for *_, number in results])
+        else:
+            body.batch(self._angles(order))
+            for number in order:
+                body.need(number)
+        # what results are that take no computing
+        for *_, number in results:
             body.need(number)
         for result, element, number in results:
             name, places = wanted.results[result]
             place = element if places is None else places[element]
-            body.lines.append(f"{name}[{place}] = {body.name(number)};")
+            if place >= 0:
+                body.lines.append(f"{name}[{place}] = {body.name(number)};")
         head = [f"const double *restrict {name}" for name in (*wanted.arguments, "k")]
         head += [f"double *restrict {name}" for name, _ in wanted.results]
         lines = "".join(f"  {line}\n" for line in body.lines)
         return f"static void {function.name()}({', '.join(head)}) {{\n{lines}}}\n"
+
+    def _guarded(self, body: _Body, order: Sequence[int], results: Sequence[int]) -> None:
+        """Compute the results, each law while its effect is there."""
+        computed = [n for n in order if not (self._values[n].parameters or self._leaf(n))]
+
+        def of(number: int, among: Collection[int] = frozenset(computed)) -> list[int]:
+            return [n for n in self._values[number].of if n in among]
+
+        found = guards(computed, results, of, lambda n: self._values[n].zero)
+        for number in found:  # a sine and its cosine are one call
+            if self._values[number].operation == ca.OP_SIN:
+                cosine = self.known(ca.OP_COS, self._values[number].of[0])
+                if cosine in found:
+                    both = found[number], found[cosine]
+                    found[number] = found[cosine] = (
+                        None if None in both else frozenset().union(*filter(None, both))
+                    )
+        body.batch(self._angles([n for n in computed if n in found and found[n] is None]))
+        left = [n for n in computed if n in found and not body.has(n)]
+        within = frozenset(left)
+        for chunk in chunks(left, found.__getitem__, lambda n: of(n, within)):
+            body.chunk(chunk)
+
+    def _leaf(self, number: int) -> bool:
+        return self._values[number].operation in (ca.OP_CONST, ca.OP_INPUT)
+
+    def _angles(self, order: Sequence[int]) -> list[int]:
+        """Angles of states and inputs whose sines or cosines are among these, in their order."""
+        angles = dict.fromkeys(
+            self._values[n].of[0]
+            for n in order
+            if self._values[n].operation in _TRIGONOMETRIC
+            and self._values[n].depth == 1
+            and not self._values[n].parameters
+        )
+        return list(angles) if len(angles) >= BATCH else []
 
     def constants(self) -> str:
         """`f_constants(p, k)`: what all functions written so far need of the parameters."""
@@ -219,9 +262,15 @@ class Writer:
                 for v in below
             )
             depth = max((v.depth for v in below), default=0) + (operation in _TRIGONOMETRIC)
+            zero = frozenset[int]()
             if operation == ca.OP_INPUT:  # of the parameters: -1
                 of = (-1 if name == self._parameters else of[0], of[1])
-            self._values.append(Value(operation, of, constant, fixed, depth))
+                if of[0] < 0 and of[1] in self._strengths:
+                    zero = frozenset([len(self._values)])
+            elif not leaf:
+                asked = of[0] if below[0].parameters else None
+                zero = zeros(operation, [v.zero for v in below], asked)
+            self._values.append(Value(operation, of, constant, fixed, depth, zero))
             self._numbers[key] = len(self._values) - 1
         return self._numbers[key]
 
@@ -233,6 +282,7 @@ class _Body:
         self.lines: list[str] = []
         self._writer, self._arguments, self._keeping = writer, arguments, keeping
         self._names: dict[int, str] = {}
+        self._inside: list[str] | None = None
 
     def name(self, number: int) -> str:
         """How a value is referred to."""
@@ -254,8 +304,31 @@ class _Body:
             else:
                 self._state(top, value)
 
+    def has(self, number: int) -> bool:
+        """Whether a value has been computed."""
+        return number in self._names
+
+    def chunk(self, chunk: Chunk) -> None:
+        """Compute values, or leave them at zero, as their guard says."""
+        if chunk.guard is None:
+            for number in chunk.numbers:
+                self.need(number)
+            return
+        for gate in sorted(chunk.guard):
+            self.need(gate)
+        asked = " || ".join(f"{self._names[gate]} != 0.0" for gate in sorted(chunk.guard))
+        before, self.lines = self.lines, []
+        self._inside = []
+        for number in chunk.numbers:
+            self.need(number)
+        declared = [f"double {name} = 0.0;" for name in self._inside]
+        inside, self._inside = self.lines, None
+        self.lines = [*before, *declared, f"if ({asked}) {{", *inside, "}"]
+
     def batch(self, angles: Sequence[int]) -> None:
         """Sines and cosines of several angles, by one loop."""
+        if not angles:
+            return
         for number in angles:
             self.need(number)
         names = [self._names[number] for number in angles]
@@ -284,12 +357,19 @@ class _Body:
             return
         arguments = [self._names[n] for n in value.of]
         if value.operation in _TRIGONOMETRIC:
-            self.lines.append(f"double s{number}, c{number};")
+            if self._inside is None:
+                self.lines.append(f"double s{number}, c{number};")
+            else:
+                self._inside += [f"s{number}", f"c{number}"]
             self.lines.append(f"sine_cosine({arguments[0]}, &s{number}, &c{number});")
             self._turned(value.of[0], f"s{number}", f"c{number}")
             return
         text = FORMS[value.operation].format(*arguments)
-        self.lines.append(f"const double a{number} = {text};")
+        if self._inside is None:
+            self.lines.append(f"const double a{number} = {text};")
+        else:
+            self._inside.append(f"a{number}")
+            self.lines.append(f"a{number} = {text};")
         self._names[number] = f"a{number}"
 
 

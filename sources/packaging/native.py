@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import itertools
 import os
 import shutil
 import struct
@@ -21,7 +22,7 @@ from cosim.spec.cache import sealed
 from ..function import Functions
 from .c_code import Wanted, Writer
 from .cache import cache_folder, keep
-from .elimination import eliminate
+from .elimination import Block, eliminate
 from .layout import Entry, owners
 from .platforms import PLATFORMS
 
@@ -42,9 +43,10 @@ ARGUMENTS = ("t", "x", "z", "u", "p")
 SEEDS = ("dt", "dx", "dz", "du", "dp")
 
 
-def _functions_code(functions: Functions) -> tuple[str, int]:
+def _functions_code(functions: Functions, entries: Sequence[Entry]) -> tuple[str, int]:
     """All functions in C, and how many numbers `f_constants` gives."""
-    writer = Writer()
+    parameters = [entry for entry in entries if entry.part == "parameter"]
+    writer = Writer(strengths=[k for k, e in enumerate(parameters) if e.quantity.strength])
 
     def write(function: ca.Function, *results: str, places: Sequence[int] | None = None) -> str:
         """With the places of the last result's elements."""
@@ -58,7 +60,11 @@ def _functions_code(functions: Functions) -> tuple[str, int]:
         code.append(write(functions.quick, "y", places=functions.quick_outputs))
     if functions.coupled_outputs:
         code.append(write(functions.coupled, "xdot", "y", places=functions.coupled_outputs))
-    code += [write(function, "z_next") for function in functions.updates]
+    for function, changed in zip(functions.updates, functions.updated, strict=True):
+        places = [-1] * function.numel_out()
+        for place, element in enumerate(changed):
+            places[element] = place
+        code.append(write(function, "z_next", places=places))
     if functions.updates:
         periods = Wanted(functions.periods, ("p",), (("periods", None),))
         code.append(writer.write(periods, sharing=False))
@@ -78,8 +84,8 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         for part in ("state", "input", "output", "parameter", "discrete")
     }
     nx = counts["state"]
-    elimination = eliminate(nx, functions.jacobian_pattern)
-    code, kept = _functions_code(functions)
+    elimination = eliminate(nx, functions.jacobian_pattern, owners(entries))
+    code, kept = _functions_code(functions, entries)
     sizes = {
         "NX": nx,
         "NU": counts["input"],
@@ -133,17 +139,39 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         lines.append(
             f"static void (*const UPDATES[])({'const double *, ' * 6}double *) = {{{names}}};"
         )
+        flat = [element for changed in functions.updated for element in changed]
+        ends = itertools.accumulate(map(len, functions.updated), initial=0)
+        lines += [
+            f"static const int UPDATED_VALUES[] = {{{', '.join(map(str, [*flat, 0]))}}};",
+            f"static const int UPDATED_FROM[] = {{{', '.join(map(str, ends))}}};",
+        ]
     if nx:
         lines += [
             "static void f_factor(const double *j, double d, double *w) {",
             "  (void)j;",
-            *(f"  {statement};" for statement in elimination.factor),
+            *(
+                f"  w[{flag}] = {' || '.join(f'j[{k}] != 0.0' for k in places) or '0.0'};"
+                for flag, places in elimination.asked.items()
+            ),
+            *_blocks_code(elimination.factor),
             "}",
             "static void f_solve(const double *w, double *b) {",
-            *(f"  {statement};" for statement in elimination.solve),
+            *_blocks_code(elimination.solve),
             "}",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _blocks_code(blocks: Sequence[Block]) -> list[str]:
+    """Statements in C, each block asking its flags."""
+    lines = []
+    for block in blocks:
+        statements = [f"  {statement};" for statement in block.statements]
+        if block.flags:
+            asked = " && ".join(f"w[{flag}] != 0.0" for flag in block.flags)
+            statements = [f"  if ({asked}) {{", *statements, "  }"]
+        lines += statements
+    return lines
 
 
 def with_token(source: str, token: str) -> str:

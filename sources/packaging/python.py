@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import inspect
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -19,7 +20,7 @@ from cosim.spec.variant import Name
 from ..function import Functions
 from ..model import Model
 from . import c_functions, runtime
-from .elimination import eliminate
+from .elimination import Block, eliminate
 from .layout import Entry, owners
 
 _BINARY = {
@@ -138,7 +139,7 @@ def slave_source(model: Model, name: Name, equations: str) -> str:
 def equations_source(model: Model, functions: Functions, entries: list[Entry], name: Name) -> str:
     """The file of a variant's equations: generated functions and tables."""
     nx = sum(entry.part == "state" for entry in entries)
-    elimination = eliminate(nx, functions.jacobian_pattern)
+    elimination = eliminate(nx, functions.jacobian_pattern, owners(entries))
     used = [functions.outputs, functions.derivatives]
     if nx:
         used.append(functions.jacobian)
@@ -175,12 +176,12 @@ def equations_source(model: Model, functions: Functions, entries: list[Entry], n
         f"NOMINAL = {nominal!r}",
         f"OWNER = {owners(entries)!r}",
     ]
-    factor = ["def f_factor(j, d, w):", *(f"    {s}" for s in elimination.factor), "    return"]
+    factor = ["def f_factor(j, d, w):", *_lines(elimination.factor), "    return"]
     factor = [
         line.replace("1.0 / ", "_div(1.0, ", 1) + ")" if "1.0 / " in line else line
         for line in factor
     ]
-    solve = ["def f_solve(w, b):", *(f"    {s}" for s in elimination.solve), "    return"]
+    solve = ["def f_solve(w, b):", *_lines(elimination.solve), "    return"]
     updates = ", ".join(function.name() for function in functions.updates)
     return "\n".join(
         [
@@ -201,6 +202,11 @@ def equations_source(model: Model, functions: Functions, entries: list[Entry], n
             "",
         ]
     )
+
+
+def _lines(blocks: Sequence[Block]) -> list[str]:
+    """Statements of a function, all of them: those whose flags are 0 change nothing."""
+    return [f"    {statement}" for block in blocks for statement in block.statements]
 
 
 def binaries(identifier: str) -> dict[str, bytes]:

@@ -32,7 +32,8 @@ static void run_ticks(Instance *c) {
   for (int k = 0; k < NC; k++) {
     if (!(m->next[k] <= v[0] + slack(m->period[k], v[0]))) continue;
     UPDATES[k](v, v + IX, v + IZ, v + IU, v + IP, m->k, z);
-    memcpy(v + IZ, z, NZ * sizeof *z);
+    const int *const values = UPDATED_VALUES + UPDATED_FROM[k];
+    for (int i = 0; i < UPDATED_FROM[k + 1] - UPDATED_FROM[k]; i++) v[IZ + values[i]] = z[i];
     m->tick[k] += 1;
     m->next[k] = m->tick[k] * m->period[k];
     m->stale = ALL;
