@@ -13,17 +13,19 @@ import threading
 from collections import OrderedDict
 from collections.abc import Hashable
 from typing import NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 from ..master.elsewhere import Elsewhere, Workers
+from ..master.outline import Outline
 from ..master.session import RUNAWAY, Session
 from .budget import Budget
 from .parts import Vector
 
 MOST = 128
-"""Idle sessions that are kept, each with some megabytes; a fit of ten runs in three step sizes and
-two threads needs half of them."""
+"""Idle sessions that are kept, each with up to a megabyte beside the inputs, which those of one run
+share; a fit of ten runs in three step sizes and two threads needs half of them."""
 KEPT = 2**27
 """Bytes of simulated rows that are kept, those asked for last: a few hundred runs of a minute."""
 
@@ -68,6 +70,9 @@ class SessionPool:
 
     Args:
         budget: how much may be simulated; no limit if not given.
+
+    Attributes:
+        outlines: the newest one of each run, whose table of inputs the next session shares.
     """
 
     def __init__(self, budget: Budget | None = None) -> None:
@@ -78,6 +83,7 @@ class SessionPool:
         self._idle: dict[Key, list[tuple[object, Session | Elsewhere]]] = {}
         self._count = 0
         self._elsewhere: dict[int, Workers] = {}
+        self.outlines: WeakValueDictionary[Hashable, Outline] = WeakValueDictionary()
 
     def elsewhere(self, count: int) -> Workers:
         """Other processes that run sessions, the same for all who ask for as many."""

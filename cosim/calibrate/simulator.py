@@ -90,10 +90,14 @@ class Simulator:
             return Elsewhere(
                 master.outline(duration, **options), self._pool.elsewhere(self.workers)
             )
-        return self.session(run)
+        master, duration, options = self._planned(run)
+        place = (self._key(run).run, self.problem.step)
+        session = Session(master, duration, like=self._pool.outlines.get(place), **options)
+        self._pool.outlines[place] = session.outline
+        return session
 
     def session(self, run: MeasuredRun) -> Session:
-        """A new prepared run."""
+        """A new prepared run of its own, which can be driven by other inputs."""
         master, duration, options = self._planned(run)
         return Session(master, duration, **options)
 

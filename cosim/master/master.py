@@ -135,6 +135,7 @@ class Master:
         record: Sequence[str] | None = None,
         every: int = 1,
         start: float = 0.0,
+        like: Outline | None = None,
     ) -> Outline:
         """What `run` does before it creates the FMUs: check everything, tabulate the inputs.
 
@@ -153,7 +154,9 @@ class Master:
         signals = spread(self.system, inputs or {})
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         times[-1] = start + duration
-        carried = self._objects(signals, times)
+        tables = like.tables_for(self.system, signals, times) if like is not None else None
+        carried = {} if tables else self._objects(signals, times)
+        times, external = tables or (times, self._external(signals, times, carried))
         return Outline(
             system=self.system,
             scenario=self.scenario,
@@ -166,7 +169,7 @@ class Master:
             observed=observed,
             every=every,
             signals=signals,
-            external=self._external(signals, times, carried),
+            external=external,
             objects=carried,
         )
 

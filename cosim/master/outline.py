@@ -57,6 +57,31 @@ class Outline:
     objects: Mapping[int, Sequence[Any]]
     endless: bool = False
 
+    def tables_for(
+        self, system: System, signals: Mapping[str, Signal], times: Vector
+    ) -> tuple[Vector, Vector] | None:
+        """The same points and values of inputs, if a run of another system has them, too.
+
+        Nobody may write to them from then on: a minute in steps of 0.1 ms takes ten megabytes.
+
+        Args:
+            system: of the other run.
+            signals: that drive its inputs.
+            times: its communication points [s].
+        """
+        known = self.signals
+        if self.objects or not np.array_equal(times, self.times) or list(known) != list(signals):
+            return None
+        for name, signal in signals.items():
+            one, other = self.system.declaration(name), system.declaration(name)
+            units = self.system.unit(name) == system.unit(name) and one.unit == other.unit
+            alike = units and one.relative == other.relative and one.type == other.type
+            if known[name] is not signal or not alike or one.items or other.items:
+                return None
+        for table in (self.times, self.external):
+            table.setflags(write=False)
+        return self.times, self.external
+
     @property
     def count(self) -> int:
         """Communication steps."""

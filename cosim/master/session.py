@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
 from ..data.signals import Shifted, Signal
-from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, ValueRangeError
+from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, GraphError, ValueRangeError
 from ..fmu.exchange import Block
 from ..fmu.library import WORK
 from ..fmu.values import check_values
@@ -57,6 +57,8 @@ class Session:
         every: record every n-th communication point.
         start: time at which the run begins [s].
         targets: full names of parameters and start values that `run` may be given as an array.
+        like: outline of a run of a similar system; its table of inputs is shared if it is the same,
+            and neither session can be driven by others then.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class Session:
         every: int = 1,
         start: float = 0.0,
         targets: Sequence[str] = (),
+        like: Outline | None = None,
     ) -> None:
         if not isinstance(master, Master):
             raise wrong(
@@ -76,7 +79,9 @@ class Session:
             )
         need_texts("targets of a Session", targets, 'targets=["load.J"]')
         self.master = master
-        outline = master.outline(duration, inputs=inputs, record=record, every=every, start=start)
+        outline = master.outline(
+            duration, inputs=inputs, record=record, every=every, start=start, like=like
+        )
         self._prepare(outline, targets)
 
     @classmethod
@@ -105,6 +110,11 @@ class Session:
         except BaseException:
             self._stack.close()
             raise
+
+    @property
+    def outline(self) -> Outline:
+        """What is run."""
+        return self._execution.outline
 
     def _block(self, name: str) -> tuple[Block, Any]:
         member, variables = self.system.variables(name)
@@ -229,8 +239,16 @@ class Session:
 
         Args:
             signals: driven input, as the run has it -> what drives it.
+
+        Raises:
+            GraphError: the session shares its inputs with others.
         """
         outline = self._execution.outline
+        if not self._run.external.flags.writeable:
+            raise GraphError(
+                "this session shares its inputs with others and can't be driven; make one without "
+                "like="
+            )
         self._run.external[:] = self.master.tabulate({**outline.signals, **signals}, outline.times)
         self._later = {}
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import FmuCallError, StepError, UnknownNameError, ValueRangeError
+from cosim.data.signals import Constant
+from cosim.errors import FmuCallError, GraphError, StepError, UnknownNameError, ValueRangeError
 from cosim.fmu.exchange import Part
 from cosim.fmu.instance import Instance
 from cosim.installation.builder import default_provider
@@ -143,3 +144,27 @@ def test_thousand_runs_leave_no_memory(parts) -> None:
             session.run({"load.J": 0.08})
         # one page per ten runs would be 100; the interpreter's own pools may move by a few
         assert pages() - before < 50
+
+
+def test_sessions_of_one_run_share_their_inputs(parts) -> None:
+    """Bit for bit the same results; one that is driven otherwise, or begins later, has its own."""
+    master, inputs = parts
+    given = {name: Constant(value) for name, value in inputs.items()}
+
+    def session(**changed) -> Session:
+        return Session(master, DURATION, **{"inputs": given, "record": RECORD, **changed})
+
+    with session() as first:
+        expected = first.run()
+        with session(like=first.outline) as second:
+            assert second.outline.external is first.outline.external
+            assert second.outline.times is first.outline.times
+            for found, wanted in zip(second.run(), expected, strict=True):
+                assert np.array_equal(found, wanted)
+            with pytest.raises(GraphError, match="shares its inputs with others"):
+                second.drive(given)
+        others = {name: Constant(2.0 * value) for name, value in inputs.items()}
+        for changed in ({"inputs": others}, {"start": 0.1}):
+            with session(like=first.outline, **changed) as third:
+                assert third.outline.external is not first.outline.external
+                third.drive(others)
