@@ -45,8 +45,10 @@ SHORTER = 8
 """Times a step is damped by 30 more until it is given up: from Gauss-Newton to steepest descent."""
 SETTLED = 0.2
 """Fall of the cost [nats] below which a quick fit ends: far below what is decided on it."""
+KEPT = 0.25
+"""Share of what a quadratic promises that steps must keep: below, trust regions call it poor."""
 SHRUNK, VALLEY = 0.1, 15
-"""Factor on the steps of differences where a quadratic keeps nothing, down to the shortest, and the
+"""Factor on the steps of differences where a quadratic is poor, down to the shortest, and the
 Jacobians from then on."""
 LOWER = 1.0
 """Fall of the cost [nats] from which a point that was met on another errand is worth going to: the
@@ -76,7 +78,7 @@ class Descent:
         self.uneven = False
         self.promised = math.inf
         self.unkept, self.valley = 0.0, False
-        self.damping = FIRM
+        self.damping, self.length = FIRM, STEPS[-1]
         self.begun = simulator.evaluations if begun is None else begun
         self.drawn = drawn(problem)
         self.products, self.straight = pairs(problem), np.zeros(self.theta.size)
@@ -270,7 +272,7 @@ class Descent:
             whole = self.step(normal, damping)
             straight = self.straight
             if abs(self.promised) < SETTLED:
-                return True
+                return damping <= FIRM  # more damped, any step promises nothing
             # a limit or a threshold is passed: the direction is right, but not so far
             if not (self.restored(normal, whole, damping) or any(
                 self.attempt(stepped(self.theta, part * straight, self.products)) for part in PARTS
@@ -288,23 +290,28 @@ class Descent:
     def correct(self, *, draft: bool = False) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far.
 
-        Where no step keeps anything of what the quadratic promises, differences were too long for
-        what many parameters undo of each other: they are taken again, shorter. In the valley in
-        which that happens, more Jacobians are needed.
+        Where steps keep little of what the quadratic promises, or more than so many of them can,
+        differences were too long for what many parameters undo of each other: they are taken again,
+        shorter. In the valley in which that happens, more Jacobians are needed.
 
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
-        size, left = STEPS[-1], DRAFTED if draft else RENEWALS
+        left = DRAFTED if draft else RENEWALS
+        rough = draft or self.problem.unstable
         while True:
             before, left = self.cost, left - 1
-            normal = self.normal(size, central=not draft)
+            normal = self.normal(self.length, central=not draft)
+            self.step(normal, FIRM)
+            promised = self.promised
             if self.settle(normal, CORRECTIONS):
                 break
-            if before - self.cost < self.enough(ROUGHLY if draft else EVEN):
-                if draft or self.cost < before or size <= SHORTEST or self.problem.unstable:
-                    break
-                size, left, self.valley = SHRUNK * size, VALLEY, True
-            elif not left:
+            fall, enough = before - self.cost, self.enough(ROUGHLY if draft else EVEN)
+            if max(fall, promised) < enough:
+                break
+            good = KEPT * promised < fall < CORRECTIONS * promised
+            if not good and not rough and self.length > SHORTEST:
+                self.length, left, self.valley = SHRUNK * self.length, VALLEY, True
+            elif fall < enough or not left:
                 break
         return normal

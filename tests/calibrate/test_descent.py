@@ -1,0 +1,84 @@
+"""Fits along valleys: little but a product shows, and differences claim more than there is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cosim.calibrate.descent import STEPS, Descent
+from cosim.calibrate.problem import Problem
+from cosim.calibrate.simulator import Simulator
+from tests.problems import simulator
+
+Vector = NDArray[np.float64]
+MASS, PLACE = "J_load", "R_a"
+
+
+def away(short: Problem, monkeypatch: pytest.MonkeyPatch, steep: float) -> Descent:
+    """A fit that begins at three times a mass and a third of its place, which are 1 in the data.
+
+    100 times the noise goes with the product, a tenth of it with m p^2. Differences over a step h
+    see `steep` h^2 where product and place should undo each other.
+
+    Args:
+        short, monkeypatch: of the test.
+        steep: size over the noise of what goes with the cube of the product.
+    """
+    run = short.chosen("identification")[0]
+    mass, place = short.index(MASS), short.index(PLACE)
+    problem = short.with_parameters(
+        [
+            replace(p, nominal=1.0, minimum=0.01, maximum=100.0, span=1.0)
+            if p.name in (MASS, PLACE) else p
+            for p in short.parameters
+        ]
+    )  # fmt: skip
+    random = np.random.default_rng(3)
+    one, other, faint = (random.standard_normal(run.data.shape) for _ in range(3))
+
+    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
+        m, p = values[mass], values[place]
+        rest = float(np.sum(np.delete(values - problem.nominal, [mass, place])))
+        model = 100.0 * one * m * p + steep * other * (m * p) ** 3 + 0.1 * faint * m * p**2
+        return np.asarray((model + one[::-1] * rest) * problem.sigma)
+
+    monkeypatch.setattr(Simulator, "simulate", simulate)
+    data = simulate(simulator(problem), problem.nominal, run)
+    data += random.standard_normal(data.shape) * problem.sigma
+    problem = problem.changed(runs=[replace(run, data=data)])
+    theta = problem.nominal
+    theta[mass], theta[place] = 3.0, 1.0 / 3.0
+    found = Descent(simulator(problem), [run.name], theta)
+    found.products = [(place, mass)]
+    return found
+
+
+@pytest.mark.parametrize(("steep", "shorter"), [(10.0, False), (100.0, True)])
+def test_a_fit_goes_on_where_differences_were_too_long_for_a_valley(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, steep: float, shorter: bool
+) -> None:
+    """They are taken again, shorter, if the quadratic is poor; where it is good they stay."""
+    run = away(short, monkeypatch, steep)
+    truth = run.problem.nominal
+    best = run.total(truth, run.simulator.residuals(truth, run.purpose))
+    assert run.cost > best + 30.0
+    run.correct()
+    # noise moves the minimum: half a nat by each parameter
+    assert best - 10.0 < run.cost < best
+    # 43 nats are 9.2 deviations, from 3 to 1
+    assert run.theta[run.problem.index(MASS)] == pytest.approx(1.0, abs=3.0 * 2.0 / 9.2)
+    assert (run.length < STEPS[-1]) is shorter
+
+
+def test_a_draft_takes_its_differences_once(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is only to be compared with others that are no nearer to their minima."""
+    run = away(short, monkeypatch, 100.0)
+    before = run.cost
+    run.correct(draft=True)
+    assert run.cost <= before
+    assert run.length == STEPS[-1]
