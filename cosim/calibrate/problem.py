@@ -10,6 +10,7 @@ A problem says nothing of how it is simulated; `simulator.Simulator` does that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -61,6 +62,7 @@ class Problem:
         further: give runs of the data set that need another system; read when they are asked for.
         source: where the data come from, for their checks.
         shafts: angle of an effect (see `shaft`) -> what it is in proportion with, and the ratio.
+        turns: angle of a periodic effect (see `shaft`) -> how far it turns in a run at most [rad].
         readings: error that an effect adds to a sensor -> starts of runs that it has read, with
             factors: a run begins there less the error.
     """
@@ -84,6 +86,7 @@ class Problem:
     further: Sequence[Callable[[], Problem]] = ()
     source: Source = NO_SOURCE
     shafts: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    turns: Mapping[str, float] = field(default_factory=dict)
     readings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -355,15 +358,19 @@ class Problem:
                     and full not in changed.constants
                     and full not in stated
                 ):
-                    added.append(
-                        free_parameter(
-                            variable, full, full, strength=variable.name in strengths,
-                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
-                        )
+                    free = free_parameter(
+                        variable, full, full, strength=variable.name in strengths,
+                        hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
                     )  # fmt: skip
+                    added.append(self._counting(free))
         return changed.changed(
             parameters=[*self.parameters, *added], runs=[changed.standing(run) for run in self.runs]
         )
+
+    def _counting(self, parameter: Parameter) -> Parameter:
+        """A parameter that counts cycles per turn, spanned so that a run has one cycle more."""
+        turned = self.turns.get(shaft(parameter.hints.cycles), 0.0)
+        return replace(parameter, span=2.0 * math.pi / turned) if turned else parameter
 
     def standing(self, run: MeasuredRun) -> MeasuredRun:
         """The run with where the shafts of effects stand when it begins, as `shafts` says."""

@@ -19,9 +19,12 @@ conversion, IEEE Trans. Ind. Electron. 37(6), 1990.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from ..errors import UnknownNameError, listing
 from ..spec.hints import NO_HINTS, SearchHints
@@ -94,11 +97,19 @@ class Reading:
                 free("A", WAVE, -GREATEST_WAVE, GREATEST_WAVE, span=TRIED_WAVE, unit=own.unit,
                      text="amplitude of the error, 0 = absent"),
                 free("n", CYCLES, FEWEST, MOST_CYCLES, start=1.0, text="cycles per turn",
-                     hints=SearchHints(cycles=own.signal)),
+                     span=self._one_cycle(problem), hints=SearchHints(cycles=own.signal)),
                 free("psi", PHASE, -WINDING, WINDING, unit="rad", text="phase at angle 0",
                      hints=SearchHints(mix="turn")),
             ]  # fmt: skip
         return problem.with_parameters([*problem.parameters, *added])
+
+    def _one_cycle(self, problem: Problem) -> float:
+        """How much more cycles per turn are one cycle more in a run."""
+        column = [c.name for c in problem.channels].index(self.channel)
+        turned = [np.nanmax(rows) - np.nanmin(rows) for run in problem.chosen("identification")
+                  if np.isfinite(rows := run.data[:, column]).any()]  # fmt: skip
+        most = max(turned, default=0.0)
+        return 2.0 * math.pi / most if most > 0.0 else 1.0
 
 
 def recorded(parameters: Iterable[Parameter]) -> set[str]:

@@ -32,7 +32,7 @@ from .probes import batches
 from .rivals import challenged, nearly, reconsidered, restarted
 from .rounds import Round, named_few
 from .secant import Bench, model_values
-from .shafts import geared
+from .shafts import followed_shafts
 from .shortlist import promising, remaining
 from .signature import Signature, merge, worthy
 from .whiteness import whiteness_tests
@@ -159,9 +159,10 @@ class Search(LateValueFitter):
             raw = self.count_in_full()
         self.evaluations += first.evaluations
         if self.known:
-            shafts = geared(first.simulator, first.theta, _changes(self.known, self.declared))
-            raw = self.taken(raw.changed(shafts=shafts))
-            whole = first.problem.changed(shafts=shafts)
+            changes = _changes(self.known, self.declared)
+            shafts, turns = followed_shafts(first.simulator, first.theta, changes)
+            raw = self.taken(raw.changed(shafts=shafts, turns=turns))
+            whole = first.problem.changed(shafts=shafts, turns=turns)
             first = replace(first, simulator=self.simulator.of(whole))
         self.say(
             f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"

@@ -1,4 +1,4 @@
-"""Where the shafts of periodic effects stand when a run begins.
+"""Where the shafts of periodic effects stand when a run begins, and how far they turn.
 
 A law that repeats over the angle of a shaft integrates the shaft's speed where its balance offers
 no angle, from 0 in each run; its phase would be another one in each. If that angle moves in
@@ -7,6 +7,9 @@ proportion with one of which the log says where it begins,
     theta(t) - theta(0) = c (phi(t) - phi(0))      in all runs,
 
 both are one shaft, or one is geared to the other, and theta(0) = c phi(0).
+
+Over a run in which the shaft turns by T, a law that repeats n times per turn has one cycle more
+with n + 2 pi / T: a typical change of n, over much less of which differences are taken.
 """
 
 from __future__ import annotations
@@ -37,10 +40,22 @@ class Gear(NamedTuple):
     misfit: float
 
 
-def geared(
+class Shafts(NamedTuple):
+    """What is known of the shafts of periodic effects (see `problem.shaft`).
+
+    Attributes:
+        gears: shaft -> angle that says where it stands when a run begins, and the ratio.
+        turns: angle over which an effect repeats -> how far it turns in a run at most [rad].
+    """
+
+    gears: dict[str, tuple[str, float]]
+    turns: dict[str, float]
+
+
+def followed_shafts(
     simulator: Simulator, theta: Vector, changes: Iterable[Mapping[str, str]]
-) -> dict[str, tuple[str, float]]:
-    """Shafts of effects that stand where another angle says: shaft -> its name and the ratio.
+) -> Shafts:
+    """Shafts of effects, followed through the runs.
 
     Args:
         simulator: of the declared system.
@@ -49,33 +64,48 @@ def geared(
     """
     problem = simulator.problem
     stated = _stated(problem)
-    runs = [run for run in problem.chosen("identification") if set(stated) & set(run.starts)]
-    found: dict[str, tuple[str, float]] = {}
+    runs = problem.chosen("identification")
+    found = Shafts({}, {})
     asked: set[str] = set()
-    if not runs:
-        return found
     for change in changes:
         try:
             changed = problem.with_effects(change)
         except UnbuiltError:
             continue  # the round that asks for these effects says so
-        own = {shaft(name): name for name in angles(problem, changed)}
-        wanted = {place: name for place, name in own.items() if place not in asked}
-        asked |= set(wanted)
-        if not wanted:
+        integrated = {shaft(name): name for name in angles(problem, changed)}
+        shown = {shaft(name): name for name in _repeated(problem, changed)}
+        own = {p: n for p, n in integrated.items() if p not in asked and stated}
+        outputs = {p: n for p, n in shown.items() if p not in asked}
+        asked |= {*own, *outputs}
+        if not own and not outputs:
             continue
         point = changed.nominal
         point[: theta.size] = theta
-        paths = followed(simulator.of(changed), point, runs, [*wanted.values(), *stated])
-        for k, place in enumerate(wanted):
+        names = [*own.values(), *outputs.values(), *stated]
+        paths = followed(simulator.of(changed), point, runs, names)
+        for k, place in enumerate(own):
             gears = [
-                _gear(name, [path[:, k] for path in paths], [path[:, j] for path in paths])
-                for j, name in enumerate(stated, start=len(wanted))
+                _gear(name, [path[:, k] for path in known], [path[:, j] for path in known])
+                for j, name in enumerate(stated, start=len(own) + len(outputs))
+                if (known := [p for p, run in zip(paths, runs, strict=True) if name in run.starts])
             ]
-            best = min(gears, key=lambda gear: gear.misfit)
-            if best.misfit <= TOGETHER:
-                found[place] = (best.name, best.ratio)
+            best = min(gears, key=lambda gear: gear.misfit, default=None)
+            if best is not None and best.misfit <= TOGETHER:
+                found.gears[place] = (best.name, best.ratio)
+        for k, place in enumerate(outputs, start=len(own)):
+            turned = max(float(np.ptp(path[:, k])) for path in paths)
+            whole = place.partition("[")[0]  # effects on several shafts are one to a parameter
+            found.turns[whole] = max(found.turns.get(whole, 0.0), turned)
     return found
+
+
+def _repeated(before: Problem, after: Problem) -> Iterator[str]:
+    """Angles over which effects repeat that only the second problem's system has."""
+    known = {p.name for p in before.parameters}
+    for p in after.parameters:
+        if p.hints.cycles and p.name not in known:
+            member, variables = after.plain().variables(p.hints.cycles)
+            yield from (f"{member.name}.{element}" for v in variables for element in v.elements())
 
 
 def angles(before: Problem, after: Problem) -> Iterator[str]:

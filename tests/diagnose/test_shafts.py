@@ -13,7 +13,7 @@ from benchmarks.motor_plant import draw, write_sets
 from cosim.calibrate.mapping import read_problem
 from cosim.calibrate.problem import Problem
 from cosim.data.signals import Constant
-from cosim.diagnose.shafts import geared
+from cosim.diagnose.shafts import followed_shafts
 from tests.problems import simulator
 
 SHEET = Path(__file__).parents[2] / "scenarios/motor_bench/data/motor_bench.toml"
@@ -38,7 +38,7 @@ def rippled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Bench]:
 
 def test_shafts_are_found_by_their_motion(rippled: tuple[Problem, Bench]) -> None:
     problem, _ = rippled
-    found = geared(simulator(problem), problem.nominal, CHANGES)
+    found, _ = followed_shafts(simulator(problem), problem.nominal, CHANGES)
     # the load's angle is the balance's own, and nothing is integrated there
     assert set(found) == {
         "motor.torque_constant.theta", "gearbox.ratio.theta", "gearbox.flange_a.theta"
@@ -54,16 +54,16 @@ def test_nothing_is_known_where_runs_say_nothing(rippled: tuple[Problem, Bench])
     problem, _ = rippled
     odd = {"load.flange.warm_up.t_on": 3.0}  # of an effect that is not there
     silent = problem.changed(runs=[replace(run, starts=odd) for run in problem.runs])
-    assert geared(simulator(silent), silent.nominal, CHANGES) == {}
+    assert followed_shafts(simulator(silent), silent.nominal, CHANGES).gears == {}
     resting = problem.changed(
         runs=[replace(run, inputs=dict.fromkeys(run.inputs, Constant(0.0))) for run in problem.runs]
     )
-    assert geared(simulator(resting), resting.nominal, CHANGES) == {}
+    assert followed_shafts(simulator(resting), resting.nominal, CHANGES).gears == {}
 
 
 def test_a_ripple_has_one_phase_in_all_runs(rippled: tuple[Problem, Bench]) -> None:
     problem, bench = rippled
-    shafts = geared(simulator(problem), problem.nominal, CHANGES[:1])
+    shafts, _ = followed_shafts(simulator(problem), problem.nominal, CHANGES[:1])
 
     def left(changed: Problem) -> list[float]:
         theta = changed.nominal
@@ -77,3 +77,27 @@ def test_a_ripple_has_one_phase_in_all_runs(rippled: tuple[Problem, Bench]) -> N
     # what is read when within a tick is worth up to a tenth of the noise beside such a ripple
     assert max(known) < 1.1
     assert max(left(problem.with_effects(CHANGES[0]))) > 2.0
+
+
+def test_a_span_of_cycles_is_one_more_in_a_run(rippled: tuple[Problem, Bench]) -> None:
+    """Also where the balance offers the angle; a count of cycles per turn has no other scale."""
+    problem, _ = rippled
+    _, turns = followed_shafts(simulator(problem), problem.nominal, CHANGES)
+    assert set(turns) == {
+        "motor.torque_constant.angle", "gearbox.ratio.angle", "gearbox.flange_a.angle",
+        "load.flange.angle",
+    }  # fmt: skip
+    # of the logs: the longest way of a run
+    angle = [c.name for c in problem.channels].index("angle")
+    turned = max(float(np.ptp(r.data[:, angle])) for r in problem.chosen("identification"))
+    # parameters of the sheet, not the bench's, and 5 mrad of noise
+    assert turns["motor.torque_constant.angle"] == pytest.approx(turned, rel=0.01)
+    assert turns["load.flange.angle"] == pytest.approx(turned / RATIO, rel=0.01)
+    known = problem.changed(turns=turns)
+    for change, name in zip(CHANGES, (RIPPLE, "gearbox.flange_a.cogging", "load.flange.cogging"),
+                            strict=True):  # fmt: skip
+        (span,) = (p.span for p in known.with_effects(change).parameters if p.name == f"{name}.n")
+        place, _, _ = name.rpartition(".")
+        assert span * turns[f"{place}.angle"] == pytest.approx(2.0 * np.pi)
+        (plain,) = (p for p in problem.with_effects(change).parameters if p.name == f"{name}.n")
+        assert plain.span == plain.nominal
