@@ -1,4 +1,9 @@
-"""Runs that begin where the model does not: in motion, or from a value that nobody stated."""
+"""Runs that begin where the model does not: in motion, or from a value that nobody stated.
+
+What a machine begins with are positions and speeds. Where they are the model's, and the machine
+stands as long as the model does, another current or torque is no other beginning: a force that the
+model lacks (friction, a detent, a weight) holds it there.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
+from ...spec.units import BASE, parse
 from .finding import Finding
 
 if TYPE_CHECKING:
+    from ..parts import MeasuredRun
+    from ..problem import Problem
     from ..simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -19,6 +27,9 @@ FIRST = 5
 """Samples at the beginning that count together."""
 OFF = 10.0
 """Deviations of their mean from which a beginning is another one."""
+RESTS = 3.0
+"""Deviations of one sample by which means of `FIRST` samples may differ in a machine that stands:
+five of their own, so that noise does not do it in any channel of any run."""
 MOVES = 0.25
 """Share of the way to the bounds by which the parameters are changed."""
 
@@ -63,12 +74,39 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
             f"{models[run.name][0, i]:.4g} {problem.channels[i].unit}".rstrip()
             for i in wrong
         )
+        if _held(simulator, run, models[run.name], wrong):
+            text = (
+                f"stands where the model stands, but not with the same effort ({names}): a force "
+                "that the model lacks, or a sensor's zero"
+            )
+            yield Finding("warning", "start", run.name, "", text)
+            continue
         text = (
             f"begins where the model does not ({names}): give what the system begins with in "
             '[starts] ("first:COLUMN" = "VARIABLE"), or estimate it as a [[nuisance]] with '
             "per_run = true, or begin with a sample at rest"
         )
         yield Finding("error", "start", run.name, "", text)
+
+
+def _held(simulator: Simulator, run: MeasuredRun, model: Vector, wrong: list[int]) -> bool:
+    """Whether the machine stands as long as the model does, and only efforts are not its own."""
+    problem = simulator.problem
+    sigma = problem.sigma
+    moved = np.any(np.abs(model - model[0]) > sigma, axis=1)
+    stands = int(np.argmax(moved)) if moved.any() else len(model)
+    if stands < 2 * FIRST or any(_moves(problem, i) for i in wrong):
+        return False
+    ends = np.nan_to_num(run.data[stands - FIRST : stands] - run.data[:FIRST])
+    # means of so few samples differ by their noise
+    return bool(np.all(np.abs(ends.mean(axis=0)) < RESTS * sigma))
+
+
+def _moves(problem: Problem, channel: int) -> bool:
+    """Whether a channel shows a position, a speed or what is counted of them; all unknown ones."""
+    _, (variable, *_) = problem.system().variables(problem.channels[channel].signal)
+    exponents = dict(zip(BASE, parse(variable.symbol).exponents, strict=True))
+    return not (exponents["kg"] or exponents["A"])
 
 
 def _median(values: Vector) -> Vector:

@@ -1,0 +1,72 @@
+"""Runs that begin elsewhere, and machines that a force holds where the model stands, too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.calibrate.checks.finding import Finding
+from cosim.calibrate.checks.starts import check_starts
+from cosim.calibrate.problem import Problem
+from tests.problems import simulator
+
+OFF = {"speed": 9.0, "current": 2.0, "voltage": 2.0, "angle": 1.0}
+"""Far beyond the noise, and what a quarter of the parameters' bounds changes."""
+
+
+@pytest.fixture(scope="module")
+def standing(short: Problem) -> dict[str, np.ndarray]:
+    """Noisy values of the model; the run `stairs` stands for a quarter of a second."""
+    random = np.random.default_rng(5)
+    values = {run.name: simulator(short).simulate(short.nominal, run) for run in short.runs}
+    return {n: v + short.sigma * random.standard_normal(v.shape) for n, v in values.items()}
+
+
+def found(short: Problem, data: dict[str, np.ndarray]) -> list[Finding]:
+    """In these values of the channels."""
+    problem = short.changed(runs=[replace(run, data=data[run.name]) for run in short.runs])
+    models = {run.name: simulator(short).simulate(short.nominal, run) for run in short.runs}
+    return list(check_starts(simulator(problem), models))
+
+
+@pytest.mark.parametrize("channel", ["current", "voltage"])
+def test_what_a_force_holds_at_rest_is_no_other_beginning(
+    short: Problem, standing: dict[str, np.ndarray], channel: str
+) -> None:
+    assert found(short, standing) == []
+    k = [c.name for c in short.channels].index(channel)
+    held = standing["stairs"].copy()
+    held[:, k] += OFF[channel]
+    (warning,) = found(short, {**standing, "stairs": held})
+    assert (warning.severity, warning.kind, warning.run) == ("warning", "start", "stairs")
+    assert (
+        f"stands where the model stands, but not with the same effort ({channel} " in warning.text
+    )
+
+
+@pytest.mark.parametrize(
+    ("channel", "fades"), [("angle", False), ("speed", False), ("current", True)]
+)
+def test_another_place_another_speed_and_what_changes_is_one(
+    short: Problem, standing: dict[str, np.ndarray], channel: str, fades: bool
+) -> None:
+    """The twin: a current that is gone before anything moves is what a drive began with."""
+    k = [c.name for c in short.channels].index(channel)
+    away = standing["stairs"].copy()
+    ahead = np.exp(-np.arange(len(away)) / 50.0) if fades else np.ones(len(away))
+    away[:, k] += 2.0 * OFF[channel] * ahead
+    (error,) = found(short, {**standing, "stairs": away})
+    assert (error.severity, error.kind, error.run) == ("error", "start", "stairs")
+    assert "begins where the model does not" in error.text
+
+
+def test_a_run_in_which_the_model_moves_at_once_begins_elsewhere(
+    short: Problem, standing: dict[str, np.ndarray]
+) -> None:
+    k = [c.name for c in short.channels].index("current")
+    away = standing["sines"].copy()
+    away[:, k] += 2.0 * OFF["current"]
+    (error,) = found(short, {**standing, "sines": away})
+    assert (error.severity, error.run) == ("error", "sines")
