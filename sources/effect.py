@@ -89,6 +89,7 @@ KINDS: dict[str, Kind] = {
             y="floor position y [m]",
             angle="wheel angle [rad]",
             speed="speed that the coefficient may depend on",
+            turning="speed of the shaft with whose angle the coefficient may repeat [rad/s]",
             current="current that the coefficient may depend on [A]",
             side="-1 right, +1 left of the vehicle",
             longitudinal="the same coefficient along the track or wheel",

@@ -32,7 +32,7 @@ def machine(m: Model, i: SX, measured: SX, voltage: SX, w: SX) -> None:
         unit="N.m/A",
         value=p.K_t,
         current=i,
-        speed=w,
+        turning=w,
     )
     k_t = p.K_t + ripple.effort
     winding = m.balance(

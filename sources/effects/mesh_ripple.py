@@ -45,7 +45,7 @@ EFFECT = Effect(
     "Transmission error of a gear that repeats with the angle of the output.",
     ("coefficient",),
     EPS,
-    needs=("speed",),
+    needs=("turning",),
     source="Taghirad and Bélanger 1998",
     unit="1",
 )
@@ -54,5 +54,5 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the variation of the ratio."""
     p, ratio = e.parameters(N, PSI, EPS), e.signal("value")
-    theta_b = shown_angle(e, "speed")
+    theta_b = shown_angle(e, "turning")
     e.add(ratio * p.n * p.eps * ca.cos(p.n * theta_b + p.psi))

@@ -36,7 +36,7 @@ EFFECT = Effect(
     "Torque constant that repeats with the angle.",
     ("coefficient",),
     R,
-    needs=("speed",),
+    needs=("turning",),
     source="Hanselman 2006",
     unit="N.m/A",
 )
@@ -45,5 +45,5 @@ EFFECT = Effect(
 def law(e: EffectModel) -> None:
     """Add the variation of the constant."""
     p, K = e.parameters(N, PSI, R), e.signal("value")
-    theta = shown_angle(e, "speed")
+    theta = shown_angle(e, "turning")
     e.add(p.r * K * ca.cos(p.n * theta + p.psi))

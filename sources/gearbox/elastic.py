@@ -60,7 +60,7 @@ def equations(m: Model) -> None:
     j_a = ca.fmax(p.J_a, SMALLEST_ROTOR)
     w_a = x.rotor_speed
 
-    ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, speed=u.w_b)
+    ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, turning=u.w_b)
     ratio = p.ratio + ripple.effort
     rate = w_a / ratio - u.w_b
     spring = m.balance(

@@ -16,7 +16,7 @@ def rigid(m: Model, efficiency: Callable[[SX, SX], SX]) -> None:
     u = m.inputs(qs.TAU_A, qs.W_B)
     p = m.parameters(qs.RATIO, qs.B, qs.J_A)
     # Speed and torque use the same ratio, so a ripple of it neither takes nor gives power.
-    ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, speed=u.w_b)
+    ripple = m.balance("ratio", "coefficient", unit="1", value=p.ratio, turning=u.w_b)
     ratio = p.ratio + ripple.effort
     w_a = ratio * u.w_b
     flange_b = m.balance("flange_b", "rotation", velocity=u.w_b, load=ratio * u.tau_a)

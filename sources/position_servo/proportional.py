@@ -57,7 +57,7 @@ def equations(m: Model) -> None:
             unit="N.m/A",
             value=p.K_t,
             current=nominal,
-            speed=u.w,
+            turning=u.w,
         ).effort
     )
     plain = on * (z.u_held - k_t * u.w) / p.R_a
