@@ -38,9 +38,8 @@ def _folder(given: Path) -> Path:
         return known[str(given)]
     here = sorted(path.name for path in given.parent.glob("[!.]*") if path.is_dir())
     if len(given.parts) > 1:
-        raise ScenarioError(
-            f"{given}: there is no such folder; beside it {listing(here, given.name)}"
-        )
+        beside = f"; beside it {listing(here, given.name)}" if here else ""
+        raise ScenarioError(f"{given}: there is no such folder{beside}")
     raise UnknownNameError(
         f"{given}: there is no such folder, and no data set of this name comes with cosim; "
         f"{listing([*known, *here], str(given))}"
@@ -78,7 +77,8 @@ def find_mapping(folder: Path, rig: str) -> Path:
     if not rig:
         raise ScenarioError(
             f"{folder}: has no set.toml that names a rig, and there is no dataset.toml in it nor "
-            "in the two folders above; write one (docs/datasets.md), or name one with --mapping"
+            "in the two folders above; make one of logs with `cosim data import LOGS --system "
+            "SYSTEM` (docs/own_logs.md), write one (docs/datasets.md), or name one with --mapping"
         )
     raise ScenarioError(
         f"{folder}: no dataset.toml says how rig {rig!r} maps to a system; {listing(known, rig)}; "

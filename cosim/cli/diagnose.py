@@ -113,7 +113,7 @@ def diagnose_command(
 
 @contextmanager
 def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]:
-    """Ctrl-C ends the search and reports; a second one ends the program."""
+    """Ctrl-C or SIGTERM ends the search and reports; a second one ends the program."""
 
     def end() -> None:
         if budget.stopped:
@@ -121,7 +121,7 @@ def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]
         budget.stop("by hand")
         say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")
 
-    with taken(signal.SIGINT, end):
+    with taken(signal.SIGINT, end), taken(signal.SIGTERM, end):
         yield
 
 

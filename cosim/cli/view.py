@@ -120,5 +120,6 @@ def _recording(place: Path) -> Path:
             f"{place} has {len(folders)} runs; take one of them: {listing(folders)}"
         )
     raise UnknownNameError(
-        f"{place}: there is no recording.parquet; give the folder that 'cosim run' wrote"
+        f"{place}: there is no recording.parquet; give a folder that `cosim run` has written "
+        "(out/motor_bench/ST1 after `cosim run motor_bench`)"
     )

@@ -6,6 +6,7 @@ All of it at the system's own values, over the beginning of the runs that are fi
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.clocks import clocked
 from ..calibrate.differences import jacobian
-from ..calibrate.parts import MeasuredRun, Parameter, adjustable
+from ..calibrate.parts import MeasuredRun, Parameter, adjustable, natural
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError, InputError
@@ -56,7 +57,8 @@ PARALLEL = 0.9
 NEARER = 2.0
 """What a parameter counts more that belongs to what is measured, where another does the same."""
 BUILT = ("ratio", "teeth", "poles", "counts")
-"""Words of parameters that are known from how a machine is built."""
+"""Words in names of parameters that are known from how a machine is built; all but the first also
+in what is said of them, where a ratio may be one of damping."""
 
 
 @dataclass(frozen=True)
@@ -232,9 +234,14 @@ def _speed(run: MeasuredRun, index: int) -> float:
 # -- parameters ------------------------------------------------------------------------------------
 
 
-def candidates(problem: Problem) -> tuple[list[Parameter], list[str]]:
-    """Parameters of the system that may be estimated, and those that are 0 and so have no size."""
-    found, zero = [], []
+def candidates(problem: Problem) -> tuple[list[Parameter], list[Parameter], list[str]]:
+    """Parameters of the system that may be estimated, those that are known from how the machine is
+    built (ratios, counts per turn, periods of loops and all else that can only be set beforehand),
+    and those that are 0 and so have no size.
+    """
+    found: list[Parameter] = []
+    built: list[Parameter] = []
+    zero: list[str] = []
     set_ = {n for p in problem.parameters for n, _ in p.targets} | set(problem.constants)
     for name, member in problem.plain().members.items():
         for variable in member.description.variables.values():
@@ -247,12 +254,14 @@ def candidates(problem: Problem) -> tuple[list[Parameter], list[str]]:
             if value == 0.0:
                 zero.append(full)
                 continue
-            found.append(
-                _bounded(
-                    full, variable.symbol, value, variable.minimum, variable.maximum, variable.text
-                )
+            bounded = _bounded(
+                full, variable.symbol, value, variable.minimum, variable.maximum, variable.text
             )
-    return found, zero
+            said = set(re.findall("[a-z]+", variable.text.lower())) & set(BUILT[1:])
+            known = said or any(word in variable.name.lower() for word in BUILT)
+            known = known or not natural(variable, ())
+            (built if known else found).append(bounded)
+    return found, built, zero
 
 
 def _bounded(
@@ -353,14 +362,12 @@ def add_parameters(
     Returns:
         Those that the logs do not tell apart from these.
     """
-    tried, zero = candidates(problem)
+    free, built, zero = candidates(problem)
     if given:
-        known = {p.name: p for p in tried}
+        known = {p.name: p for p in (*free, *built)}
         for name, numbers in given.items():
             draft.parameters.append(_entry(_stated(problem, name, numbers, known.get(name))))
         return []
-    built = [p for p in tried if any(word in p.name.lower().partition(".")[2] for word in BUILT)]
-    free = [p for p in tried if p not in built]
     chosen, deciding = told(problem, free) if free else ([], [])
     draft.parameters += [_entry(p) for p in free if p.name in chosen]
     draft.parameters += [_assumed(p) for p in free if p.name in deciding]

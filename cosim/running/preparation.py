@@ -87,3 +87,10 @@ def recorded_signals(
     kept = list(filter(has, (*everything, *shown)))
     checked = filter(has, (name for check in scenario.checks for name in check.needs))
     return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
+
+
+def shortened(scenario: Scenario, duration: float) -> Scenario:
+    """A shorter run keeps the checks whose time window it reaches; others need the whole run."""
+    end = scenario.start + duration
+    kept = tuple(check for check in scenario.checks if check.before <= end)
+    return replace(scenario, duration=duration, checks=kept)

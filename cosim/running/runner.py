@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from ..master.outline import Outline
 from ..master.session import Session
 from ..master.twin import Twin
 from ..scenario import scenario as scenarios
-from ..scenario.checks import CheckResult, evaluate
+from ..scenario.checks import CheckResult, evaluate, met
 from ..scenario.scenario import Scenario
 from ..ssp import read_scenario
 from ..system.provider import Provider
@@ -34,7 +35,13 @@ from ..view.scene import Scenes, needs, scenes
 from .checks_table import checks_html
 from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
-from .preparation import left_out, recorded_signals, recording_interval, swapped_system
+from .preparation import (
+    left_out,
+    recorded_signals,
+    recording_interval,
+    shortened,
+    swapped_system,
+)  # fmt: skip
 
 Vector = NDArray[np.float64]
 SHOWN_RUNS = 3
@@ -65,11 +72,14 @@ class RunResult:
     fmu_steps: int
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<RunResult of {self.scenario.name}: {met(self.checks)}, {self.recording!r}>"
+
     def _repr_html_(self) -> str:
         from ..display.html import Html, join
 
-        differences = (item._repr_html_() for item in self.comparisons.values())
         checks = checks_html(self.scenario.name, self.checks)
+        differences = (item._repr_html_() for item in self.comparisons.values())
         return join(*map(Html, (checks, self.recording._repr_html_(), *differences)))
 
     def plot(self, path: Path | str | None = None) -> Any:
@@ -104,6 +114,9 @@ class Result:
     runs: Mapping[str, RunResult]
     files: tuple[Path, ...] = field(default=())
 
+    def __repr__(self) -> str:
+        return f"<Result of {self.name}: runs {len(self.runs)}, {met(self.checks.values())}>"
+
     @property
     def recording(self) -> Recording:
         """The recording of a scenario with one run.
@@ -112,10 +125,8 @@ class Result:
             ValueRangeError: there are several; take `runs[name].recording`.
         """
         if len(self.runs) != 1:
-            raise ValueRangeError(
-                f"{self.name} has {len(self.runs)} runs; take runs[name].recording, name one of "
-                f"{', '.join(self.runs)}"
-            )
+            of = f"{self.name} has {len(self.runs)} runs; take runs[name].recording, name one of "
+            raise ValueRangeError(f"{of}{', '.join(self.runs)}")
         return next(iter(self.runs.values())).recording
 
     @property
@@ -423,7 +434,7 @@ def _run(
     for run_name, item in items.items():
         item = adjusted(item, **adjustments)
         place = None if out is None else out / run_name
-        told = None if progress is None else _told(progress, item.name)
+        told = None if progress is None else partial(progress, item.name)
         try:
             result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
@@ -468,7 +479,7 @@ def adjusted(
     does not reach.
     """
     if duration is not None and duration < item.duration:
-        item = _shortened(item, duration)
+        item = shortened(item, duration)
     used = step if step is not None else item.step
     if record_period is not None and record_period < used:
         raise ValueRangeError(
@@ -486,14 +497,3 @@ def adjusted(
         duration=duration if duration is not None else item.duration,
         period=record_period if record_period is not None else item.period,
     )
-
-
-def _shortened(scenario: Scenario, duration: float) -> Scenario:
-    """A shorter run keeps the checks whose time window it reaches; others need the whole run."""
-    end = scenario.start + duration
-    kept = tuple(check for check in scenario.checks if check.before <= end)
-    return replace(scenario, duration=duration, checks=kept)
-
-
-def _told(progress: Callable[[str, float], None], name: str) -> Callable[[float], None]:
-    return lambda fraction: progress(name, fraction)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -278,3 +278,11 @@ def evaluate(
         measured_unit=measured_unit,
         unfit=unfit,
     )
+
+
+def met(checks: Iterable[CheckResult]) -> str:
+    """How many checks are met of those that are judged."""
+    judged = [check for check in checks if not check.unfit]
+    if not judged:
+        return "no checks"
+    return f"{sum(check.ok for check in judged)} of {len(judged)} checks met"

@@ -88,7 +88,11 @@ def test_before_the_declared_parameters_are_fitted_there_is_nothing_to_report(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
-def test_ctrl_c_ends_the_search_with_a_report(rubbing: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_search_with_a_report(
+    rubbing: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    """Ctrl-C by hand; `timeout` and whoever stops containers send SIGTERM."""
     command = [sys.executable, "-m", "cosim", "diagnose", str(rubbing), "--out", str(tmp_path)]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -96,7 +100,7 @@ def test_ctrl_c_ends_the_search_with_a_report(rubbing: Path, tmp_path: Path) -> 
         assert process.stderr is not None
         for line in process.stderr:
             if "round 1" in line:
-                process.send_signal(signal.SIGINT)
+                process.send_signal(number)
                 break
         out, said = process.communicate()
     assert process.returncode == 0, said
