@@ -10,6 +10,7 @@ from typing import Any
 
 WIDTH = 100
 """Of comments."""
+COARSER = "A diagnosis may search more coarsely: what this adds, it takes from the data."
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Draft:
 
     Attributes:
         head: comment at the top.
-        system, step, period, time: as of the mapping; `period` 0 leaves it out.
+        system, step, search_step, period, time: as of the mapping; 0 leaves one out.
         step_comment, time_comment: what is said about them.
         columns: entries of `[columns]`.
         inputs: full name of the input -> column.
@@ -50,6 +51,7 @@ class Draft:
     step: float
     time: str
     period: float = 0.0
+    search_step: float = 0.0
     step_comment: str = ""
     time_comment: str = ""
     columns: list[ColumnEntry] = field(default_factory=list)
@@ -65,6 +67,8 @@ class Draft:
         """The file."""
         lines = [*_comment(self.head), f"system = {_value(self.system)}"]
         lines += [*_comment(self.step_comment), f"step = {_value(self.step)}"]
+        if self.search_step:
+            lines += [*_comment(COARSER), f"search_step = {_value(self.search_step)}"]
         if self.period:
             lines.append(f"period = {_value(self.period)}")
         lines.append('algorithm = "gauss_seidel"')

@@ -26,7 +26,7 @@ from .given import take
 from .guess import Guess
 from .inspect import FileReport, inspect
 from .matching import Column, Match, Matches, Place, candidates, guess, places_of
-from .refine import add_parameters, add_starts, choose_step, short
+from .refine import add_parameters, add_starts, choose_steps, short
 from .runs import Run, check_alike, parts_of
 
 NAME = "dataset.toml"
@@ -353,7 +353,8 @@ def _refined(
     inputs = [signal for run in first.runs for signal in run.inputs.values()]
     shortest = min((_interval(signal) for signal in inputs), default=draft.period)
     told("trying communication steps")
-    draft.step, change = choose_step(first, max(shortest, draft.period * 0.02))
+    draft.step, change, search = choose_steps(first, max(shortest, draft.period * 0.02))
+    draft.search_step = search if search > draft.step else 0.0
     if draft.nuisances:  # late clocks ask for what is between the samples
         draft.period = draft.step
     if change is None:

@@ -6,9 +6,11 @@ All of it at the system's own values, over the beginning of the runs that are fi
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,9 @@ DIVISIONS = (1, 2, 4, 5, 8, 10, 20, 40, 50, 100)
 ENOUGH, FINE = 0.1, 0.03
 """Change by a finer step, over the noise, below which a step is fine enough; the second one adds
 less than a nat to 2000 samples, which nobody can take for physics."""
+SEARCHED = 1.0
+"""What a search's step may change, over the noise: a diagnosis takes it from the data, where the
+parameters of its fits hardly change it (`calibrate.deferred`)."""
 HELD = 20.0
 """Steps in an interval of commands with a clock of their own, at most: commands that come between
 two steps are late by half a step, so errors fall with the step only, and slowly."""
@@ -91,12 +96,27 @@ def short(problem: Problem) -> Problem:
 # -- step ------------------------------------------------------------------------------------------
 
 
-def choose_step(problem: Problem, shortest: float) -> tuple[float, float | None]:
-    """A communication step, and what the next finer one changes over the noise (None if unknown).
+class Steps(NamedTuple):
+    """Communication steps.
 
-    The coarsest whose next finer one changes less than `ENOUGH`. Clocks that are estimated are
-    tried late by a part of a sample: what is recorded is interpolated then, and must change less
-    than `FINE`. (Errors of the exchange of several FMUs are measured and removed by a diagnosis.)
+    Attributes:
+        step: that is right.
+        change: what the next finer one changes, over the noise; None if that is not known.
+        search: a coarser one for thousands of simulations, the same if none will do.
+    """
+
+    step: float
+    change: float | None
+    search: float
+
+
+def choose_steps(problem: Problem, shortest: float) -> Steps:
+    """The coarsest communication step whose next finer one changes less than `ENOUGH`, and the
+    coarsest that changes less than `SEARCHED` from there.
+
+    Clocks that are estimated are tried late by a part of a sample: what is recorded is interpolated
+    then, and must change less than `FINE`, and a search takes the same steps. (Errors of the
+    exchange of several FMUs are measured and removed by a diagnosis.)
 
     Args:
         problem: with `period`, the interval of samples.
@@ -127,15 +147,24 @@ def choose_step(problem: Problem, shortest: float) -> tuple[float, float | None]
     least = shortest / HELD if clocks else 0.0
     allowed = [n for n in DIVISIONS if least <= period / n <= 0.5 * shortest]
     allowed = allowed or [DIVISIONS[-1]]
-    for division, finer in itertools.pairwise(allowed):
+
+    def changed(division: int, finer: int) -> float:
         coarse, fine = at(division), at(finer)
         if coarse is None or fine is None:
-            continue
+            return math.inf
         apart = np.nanmean(((coarse - fine) / problem.sigma) ** 2, axis=0)
-        change = float(np.sqrt(np.nanmax(apart)))
-        if change < enough:
-            return period / division, change
-    return period / allowed[-1], None
+        return float(np.sqrt(np.nanmax(apart)))
+
+    right, change = allowed[-1], None
+    for division, finer in itertools.pairwise(allowed):
+        if (found := changed(division, finer)) < enough:
+            right, change = division, found
+            break
+    search = right
+    if not clocks:  # whole multiples of the right one
+        coarser = (n for n in allowed if n < right and right % n == 0)
+        search = next((n for n in coarser if changed(n, right) < SEARCHED), right)
+    return Steps(period / right, change, period / search)
 
 
 # -- start values ----------------------------------------------------------------------------------

@@ -57,3 +57,17 @@ def test_a_factor_of_a_run_in_which_all_else_is_wrong_is_the_machine(noisy) -> N
         data[:, names.index(name)] = walk * problem.sigma[names.index(name)] * 10.0
     runs = [replace(r, data=data) if r.name == "stairs" else r for r in problem.runs]
     assert ("stairs", "voltage", "error") not in units(problem.changed(runs=runs))
+
+
+@pytest.mark.parametrize(("factor", "named"), [(1e3, True), (30.0, False)])
+def test_a_column_a_thousand_times_too_large_need_not_follow(
+    noisy, factor: float, named: bool
+) -> None:
+    """A motor whose load has friction that the model lacks, its current in thousandths."""
+    problem = noisy(0)
+    index = [c.name for c in problem.channels].index("current")
+    random = np.random.default_rng(4)
+    data = {run.name: run.data.copy() for run in problem.runs}
+    for values in data.values():
+        values[:, index] = factor * np.std(values[:, index]) * random.standard_normal(len(values))
+    assert units(problem.with_data(data)) == ([("", "current", "error")] if named else [])

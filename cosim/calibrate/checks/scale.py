@@ -17,9 +17,14 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 FOLLOWS = 0.9
 """Correlation from which a column counts as following a signal."""
+MOVES = 5.0
+"""Deviations of the noise by which a signal must move to be compared."""
 STRANGE = 8.0
 """A column that is so many times too large is no measurement of the signal. By less, it may be
 what the model lacks, unless the factor is one of those below: cold grease triples a current."""
+BEYOND = 300.0
+"""A column that changes by so many times what its signal does is in another unit even where it does
+not follow: what a model lacks may double a current or triple it, and by thousandths it is 1000."""
 LONG = 1e3
 """Communication steps between samples from which the clock may count thousandths of a second."""
 FORETOLD = 0.2
@@ -56,7 +61,7 @@ def _follow(
     for run in problem.runs:
         measured, simulated = _centred(problem, models, index, index, run)
         power, noise = float(simulated @ simulated), float(measured @ measured)
-        if not measured.size or noise == 0.0 or np.std(simulated) < 5.0 * sigma:
+        if not measured.size or noise == 0.0 or np.std(simulated) < MOVES * sigma:
             continue
         cross = float(measured @ simulated)
         correlation = cross / float(np.sqrt(power * noise))
@@ -93,6 +98,16 @@ def _unit(size: float) -> str:
     """What is wrong with the unit of a column that is so many times its signal, "" if unknown."""
     near = min(FACTORS, key=lambda item: abs(np.log(size / FACTORS[item])))
     return near if abs(np.log(size / FACTORS[near])) < 0.2 else ""
+
+
+def _spread(problem: Problem, models: Mapping[str, Vector], index: int) -> float:
+    """By how many times what its signal does a column changes, in the median over the runs."""
+    sizes = []
+    for run in problem.runs:
+        measured, simulated = _centred(problem, models, index, index, run)
+        if measured.size and np.std(simulated) >= MOVES * problem.channels[index].sigma:
+            sizes.append(float(np.std(measured) / np.std(simulated)))
+    return float(np.median(sizes)) if sizes else 0.0
 
 
 def _size(follow: Mapping[str, tuple[float, float]]) -> float:
@@ -143,6 +158,10 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
     channel = problem.channels[index]
     follow = _follow(problem, models, index)
     if not follow:
+        if (size := _spread(problem, models, index)) > BEYOND:
+            unit = f" [{channel.unit}]" if channel.unit else ""
+            text = f"changes by {size:.3g} times what it does in the model{unit}: another unit?"
+            yield Finding("error", "unit", "", channel.name, text)
         return
     turned = [name for name, (slope, _) in follow.items() if slope < 0.0]
     if len(turned) > len(follow) / 2 and len(follow) >= len(problem.runs) / 2:
