@@ -113,15 +113,22 @@ def diagnose_command(
 
 @contextmanager
 def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]:
-    """Ctrl-C or SIGTERM ends the search and reports; a second one ends the program."""
+    """Ctrl-C or SIGTERM ends the search and reports; a second Ctrl-C ends the program.
+
+    `timeout` sends its signal to the command and to its group, so a second SIGTERM is the first.
+    """
 
     def end() -> None:
+        if not budget.stopped:
+            budget.stop("by hand")
+            say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")
+
+    def again() -> None:
         if budget.stopped:
             raise KeyboardInterrupt
-        budget.stop("by hand")
-        say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")
+        end()
 
-    with taken(signal.SIGINT, end), taken(signal.SIGTERM, end):
+    with taken(signal.SIGINT, again), taken(signal.SIGTERM, end):
         yield
 
 

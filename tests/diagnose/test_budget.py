@@ -92,7 +92,7 @@ def test_before_the_declared_parameters_are_fitted_there_is_nothing_to_report(
 def test_a_signal_ends_the_search_with_a_report(
     rubbing: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
-    """Ctrl-C by hand; `timeout` and whoever stops containers send SIGTERM."""
+    """Ctrl-C by hand; `timeout` sends SIGTERM, to the command and to its group."""
     command = [sys.executable, "-m", "cosim", "diagnose", str(rubbing), "--out", str(tmp_path)]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -101,6 +101,8 @@ def test_a_signal_ends_the_search_with_a_report(
         for line in process.stderr:
             if "round 1" in line:
                 process.send_signal(number)
+                if number == signal.SIGTERM:
+                    process.send_signal(number)
                 break
         out, said = process.communicate()
     assert process.returncode == 0, said
