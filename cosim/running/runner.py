@@ -41,7 +41,7 @@ from .preparation import (
     recording_interval,
     shortened,
     swapped_system,
-)  # fmt: skip
+)
 
 Vector = NDArray[np.float64]
 SHOWN_RUNS = 3

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
-from ...spec.units import BASE, parse
+from ...spec.units import BASE
 from .finding import Finding
 
 if TYPE_CHECKING:
@@ -103,9 +103,11 @@ def _held(simulator: Simulator, run: MeasuredRun, model: Vector, wrong: list[int
 
 
 def _moves(problem: Problem, channel: int) -> bool:
-    """Whether a channel shows a position, a speed or what is counted of them; all unknown ones."""
+    """Whether a channel may show a position or a speed: its signal's unit is of no effort."""
     _, (variable, *_) = problem.system().variables(problem.channels[channel].signal)
-    exponents = dict(zip(BASE, parse(variable.symbol).exponents, strict=True))
+    if variable.unit is None:
+        return True
+    exponents = dict(zip(BASE, variable.unit.exponents, strict=True))
     return not (exponents["kg"] or exponents["A"])
 
 
