@@ -272,7 +272,7 @@ class Descent:
             whole = self.step(normal, damping)
             straight = self.straight
             if abs(self.promised) < SETTLED:
-                return damping <= FIRM  # more damped, any step promises nothing
+                return True
             # a limit or a threshold is passed: the direction is right, but not so far
             if not (self.restored(normal, whole, damping) or any(
                 self.attempt(stepped(self.theta, part * straight, self.products)) for part in PARTS
@@ -298,19 +298,25 @@ class Descent:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
         left = DRAFTED if draft else RENEWALS
-        rough = draft or self.problem.unstable
+        if not self.products:
+            self.length = STEPS[-1]
         while True:
             before, left = self.cost, left - 1
             normal = self.normal(self.length, central=not draft)
+            bent = bool(self.products) and not (draft or self.uneven or self.problem.unstable)
             self.step(normal, FIRM)
             promised = self.promised
-            if self.settle(normal, CORRECTIONS):
+            settled = self.settle(normal, CORRECTIONS)
+            # more damped, any step promises nothing
+            if settled and (self.damping <= FIRM or not bent):
                 break
             fall, enough = before - self.cost, self.enough(ROUGHLY if draft else EVEN)
-            if max(fall, promised) < enough:
-                break
-            good = KEPT * promised < fall < CORRECTIONS * promised
-            if not good and not rough and self.length > SHORTEST:
+            if bent:
+                poor = not KEPT * promised < fall < CORRECTIONS * promised
+                poor &= max(fall, promised) >= enough
+            else:
+                poor = fall == 0.0 and not (draft or self.problem.unstable)
+            if poor and self.length > SHORTEST:
                 self.length, left, self.valley = SHRUNK * self.length, VALLEY, True
             elif fall < enough or not left:
                 break

@@ -358,19 +358,25 @@ class Problem:
                     and full not in changed.constants
                     and full not in stated
                 ):
-                    free = free_parameter(
-                        variable, full, full, strength=variable.name in strengths,
-                        hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
+                    added.append(
+                        free_parameter(
+                            variable, full, full, strength=variable.name in strengths,
+                            hints=hints.get(variable.name, NO_HINTS).within(name, variable.name),
+                        )
                     )  # fmt: skip
-                    added.append(self._counting(free))
         return changed.changed(
             parameters=[*self.parameters, *added], runs=[changed.standing(run) for run in self.runs]
         )
 
-    def _counting(self, parameter: Parameter) -> Parameter:
-        """A parameter that counts cycles per turn, spanned so that a run has one cycle more."""
-        turned = self.turns.get(shaft(parameter.hints.cycles), 0.0)
-        return replace(parameter, span=2.0 * math.pi / turned) if turned else parameter
+    def counting(self) -> Problem:
+        """The problem with parameters that count cycles per turn spanned by one more in a run."""
+        turned = [self.turns.get(shaft(p.hints.cycles), 0.0) for p in self.parameters]
+        return self.with_parameters(
+            [
+                replace(p, span=2.0 * math.pi / angle) if angle else p
+                for p, angle in zip(self.parameters, turned, strict=True)
+            ]
+        )
 
     def standing(self, run: MeasuredRun) -> MeasuredRun:
         """The run with where the shafts of effects stand when it begins, as `shafts` says."""

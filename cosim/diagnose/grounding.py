@@ -3,7 +3,8 @@
 What a coarse communication step adds to the model is taken from the data at one point (`deferred`).
 Where runs meet limits by ticks, that varies so much with the parameters that a fit which begins at
 this point ends there: the data are only right for it. Steps at the rig's own step need no
-correction, and lead to where the correction is taken next.
+correction, and lead to where the correction is taken next. Counts of cycles per turn are spanned by
+one cycle more in a run there: over their own sizes, differences turn the phase by whole turns.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
     measured = {run.name: run.data for run in raw.runs}
     problem = winner.simulator.problem.with_data(measured).changed(step=raw.step)
     try:
-        simulator = winner.simulator.limited({}).of(problem)
+        simulator = winner.simulator.limited({}).of(problem.counting())
         fine = fit(simulator, winner.estimate.theta, effort=STEPS)
     except CosimError as error:
         fitter.say(f"{winner.effects[-1].label} could not be fitted at the rig's step: {error}")
