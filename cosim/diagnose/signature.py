@@ -23,6 +23,9 @@ or less than 1/50 of what the best one gains, is not simulated again."""
 KEPT = 40
 """Candidates that go from one run to all of them at most: each costs a simulation of all runs, and
 so many are a fit's worth (two for each of ten parameters, and its steps)."""
+DIGITS = 5
+"""Of gains by which candidates are put in order: signatures of two laws that are one agree to 1e-6
+(`merge`), and what is behind that depends on the processor."""
 HIDDEN = 0.98
 """Share of a signature's energy beyond which one run cannot tell it from other parameters."""
 WHOLES = 3
@@ -123,7 +126,8 @@ def worthy(found: Sequence[Signature], starts: Container[str] = ()) -> list[Sign
         for s in found
         if s.score.gain > max(EVIDENT, SHARE * best) or (s.score.size > 0.0 and s.absorbed > HIDDEN)
     ]
-    kept.sort(key=lambda s: -s.score.gain)
+    # of laws that are one in this run, the first of the catalogue stays first on any machine
+    kept.sort(key=lambda s: -float(f"{s.score.gain:.{DIGITS}g}"))
     kept = kept[:KEPT]
     known = {s.candidate for s in kept}
     return kept + [
