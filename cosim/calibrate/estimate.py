@@ -170,7 +170,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     scaled = known + unknown
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
-        scaled = profiled(run, normal, scaled, vectors[:, doubtful])
+        scaled = profiled(run, scaled, vectors[:, doubtful])
     # any value between two of a lattice may do as well
     lattice = np.array([p.hints.lattice**2 / 12.0 for p in problem.parameters]) / scale**2
     scaled += np.diag(lattice)

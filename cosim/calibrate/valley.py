@@ -12,27 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
+from .broyden import Broyden
 from .descent import Descent
 from .felt import STUCK
-from .normal import KNOWN, Normal, gradient
+from .normal import KNOWN
 from .problem import Problem
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
 """Weight in a weak direction from which a parameter is moved by itself."""
-FAR, FOLLOWED, SLIGHT = 1.0, 6, 0.1
-"""Spans by which that is done at most, steps of the others, and the fall [nats] that ends them."""
+FAR, FOLLOWED, SLIGHT = 1.0, 20, 0.1
+"""Spans by which that is done at most, steps of the others (Broyden's end in twice as many as there
+are directions, D. M. Gay 1979; jumps blur ten at most), and the fall [nats] that ends them."""
 CLAIMED, SURE, SEEN, LOST = 4.0, 0.5, 8.0, 80.0
 """Standard deviations by which it is done first, the share of the information claimed that settles
 it, and rises of the cost [nats] at which it has gone far enough, and at which it has gone astray.
 """
 SHARED = 0.1
 """Share of a step [spans] from which a parameter takes part in it."""
-LONGER, SHORTER = (1.0, 3.0, 9.0, 27.0), 0.3
-"""Multiples of a step that are tried as long as it gets better, and the one if it has not."""
+LONGER = 10.0
+"""Multiple of a step that promises nothing: rounded derivatives claim to know, and then promise too
+little of, what hardly changes anything."""
 
 
-def profiled(run: Descent, normal: Normal, covariance: Vector, weak: Vector) -> Vector:
+def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
     """A covariance, widened where a parameter can be moved far and the others make up for that.
 
     Several weak directions at once are mixed by rounded derivatives, and none of them is then the
@@ -42,7 +45,6 @@ def profiled(run: Descent, normal: Normal, covariance: Vector, weak: Vector) -> 
 
     Args:
         run: at its minimum.
-        normal: equations there.
         covariance: in spans.
         weak: directions (columns); parameters with a share in one are moved, but for those of runs.
     """
@@ -56,7 +58,7 @@ def profiled(run: Descent, normal: Normal, covariance: Vector, weak: Vector) -> 
             told, way = (2.0 / _room(run, k)[1]) ** 2, covariance[:, k] / covariance[k, k]
         elif claimed > KNOWN:
             continue
-        elif (found := _followed(run, normal, k, claimed)) is not None:
+        elif (found := _followed(run, k, claimed)) is not None:
             told, way = found
         else:
             continue
@@ -73,7 +75,7 @@ def _room(run: Descent, k: int) -> tuple[float, float]:
     return (1.0 if above >= below else -1.0), min(FAR, max(above, below))
 
 
-def _followed(run: Descent, normal: Normal, k: int, claimed: float) -> tuple[float, Vector] | None:
+def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | None:
     """Information on a parameter when the others make up for it, and how they do [spans].
 
     What a step of any length costs (up to `STUCK`) is no information: it is read from steps of two
@@ -81,9 +83,8 @@ def _followed(run: Descent, normal: Normal, k: int, claimed: float) -> tuple[flo
 
     Args:
         run: at its minimum.
-        normal: equations there.
         k: the parameter.
-        claimed: its standard deviation according to them [spans].
+        claimed: its standard deviation according to the derivatives there [spans].
 
     Returns:
         None where it cannot be moved, or has been found as well known as claimed.
@@ -91,17 +92,15 @@ def _followed(run: Descent, normal: Normal, k: int, claimed: float) -> tuple[flo
     p = run.problem
     stuck = STUCK**2 * sum(np.isfinite(r).sum() for _, r in run.residuals)
     side, room = _room(run, k)
-    others = np.flatnonzero(np.arange(run.theta.size) != k)
-    inverse = np.zeros_like(normal.matrix)
-    part = np.linalg.pinv(normal.matrix[np.ix_(others, others)], 1e-12, hermitian=True)
-    inverse[np.ix_(others, others)] = part
-    way = -(inverse @ normal.matrix[:, k])
+    slopes = Broyden(p, run.jacobian, run.loss)
+    matrix = slopes.normal(run.theta, run.residuals).matrix
+    way = -_undo(matrix, matrix[:, k], k)
     way[k] = 1.0
     length, before = min(0.5 * CLAIMED * claimed, room), math.nan
     told, best = math.inf, way
     while True:
         try:
-            theta, rise = _made_up(run, inverse, side * length * way)
+            theta, rise = _made_up(run, slopes, k, side * length * way)
         except FmuCallError:
             break
         if rise > LOST:
@@ -121,6 +120,15 @@ def _followed(run: Descent, normal: Normal, k: int, claimed: float) -> tuple[flo
     return (told, best) if told < SURE / claimed**2 else None
 
 
+def _undo(matrix: Vector, wanted: Vector, k: int) -> Vector:
+    """Change of all parameters but one that the normal equations ask for."""
+    others = np.flatnonzero(np.arange(wanted.size) != k)
+    inverse = np.linalg.pinv(matrix[np.ix_(others, others)], 1e-12, hermitian=True)
+    change = np.zeros(wanted.size)
+    change[others] = inverse @ wanted[others]
+    return change
+
+
 def stretch(problem: Problem, theta: Vector, way: Vector) -> float:
     """How far a direction goes until a parameter that it moves meets its bound [spans]."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -129,29 +137,27 @@ def stretch(problem: Problem, theta: Vector, way: Vector) -> float:
     return float(np.min(rooms, where=np.abs(way) > SHARED, initial=np.inf))
 
 
-def _made_up(run: Descent, inverse: Vector, change: Vector) -> tuple[Vector, float]:
+def _made_up(run: Descent, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
     """Where the other parameters go when one is moved, and by how much the cost rises [nats].
 
-    Rounded derivatives promise too much of a step along what hardly changes anything, so steps that
-    are good are made longer.
+    The derivatives learn from all steps, good and bad.
     """
     p = run.problem
     theta = np.clip(run.theta + change * p.scale, p.lower, p.upper)
     residuals = run.simulator.residuals(theta, run.purpose)
     cost = run.total(theta, residuals)
+    slopes.learn(theta - run.theta, run.residuals, residuals)
     for _ in range(FOLLOWED):
-        step = inverse @ gradient(p, theta, run.jacobian, residuals, run.loss) * p.scale
-        begun, before = theta, cost
-        for parts in (LONGER, (SHORTER,)):
-            for part in parts:
-                there = np.clip(begun + part * step, p.lower, p.upper)
-                moved = run.simulator.residuals(there, run.purpose)
-                if not (after := run.total(there, moved)) < cost:
-                    break
-                theta, residuals, cost = there, moved, after
-            if cost < before:
-                break
-        if before - cost < SLIGHT:
+        normal = slopes.normal(theta, residuals)
+        step = _undo(normal.matrix, normal.gradient, k)
+        last = 0.5 * float(normal.gradient @ step) < SLIGHT
+        there = np.clip(theta + (LONGER if last else 1.0) * step * p.scale, p.lower, p.upper)
+        moved = run.simulator.residuals(there, run.purpose)
+        slopes.learn(there - theta, residuals, moved)
+        if (after := run.total(there, moved)) < cost:
+            last &= cost - after < SLIGHT
+            theta, residuals, cost = there, moved, after
+        if last:
             break
     run.meet(theta, residuals, cost)
     return theta, cost - run.cost

@@ -51,7 +51,7 @@ def deviations(run: Descent) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations by the derivatives, and with the parameters moved."""
     normal = Normal(run.problem, run.theta, run.jacobian, run.residuals)
     covariance = np.linalg.inv(normal.matrix)
-    found = profiled(run, normal, covariance, np.eye(3))
+    found = profiled(run, covariance, np.eye(len(covariance)))
     return np.sqrt(np.diag(covariance)), np.sqrt(np.diag(found))
 
 
