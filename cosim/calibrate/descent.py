@@ -19,6 +19,7 @@ from .differences import UNEVEN, jacobian, unevenness
 from .felt import SHORTEST, felt
 from .known import STEP, Known
 from .loss import Loss, Squares
+from .making_up import walk
 from .normal import BOUNDS, Normal, cost_of, drawn, gradient
 from .products import pairs, stepped
 from .simulator import Simulator
@@ -287,23 +288,28 @@ class Descent:
             normal.gradient = self.gradient()
         return False
 
+    def walked(self, normal: Normal) -> float:
+        """Go along the valley to which a hardly damped step points; by how much the cost fell."""
+        before, normal.gradient = self.cost, self.gradient()
+        walk(self, self.step(normal, FIRM) - self.theta)
+        return before - self.cost
+
     def correct(self, *, draft: bool = False) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far.
 
         Where steps keep little of what the quadratic promises, or more than so many of them can,
         differences were too long for what many parameters undo of each other: they are taken again,
-        shorter. In the valley in which that happens, more Jacobians are needed.
+        shorter. In the valley in which that happens, more Jacobians are needed; where the second is
+        no better, the valley is bent, and is walked.
 
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
         """
         left = DRAFTED if draft else RENEWALS
-        if not self.products:
-            self.length = STEPS[-1]
         while True:
             before, left = self.cost, left - 1
             normal = self.normal(self.length, central=not draft)
-            bent = bool(self.products) and not (draft or self.uneven or self.problem.unstable)
+            bent = not (draft or self.uneven or self.problem.unstable)
             self.step(normal, FIRM)
             promised = self.promised
             settled = self.settle(normal, CORRECTIONS)
@@ -316,6 +322,8 @@ class Descent:
                 poor &= max(fall, promised) >= enough
             else:
                 poor = fall == 0.0 and not (draft or self.problem.unstable)
+            if poor and bent and self.valley and left and self.walked(normal) > enough:
+                continue
             if poor and self.length > SHORTEST:
                 self.length, left, self.valley = SHRUNK * self.length, VALLEY, True
             elif fall < enough or not left:

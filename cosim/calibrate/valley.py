@@ -15,24 +15,21 @@ from ..errors import FmuCallError
 from .broyden import Broyden
 from .descent import Descent
 from .felt import STUCK
+from .making_up import made_up, undone
 from .normal import KNOWN
 from .problem import Problem
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
 """Weight in a weak direction from which a parameter is moved by itself."""
-FAR, FOLLOWED, SLIGHT = 1.0, 20, 0.1
-"""Spans by which that is done at most, steps of the others (Broyden's end in twice as many as there
-are directions, D. M. Gay 1979; jumps blur ten at most), and the fall [nats] that ends them."""
+FAR = 1.0
+"""Spans by which that is done at most."""
 CLAIMED, SURE, SEEN, LOST = 4.0, 0.5, 8.0, 80.0
 """Standard deviations by which it is done first, the share of the information claimed that settles
 it, and rises of the cost [nats] at which it has gone far enough, and at which it has gone astray.
 """
 SHARED = 0.1
 """Share of a step [spans] from which a parameter takes part in it."""
-LONGER = 10.0
-"""Multiple of a step that promises nothing: rounded derivatives claim to know, and then promise too
-little of, what hardly changes anything."""
 
 
 def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
@@ -94,13 +91,13 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
     side, room = _room(run, k)
     slopes = Broyden(p, run.jacobian, run.loss)
     matrix = slopes.normal(run.theta, run.residuals).matrix
-    way = -_undo(matrix, matrix[:, k], k)
+    way = -undone(matrix, matrix[:, k], k)
     way[k] = 1.0
     length, before = min(0.5 * CLAIMED * claimed, room), math.nan
     told, best = math.inf, way
     while True:
         try:
-            theta, rise = _made_up(run, slopes, k, side * length * way)
+            theta, rise = made_up(run, slopes, k, side * length * way)
         except FmuCallError:
             break
         if rise > LOST:
@@ -120,44 +117,9 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
     return (told, best) if told < SURE / claimed**2 else None
 
 
-def _undo(matrix: Vector, wanted: Vector, k: int) -> Vector:
-    """Change of all parameters but one that the normal equations ask for."""
-    others = np.flatnonzero(np.arange(wanted.size) != k)
-    inverse = np.linalg.pinv(matrix[np.ix_(others, others)], 1e-12, hermitian=True)
-    change = np.zeros(wanted.size)
-    change[others] = inverse @ wanted[others]
-    return change
-
-
 def stretch(problem: Problem, theta: Vector, way: Vector) -> float:
     """How far a direction goes until a parameter that it moves meets its bound [spans]."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rooms = np.where(way > 0.0, problem.upper - theta, problem.lower - theta)
         rooms /= way * problem.scale
     return float(np.min(rooms, where=np.abs(way) > SHARED, initial=np.inf))
-
-
-def _made_up(run: Descent, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
-    """Where the other parameters go when one is moved, and by how much the cost rises [nats].
-
-    The derivatives learn from all steps, good and bad.
-    """
-    p = run.problem
-    theta = np.clip(run.theta + change * p.scale, p.lower, p.upper)
-    residuals = run.simulator.residuals(theta, run.purpose)
-    cost = run.total(theta, residuals)
-    slopes.learn(theta - run.theta, run.residuals, residuals)
-    for _ in range(FOLLOWED):
-        normal = slopes.normal(theta, residuals)
-        step = _undo(normal.matrix, normal.gradient, k)
-        last = 0.5 * float(normal.gradient @ step) < SLIGHT
-        there = np.clip(theta + (LONGER if last else 1.0) * step * p.scale, p.lower, p.upper)
-        moved = run.simulator.residuals(there, run.purpose)
-        slopes.learn(there - theta, residuals, moved)
-        if (after := run.total(there, moved)) < cost:
-            last &= cost - after < SLIGHT
-            theta, residuals, cost = there, moved, after
-        if last:
-            break
-    run.meet(theta, residuals, cost)
-    return theta, cost - run.cost

@@ -487,6 +487,9 @@ class Search(LateValueFitter):
             id(f): self.refined(base, f if alone else self.sharpened(f, base, draft=True))
             for f in near
         }
+        key = max(better, key=lambda k: self.gain(base, better[k]), default=0)
+        if not (good or not better or self.accepted(base, better[key])):
+            better[key] = self.sharpened(better[key], base)  # refused only at its minimum
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cosim.calibrate import descent
 from cosim.calibrate.descent import STEPS, Descent
+from cosim.calibrate.making_up import walk
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
 from tests.problems import simulator
@@ -82,3 +84,42 @@ def test_a_draft_takes_its_differences_once(
     run.correct(draft=True)
     assert run.cost <= before
     assert run.length == STEPS[-1]
+
+
+@pytest.mark.parametrize("bend", [1.0, 0.0])
+def test_a_bent_valley_is_walked(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, bend: float
+) -> None:
+    """Steep walls keep one parameter to the square of the other, and little tells it."""
+    run = short.chosen("identification")[0]
+    one, other = short.index(MASS), short.index(PLACE)
+    problem = short.with_parameters(
+        [
+            replace(p, nominal=1.0, minimum=-100.0, maximum=100.0, span=0.1)
+            if p.name in (MASS, PLACE) else p
+            for p in short.parameters
+        ]
+    )  # fmt: skip
+    random = np.random.default_rng(3)
+    steep, faint, rest = (random.standard_normal(run.data.shape) for _ in range(3))
+
+    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
+        x, y = values[one], values[other]
+        away = float(np.sum(np.delete(values - problem.nominal, [one, other])))
+        curve = bend * x**2 + (1.0 - bend) * x
+        return np.asarray((100.0 * steep * (y - curve) + faint * x + rest * away) * problem.sigma)
+
+    monkeypatch.setattr(Simulator, "simulate", simulate)
+    data = simulate(simulator(problem), problem.nominal, run)
+    data += random.standard_normal(data.shape) * problem.sigma
+    problem = problem.changed(runs=[replace(run, data=data)])
+    theta = problem.nominal
+    theta[one] = 4.0
+    theta[other] = 16.0 if bend else 4.0
+    walks = []
+    monkeypatch.setattr(descent, "walk", lambda *a: (walks.append(a), walk(*a)))
+    found = Descent(simulator(problem), [run.name], theta)
+    found.correct()
+    # a span over the root of so many samples is what the noise leaves of x
+    assert found.theta[one] == pytest.approx(1.0, abs=4.0 / np.sqrt(run.data.size))
+    assert bool(walks) == bool(bend)

@@ -14,7 +14,7 @@ import pytest
 
 from cosim.diagnose.candidates import Candidate
 from cosim.diagnose.established import examined, freed, needed, settle, told_from_absence
-from cosim.diagnose.models import Fitted
+from cosim.diagnose.models import GATE, Fitted
 from cosim.diagnose.rounds import Round
 from cosim.diagnose.verdict import TENTH
 from tests.diagnose import built
@@ -126,8 +126,6 @@ def test_a_law_that_does_better_than_the_simpler_one_stays(tmp_path: Path) -> No
 
     with built.rig(tmp_path, strong) as rig:
         either, coulomb = friction_laws(rig, 1.0)
-        place = either.problem.index("load.flange.asymmetric_coulomb.a")
-        assert either.estimate.high[place] == either.problem.upper[place]  # how uneven is open
         assert rig.search.accepted(rig.base, coulomb)
         stage = Round(rig.base, [], {}, fitted=[either, coulomb], winner=either)
         settle(rig.search, rig.base, stage)
@@ -261,7 +259,7 @@ def test_a_law_beside_another_gives_way_to_all_parameters_of_that_one(tmp_path: 
 
     with built.rig(tmp_path, law) as rig:
         less, whole = parted(rig, "coulomb", tau_c=DRY)
-        assert rig.search.gain(less, whole) > 100.0
+        assert rig.search.gain(less, whole) > GATE  # it would be added
         found = freed(rig.search, less, whole)
         assert rig.search.gain(whole, found) == pytest.approx(0.0, abs=2.0)
     assert found.effects == less.effects and found.signature is less.signature

