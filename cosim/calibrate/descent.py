@@ -309,7 +309,8 @@ class Descent:
         while True:
             before, left = self.cost, left - 1
             normal = self.normal(self.length, central=not draft)
-            bent = not (draft or self.uneven or self.problem.unstable)
+            jumps = self.uneven and not self.products  # bends, too, differ on both sides
+            bent = not (draft or jumps or self.problem.unstable)
             self.step(normal, FIRM)
             promised = self.promised
             settled = self.settle(normal, CORRECTIONS)
