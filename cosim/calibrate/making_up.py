@@ -6,16 +6,17 @@ farther and farther, and the others find the floor.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
 from .broyden import Broyden
-
-if TYPE_CHECKING:
-    from .descent import Descent
+from .loss import Loss
+from .parts import Sensitivity
+from .problem import Problem
+from .simulator import Simulator
 
 Vector = NDArray[np.float64]
 FOLLOWED, SLIGHT = 20, 0.1
@@ -29,7 +30,32 @@ BEGUN, FARTHEST = 0.03, 2.0
 at most: the quadratic has its minimum at 1."""
 
 
-def walk(run: Descent, step: Vector) -> None:
+class Place(Protocol):
+    """Where a fit is; see `descent.Descent`."""
+
+    problem: Problem
+    simulator: Simulator
+    purpose: str | list[str]
+    loss: Loss
+    theta: Vector
+    residuals: list[tuple[str, Vector]]
+    cost: float
+    jacobian: list[Sensitivity]
+
+    def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
+        """Cost of a point."""
+        ...
+
+    def meet(self, theta: Vector, residuals: list[tuple[str, Vector]], cost: float) -> None:
+        """Note a point."""
+        ...
+
+    def attempt(self, theta: Vector) -> bool:
+        """Go there if it is better."""
+        ...
+
+
+def walk(run: Place, step: Vector) -> None:
     """Go along a valley as long as it falls.
 
     Args:
@@ -54,7 +80,7 @@ def walk(run: Descent, step: Vector) -> None:
     run.attempt(goal)
 
 
-def made_up(run: Descent, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
+def made_up(run: Place, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
     """Where the other parameters go when one is moved, and by how much the cost rises [nats].
 
     The derivatives learn from all steps, good and bad.
