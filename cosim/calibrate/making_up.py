@@ -30,8 +30,8 @@ BEGUN, FARTHEST = 0.03, 2.0
 at most: the quadratic has its minimum at 1."""
 
 
-class Place(Protocol):
-    """Where a fit is; see `descent.Descent`."""
+class Point(Protocol):
+    """A point on its way to the minimum; see `descent.Descent`."""
 
     problem: Problem
     simulator: Simulator
@@ -43,11 +43,11 @@ class Place(Protocol):
     jacobian: list[Sensitivity]
 
     def total(self, theta: Vector, residuals: list[tuple[str, Vector]]) -> float:
-        """Cost of a point."""
+        """Cost there."""
         ...
 
     def meet(self, theta: Vector, residuals: list[tuple[str, Vector]], cost: float) -> None:
-        """Note a point."""
+        """Note it for `lowered`."""
         ...
 
     def attempt(self, theta: Vector) -> bool:
@@ -55,7 +55,7 @@ class Place(Protocol):
         ...
 
 
-def walk(run: Place, step: Vector) -> None:
+def walk(run: Point, step: Vector) -> None:
     """Go along a valley as long as it falls.
 
     Args:
@@ -80,7 +80,7 @@ def walk(run: Place, step: Vector) -> None:
     run.attempt(goal)
 
 
-def made_up(run: Place, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
+def made_up(run: Point, slopes: Broyden, k: int, change: Vector) -> tuple[Vector, float]:
     """Where the other parameters go when one is moved, and by how much the cost rises [nats].
 
     The derivatives learn from all steps, good and bad.

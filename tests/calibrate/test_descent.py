@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +20,49 @@ Vector = NDArray[np.float64]
 MASS, PLACE = "J_load", "R_a"
 
 
+def begun(
+    short: Problem,
+    monkeypatch: pytest.MonkeyPatch,
+    law: Callable[[float, float, Sequence[Vector]], Vector],
+    start: tuple[float, float],
+    span: float,
+) -> Descent:
+    """A fit of mass and place, which are 1 in the data, from other values.
+
+    Args:
+        short, monkeypatch: of the test.
+        law: model over the noise of mass, place and three shapes.
+        start: mass and place.
+        span: of both.
+    """
+    run = short.chosen("identification")[0]
+    own = [short.index(MASS), short.index(PLACE)]
+    problem = short.with_parameters(
+        [
+            replace(p, nominal=1.0, minimum=0.01, maximum=100.0, span=span)
+            if p.name in (MASS, PLACE) else p
+            for p in short.parameters
+        ]
+    )  # fmt: skip
+    random = np.random.default_rng(3)
+    shapes = [random.standard_normal(run.data.shape) for _ in range(3)]
+
+    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
+        rest = float(np.sum(np.delete(values - problem.nominal, own)))
+        mass, place = values[own]
+        return np.asarray((law(mass, place, shapes) + shapes[0][::-1] * rest) * problem.sigma)
+
+    monkeypatch.setattr(Simulator, "simulate", simulate)
+    data = simulate(simulator(problem), problem.nominal, run)
+    data += random.standard_normal(data.shape) * problem.sigma
+    problem = problem.changed(runs=[replace(run, data=data)])
+    theta = problem.nominal
+    theta[own] = start
+    return Descent(simulator(problem), [run.name], theta)
+
+
 def away(short: Problem, monkeypatch: pytest.MonkeyPatch, steep: float) -> Descent:
-    """A fit that begins at three times a mass and a third of its place, which are 1 in the data.
+    """A fit that begins at three times a mass and a third of its place.
 
     100 times the noise goes with the product, a tenth of it with m p^2. Differences over a step h
     see `steep` h^2 where product and place should undo each other.
@@ -29,32 +71,13 @@ def away(short: Problem, monkeypatch: pytest.MonkeyPatch, steep: float) -> Desce
         short, monkeypatch: of the test.
         steep: size over the noise of what goes with the cube of the product.
     """
-    run = short.chosen("identification")[0]
-    mass, place = short.index(MASS), short.index(PLACE)
-    problem = short.with_parameters(
-        [
-            replace(p, nominal=1.0, minimum=0.01, maximum=100.0, span=1.0)
-            if p.name in (MASS, PLACE) else p
-            for p in short.parameters
-        ]
-    )  # fmt: skip
-    random = np.random.default_rng(3)
-    one, other, faint = (random.standard_normal(run.data.shape) for _ in range(3))
 
-    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
-        m, p = values[mass], values[place]
-        rest = float(np.sum(np.delete(values - problem.nominal, [mass, place])))
-        model = 100.0 * one * m * p + steep * other * (m * p) ** 3 + 0.1 * faint * m * p**2
-        return np.asarray((model + one[::-1] * rest) * problem.sigma)
+    def law(m: float, p: float, shapes: Sequence[Vector]) -> Vector:
+        one, other, faint = shapes
+        return 100.0 * one * m * p + steep * other * (m * p) ** 3 + 0.1 * faint * m * p**2
 
-    monkeypatch.setattr(Simulator, "simulate", simulate)
-    data = simulate(simulator(problem), problem.nominal, run)
-    data += random.standard_normal(data.shape) * problem.sigma
-    problem = problem.changed(runs=[replace(run, data=data)])
-    theta = problem.nominal
-    theta[mass], theta[place] = 3.0, 1.0 / 3.0
-    found = Descent(simulator(problem), [run.name], theta)
-    found.products = [(place, mass)]
+    found = begun(short, monkeypatch, law, (3.0, 1.0 / 3.0), 1.0)
+    found.products = [(short.index(PLACE), short.index(MASS))]
     return found
 
 
@@ -90,36 +113,21 @@ def test_a_draft_takes_its_differences_once(
 def test_a_bent_valley_is_walked(
     short: Problem, monkeypatch: pytest.MonkeyPatch, bend: float
 ) -> None:
-    """Steep walls keep one parameter to the square of the other, and little tells it."""
-    run = short.chosen("identification")[0]
-    one, other = short.index(MASS), short.index(PLACE)
-    problem = short.with_parameters(
-        [
-            replace(p, nominal=1.0, minimum=-100.0, maximum=100.0, span=0.1)
-            if p.name in (MASS, PLACE) else p
-            for p in short.parameters
-        ]
-    )  # fmt: skip
-    random = np.random.default_rng(3)
-    steep, faint, rest = (random.standard_normal(run.data.shape) for _ in range(3))
+    """Steep walls keep the place to the square of the mass, and little tells the mass."""
 
-    def simulate(self: Simulator, values: Vector, run: object) -> Vector:
-        x, y = values[one], values[other]
-        away = float(np.sum(np.delete(values - problem.nominal, [one, other])))
-        curve = bend * x**2 + (1.0 - bend) * x
-        return np.asarray((100.0 * steep * (y - curve) + faint * x + rest * away) * problem.sigma)
+    def law(m: float, p: float, shapes: Sequence[Vector]) -> Vector:
+        return 100.0 * shapes[0] * (p - m ** (1.0 + bend)) + shapes[1] * m
 
-    monkeypatch.setattr(Simulator, "simulate", simulate)
-    data = simulate(simulator(problem), problem.nominal, run)
-    data += random.standard_normal(data.shape) * problem.sigma
-    problem = problem.changed(runs=[replace(run, data=data)])
-    theta = problem.nominal
-    theta[one] = 4.0
-    theta[other] = 16.0 if bend else 4.0
-    walks = []
-    monkeypatch.setattr(descent, "walk", lambda *a: (walks.append(a), walk(*a)))
-    found = Descent(simulator(problem), [run.name], theta)
-    found.correct()
-    # a span over the root of so many samples is what the noise leaves of x
-    assert found.theta[one] == pytest.approx(1.0, abs=4.0 / np.sqrt(run.data.size))
+    walks: list[Descent] = []
+
+    def seen(run: Descent, step: Vector) -> None:
+        walks.append(run)
+        walk(run, step)
+
+    monkeypatch.setattr(descent, "walk", seen)
+    run = begun(short, monkeypatch, law, (4.0, 4.0 ** (1.0 + bend)), 0.1)
+    run.correct()
+    samples = sum(r.size for _, r in run.residuals)
+    # one over the root of so many samples is what the noise leaves: four deviations
+    assert run.theta[run.problem.index(MASS)] == pytest.approx(1.0, abs=4.0 / np.sqrt(samples))
     assert bool(walks) == bool(bend)
