@@ -16,6 +16,7 @@ import typer
 from ..files import make_folder, write_text
 from ..installation.builder import default_provider
 from .calibrate import clock_lines
+from .guard import heard
 from .progress import Display
 from .signals import taken
 from .streams import print_json
@@ -119,6 +120,7 @@ def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]
     """
 
     def end() -> None:
+        heard()
         if not budget.stopped:
             budget.stop("by hand")
             say("ending: a report on what was found so far follows; Ctrl-C again gives up at once")

@@ -27,6 +27,8 @@ GRACE = 5
 """Time that a command has to put its things away when it is told to end [s]."""
 SIZE = 2**22
 """Bytes of shared memory; only those that are written take any."""
+HEARD = 16
+"""Place in it where a fork says that it ends by itself, behind what the board has for both."""
 
 
 def applies(arguments: list[str]) -> bool:
@@ -54,7 +56,7 @@ def guarded(work: Callable[[], None]) -> None:
         parent, pid = os.getpid(), os.fork()
         if not pid:
             _serve(work, memory, Path(name), parent)
-        code = _waited(pid)
+        code = _waited(pid, memory)
         from ..master.board import Board
 
         board = Board(memory, Path(name))
@@ -63,12 +65,27 @@ def guarded(work: Callable[[], None]) -> None:
         raise FmuCallError(board.sentence(code))
 
 
-def _waited(pid: int) -> int:
+def heard() -> None:
+    """Say that a signal is no reason to kill this process: it ends by itself, when it has reported.
+
+    Nothing happens where nobody waits.
+    """
+    if _shared:
+        _shared[0][HEARD] = 1
+
+
+_shared: list[mmap.mmap] = []
+"""The memory, in a fork."""
+
+
+def _waited(pid: int, memory: mmap.mmap) -> int:
     """The code with which a process ends; signals go on to it.
 
+    `timeout` tells the command and its group, so a second SIGTERM is the first.
+
     Raises:
-        SystemExit: it did not end within `GRACE` of a signal (an FMU's call does not return), or
-            was interrupted twice, and was killed.
+        SystemExit: it did not end within `GRACE` of a signal (an FMU's call does not return) and
+            has not `heard` it, or was interrupted twice, and was killed.
     """
     told: list[int] = []
 
@@ -77,12 +94,17 @@ def _waited(pid: int) -> int:
             os.kill(pid, number)
 
     def forward(number: int, _: Any) -> None:
+        again = number in told
         told.append(number)
-        send(number if len(told) == 1 else signal.SIGKILL)
+        if not again:
+            send(number)
+        elif number != signal.SIGTERM:
+            send(number if memory[HEARD] else signal.SIGKILL)
         signal.alarm(GRACE)
 
     def late(_number: int, _frame: Any) -> None:
-        send(signal.SIGKILL)
+        if not memory[HEARD] or told.count(signal.SIGINT) > 1:
+            send(signal.SIGKILL)
 
     handlers = {n: forward for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     before = {n: signal.signal(n, h) for n, h in {**handlers, signal.SIGALRM: late}.items()}
@@ -104,6 +126,7 @@ def _serve(work: Callable[[], None], memory: mmap.mmap, folder: Path, parent: in
     code = 1
     try:
         os.setsid()
+        _shared.append(memory)
         from ..master.board import Board
         from ..master.isolation_worker import orphaned
 

@@ -7,6 +7,7 @@ import math
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -102,6 +103,7 @@ def test_a_signal_ends_the_search_with_a_report(
             if "round 1" in line:
                 process.send_signal(number)
                 if number == signal.SIGTERM:
+                    time.sleep(0.3)  # the second one is another
                     process.send_signal(number)
                 break
         out, said = process.communicate()

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim.cli.guard import SIZE
+from cosim.cli.guard import HEARD, SIZE
 from cosim.master import board, witness
 from tests.faults import matrix
+from tests.outside import hear_interrupts
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and an FMU for Linux")
 DATA = """
@@ -157,7 +158,63 @@ def test_what_is_guarded() -> None:
     ]
 
 
+TOLD = """
+import os, signal, sys, time
+from cosim.cli import guard
+from cosim.cli.signals import taken
+
+def work():
+    def told():
+        print("told", flush=True)
+        if {heard}:
+            guard.heard()
+    with taken(signal.SIGTERM, told), taken(signal.SIGINT, told):
+        print("begun", flush=True)
+        end = time.monotonic() + {seconds}
+        while time.monotonic() < end:
+            time.sleep(0.1)
+    print("reported", flush=True)
+
+guard.GRACE = 1
+guard.guarded(work)
+"""
+"""A command that takes a while to end once it is told to."""
+
+
+def told(heard: bool, seconds: float, numbers: list[signal.Signals]) -> tuple[int, list[str]]:
+    """Exit code and words of a command that gets signals, a moment apart."""
+    text = TOLD.format(heard=heard, seconds=seconds)
+    with subprocess.Popen(
+        [sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+    ) as process:
+        assert process.stdout is not None
+        begun = process.stdout.readline()
+        for number in numbers:
+            process.send_signal(number)
+            time.sleep(0.3)
+        rest, _ = process.communicate(timeout=60.0)
+    return process.returncode, [begun.strip(), *rest.split()]
+
+
+def test_a_command_that_has_heard_reports_as_long_as_it_takes() -> None:
+    assert told(True, 3.0, [signal.SIGINT]) == (0, ["begun", "told", "reported"])
+
+
+def test_a_second_sigterm_is_the_first() -> None:
+    """`timeout` sends its signal to the command and to its group."""
+    assert told(True, 3.0, [signal.SIGTERM] * 2) == (0, ["begun", "told", "reported"])
+
+
+def test_one_that_has_not_is_killed() -> None:
+    assert told(False, 30.0, [signal.SIGTERM]) == (143, ["begun", "told"])
+
+
+def test_a_second_interrupt_ends_one_that_reports() -> None:
+    assert told(True, 30.0, [signal.SIGINT] * 2) == (130, ["begun", "told", "told"])
+
+
 def test_the_memory_holds_what_is_said() -> None:
     assert board.SIZE <= SIZE  # it is made before anything large is imported
+    assert board._EXITING < HEARD // 8 < board.HEAD // 8
     made = board.kernel.structures.RUN_SIZE + witness.TEXT + 8 * (board.THREAD + 1)
     assert made <= board.SLOT
