@@ -87,9 +87,10 @@ def nearer(item: Signature, other: Signature) -> bool:
     """Whether one trial's strength is nearer to the one that the residual asks for.
 
     Farther than any, if calibration absorbs all that the strength does. If it absorbs nearly all,
-    what is left is curvature, unless it is small: then the one that gains more.
+    what is left is curvature, unless it is small: then the one that gains more, as beside one that
+    asks for none at all.
     """
-    if item.curved and other.curved:
+    if all(one.curved or not one.score.gain for one in (item, other)):
         return item.score.gain > other.score.gain
     return _mismatch(item) < _mismatch(other)
 

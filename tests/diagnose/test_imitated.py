@@ -72,6 +72,9 @@ def test_of_two_trials_that_calibration_absorbs_the_one_that_gains_more_counts(
     strong = replace(strong, score=replace(strong.score, amplitude=0.9))
     weak = replace(weak, score=replace(weak.score, amplitude=-40.0))
     assert nearer(weak, strong) and not nearer(strong, weak)
+    # one that shows, but asks for none of the law, says less than one that is absorbed and gains
+    none = replace(strong, absorbed=0.9, score=replace(strong.score, amplitude=0.0, gain=0.0))
+    assert nearer(weak, none) and not nearer(none, weak)
     # where calibration absorbs less, the one that is asked for
     seen = [replace(s, absorbed=0.5) for s in (strong, weak)]
     assert nearer(seen[0], seen[1]) and not nearer(seen[1], seen[0])
