@@ -124,6 +124,11 @@ class Descent:
             normal = self._felt(everything)
         self.settle(normal, CORRECTIONS)
 
+    @property
+    def jumps(self) -> bool:
+        """Whether limits make the model jump; bends of products, too, differ on both sides."""
+        return self.uneven and not self.products
+
     def attempt(self, theta: Vector) -> bool:
         """Go there, inside the bounds, if it is better."""
         theta = np.clip(theta, self.problem.lower, self.problem.upper)  # sums round past them
@@ -294,7 +299,7 @@ class Descent:
         walk(self, self.step(normal, FIRM) - self.theta)
         return before - self.cost
 
-    def correct(self, *, draft: bool = False) -> Normal:
+    def correct(self, *, draft: bool = False, goal: float = math.inf) -> Normal:
         """Steps with a Jacobian taken here, and with another one as long as they lead far.
 
         Where steps keep little of what the quadratic promises, or more than so many of them can,
@@ -304,15 +309,19 @@ class Descent:
 
         Args:
             draft: only to be compared: one-sided differences, and fewer of them.
+            goal: cost [nats] from which it is of use; where derivatives promise less, it is left.
         """
         left = DRAFTED if draft else RENEWALS
+        if self.jumps:  # over short steps its derivatives say more than there is
+            self.length = STEPS[-1]
         while True:
             before, left = self.cost, left - 1
             normal = self.normal(self.length, central=not draft)
-            jumps = self.uneven and not self.products  # bends, too, differ on both sides
-            bent = not (draft or jumps or self.problem.unstable)
+            bent = not (draft or self.jumps or self.problem.unstable)
             self.step(normal, FIRM)
             promised = self.promised
+            if self.cost - CORRECTIONS * promised > goal:
+                break
             settled = self.settle(normal, CORRECTIONS)
             # more damped, any step promises nothing
             if settled and (self.damping <= FIRM or not bent):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -31,15 +32,16 @@ class Effort:
     Attributes:
         begin: `far`: large residuals count linearly at first, the calmest runs lead; `near`: they
             count in full; `there`: but for small corrections, by steps with one Jacobian.
-        end: `draft`: the minimum roughly, for comparison or another fit, no intervals; `intervals`:
-            derivatives good enough for these; `polished`: after steps with derivatives taken there,
-            too, which `there` begins with.
+        end: `draft`: the minimum roughly, for comparison or another fit, no intervals; `minimum`:
+            as near as others come to it, no intervals; `intervals`: derivatives good enough for
+            these; `polished`: after steps with derivatives taken there, too, which `there` begins
+            with.
         iterations: at each size of difference steps at most, or with known derivatives.
         share: of the cost beyond the noise's, below which a fall ends a fit with known derivatives.
     """
 
     begin: Literal["far", "near", "there"] = "far"
-    end: Literal["draft", "intervals", "polished"] = "polished"
+    end: Literal["draft", "minimum", "intervals", "polished"] = "polished"
     iterations: int = 25
     share: float = EVEN
 
@@ -52,8 +54,10 @@ POLISH = Effort("near", iterations=0)
 """The last steps alone."""
 CORRECTION = Effort("there", "intervals")
 """Steps from close by, with intervals."""
+MINIMUM = Effort("there", "minimum")
+"""The same to be compared with what is nearly as good."""
 DRAFT = Effort("there", "draft")
-"""The same to be compared: one-sided derivatives."""
+"""The same to be compared with what is not: one-sided derivatives."""
 
 
 def fit(
@@ -63,6 +67,7 @@ def fit(
     *,
     effort: Effort = THOROUGH,
     known: Known | None = None,
+    goal: float = math.inf,
 ) -> Estimate:
     """Estimate the parameters of a problem.
 
@@ -75,6 +80,7 @@ def fit(
         effort: how far away that is, and how near the minimum must be reached.
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
+        goal: see `Descent.correct`; of fits that begin `there`.
     """
     begun, problem = simulator.evaluations, simulator.problem
     run = Descent(
@@ -87,8 +93,8 @@ def fit(
         return estimated(run)
     draft = effort.end == "draft"
     if effort.begin == "there":
-        run.correct(draft=draft)
-        return estimated(run) if draft else _confirmed(run)
+        run.correct(draft=draft, goal=goal)
+        return estimated(run) if effort.end in ("draft", "minimum") else _confirmed(run)
     if effort.begin == "far" and _uneven(run):
         run = Descent(simulator, _calmest(run), run.theta)
         sizes = np.concatenate([r[np.isfinite(r)] for _, r in run.residuals])

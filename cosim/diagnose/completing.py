@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..calibrate.fit import DRAFT
 from .fitter import BRINGS, Fitter
 from .judge import OFF
 from .models import GATE, Fitted, is_open
@@ -68,7 +69,7 @@ def _whole(fitter: Fitter, base: Fitted, fitted: Fitted) -> Fitted:
         found = fitter.refined(base, fitted, quick=True)
         if found is fitted:
             break
-        found = fitter.sharpened(found, base, draft=True)
+        found = fitter.sharpened(found, base, DRAFT)
         beyond = found.estimate.robust - 0.5 * found.estimate.count
         going = fitter.gain(fitted, found) > max(BRINGS * beyond, GATE)
         fitted = found

@@ -32,6 +32,7 @@ from .foreign_words import placed
 from .further import Further, looked
 from .grey_box import Site, site, unnamed
 from .left_over import left_over
+from .levelled import levelled
 from .localise import localise
 from .models import Fitted
 from .result import Diagnosis
@@ -271,6 +272,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     declared = search.memo.get(frozenset())
     assert declared is not None
     simple: set[frozenset[str]] = set()
+    level: set[frozenset[str]] = set()
     offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
     for _ in range(TURNS):
         if current.effects:
@@ -279,15 +281,17 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
                 simplified(search, current, offered)
                 elsewhere(search, current, _beside(search, current))
                 simple.add(current.labels)
+                level.add(current.labels)
+                levelled(search, current, level)
         result.table = table_of(search, rounds, forces, ended)
         place = proposal(result.table)
-        fewer = [] if place is None else unasked(result.table, place)
-        for labels in [result.table.models[i].labels for i in fewer]:
+        others = [] if place is None else unasked(result.table, place)
+        for labels in [result.table.models[i].labels for i in others]:
             known = search.memo.get(labels)
             assert known is not None
-            search.say(f"do fewer laws do as well? {', '.join(sorted(labels))}")
+            search.say(f"does each of these do something? {', '.join(sorted(labels))}")
             examined(search, known, candidates_of(rounds))
-        if fewer:
+        if others:
             result.table = table_of(search, rounds, forces, ended)
             place = proposal(result.table)
         if place is None:

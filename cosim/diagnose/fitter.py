@@ -86,20 +86,23 @@ class Fitter(Judge):
         known = None if close is None else close.known
         return self.judged(fit(simulator, theta, effort=effort, known=known))
 
-    def sharpened(self, quick: Fitted, base: Fitted, *, draft: bool = False) -> Fitted:
+    def sharpened(
+        self, quick: Fitted, base: Fitted, effort: Effort = CORRECTION, goal: float = math.inf
+    ) -> Fitted:
         """A quickly fitted model fitted again with derivatives of its own.
 
         Args:
             quick: what to fit.
             base: what its gain counts from.
-            draft: only to be compared; its intervals are not needed.
+            effort: of the fit, from there.
+            goal: cost [nats] from which it is of use.
         """
         found = quick
         for _ in range(CORRECTIONS):
             theta = found.estimate.theta
             try:
                 simulator = corrected(quick.simulator, theta, self.raw)
-                estimate = fit(simulator, theta, effort=DRAFT if draft else CORRECTION)
+                estimate = fit(simulator, theta, effort=effort, goal=goal)
                 found = self.again(self.judged(estimate), quick, base)
             except CosimError as error:  # a step finer than that of the quick fit may be unstable
                 self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
@@ -452,12 +455,12 @@ class Fitter(Judge):
             return fitted
         result = self.again(result, fitted, base)
         if result.estimate.unkept > GATE and not self.freer(fitted, result):  # it has stalled
-            fitted, result = (self.sharpened(f, base, draft=True) for f in (fitted, result))
+            fitted, result = (self.sharpened(f, base, DRAFT) for f in (fitted, result))
         if not self.freer(fitted, result):
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
         result = self.again(without_redundant(self, result, others), fitted, base)
-        return result if quick else self.sharpened(result, base, draft=True)
+        return result if quick else self.sharpened(result, base, DRAFT)
 
     def approached(self, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
         """A model fitted with derivatives of its own, as long as another does better and it helps.
@@ -469,7 +472,7 @@ class Fitter(Judge):
             unused = compare(self.check_data, trial.check, goal.check, self.checking).gain
             if max(worse, worse + unused) <= GATE:
                 break
-            near = self.sharpened(trial, base, draft=True)
+            near = self.sharpened(trial, base, DRAFT)
             fall = self.gain(trial, near)
             trial = near if fall > 0.0 else trial
             if fall < max(BRINGS * worse, GATE):

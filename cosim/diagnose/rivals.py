@@ -19,12 +19,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.fit import DRAFT
 from ..calibrate.problem import Problem
 from ..errors import CosimError
 from .candidates import Candidate, new_parameters
 from .composed import composed
 from .fitter import QUICKLY
 from .late_values import LateValueFitter
+from .levelled import CLOSE, lowered
 from .models import GATE, Fitted, compare, more_general
 from .probes import single
 from .rounds import Round
@@ -45,8 +47,8 @@ CHANGED = 0.01
 fitted from its parameters again."""
 TENTHS = 4
 """Powers of a tenth of a law's usual smoothing that are tried, the first being 1."""
-CLOSE, OTHERS = 0.95, 2
-"""Share of the winner's gain from which other laws are fitted as far as it, and how many."""
+OTHERS = 2
+"""Laws that do nearly what the winner does elsewhere, which are fitted as far as it."""
 MOST = 3
 """Rivals that are tried at most, besides places where to first order the same happens: each costs a
 fit, as the winner did."""
@@ -220,7 +222,7 @@ def _told_apart(
     found = [trials[i] for i in order]
     for place, i in enumerate(near if near[1:] else []):
         trial, known = trials[i]
-        found[place] = search.sharpened(trial, base, draft=True), known
+        found[place] = search.sharpened(trial, base, DRAFT), known
     return sorted(found, key=lambda pair: -search.total(present, pair[0]))
 
 
@@ -263,12 +265,16 @@ def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
             trial.gate = compare(search.check_data, base.check, trial.check, search.checking)
             if search.total(base, trial) > HOPEFUL * search.total(base, winner):
                 trial = search.refined(base, trial, quick=True, share=0.0)
-                trial = search.approached(trial, winner, base)
+                almost = search.total(base, trial) > CLOSE * search.total(base, winner)
+                if almost and item.candidate.effect != last.effect and not search.raw.unstable:
+                    trial = lowered(search, trial, winner, base)
+                else:
+                    trial = search.approached(trial, winner, base)
             else:
                 law = False
             if item.placed and search.total(base, trial) > CLOSE * search.total(base, winner):
                 # elsewhere its mass, say, is another one, and with it what the exchange adds
-                trial = search.sharpened(trial, base, draft=True)
+                trial = search.sharpened(trial, base, DRAFT)
             near = search.total(base, trial) > NEAR * search.total(base, winner)
             if law and near and (late := search.released(trial, base)) is not trial:
                 trial = search.refined(base, late, quick=True, share=0.0)

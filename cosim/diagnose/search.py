@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.deferred import corrected
-from ..calibrate.fit import DRAFT, POLISH, Effort, fit
+from ..calibrate.fit import DRAFT, MINIMUM, POLISH, Effort, fit
 from ..calibrate.loss import typical
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
@@ -408,14 +408,14 @@ class Search(LateValueFitter):
         for f in reversed(models):
             begun[id(f)] = restarted(self, f, base, list(begun.values()))
         if self.raw.far:  # near now, and fitted without regard to errors of the exchange
-            begun = {key: self.sharpened(f, base, draft=True) for key, f in begun.items()}
+            begun = {key: self.sharpened(f, base, DRAFT) for key, f in begun.items()}
         current.fitted = [begun.get(id(f), f) for f in current.fitted]
         current.winner = min(begun.values(), key=lambda f: f.estimate.robust)
         base = self.recount(current)
         found = self.refined(base, current.winner, quick=True)
         better = self.released(found, base)
         if better is found:
-            better = self.sharpened(found, base, draft=True)
+            better = self.sharpened(found, base, DRAFT)
         current.follow(self.snapped(better, base))
         current.open = is_open(current.winner.estimate)
         if not current.open:
@@ -484,12 +484,12 @@ class Search(LateValueFitter):
             least = max(SLIGHT * max(sizes, default=0.0), GATE)
             near = [f for f, gain in zip(gains, sizes, strict=True) if gain > least][:UNWANTED]
         better = {
-            id(f): self.refined(base, f if alone else self.sharpened(f, base, draft=True))
-            for f in near
+            id(f): self.refined(base, f if alone else self.sharpened(f, base, DRAFT)) for f in near
         }
-        key = max(better, key=lambda k: self.gain(base, better[k]), default=0)
-        if not (good or not better or self.accepted(base, better[key])):
-            better[key] = self.sharpened(better[key], base)  # refused only at its minimum
+        if near and not good:
+            best = max(better, key=lambda k: self.gain(base, better[k]))
+            if not self.accepted(base, better[best]):  # but at its minimum
+                better[best] = self.sharpened(better[best], base, MINIMUM)
         current.fitted = [better.get(id(f), f) for f in current.fitted]
         current.fitted.sort(key=lambda f: -self.total(base, f))
 

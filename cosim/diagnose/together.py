@@ -138,7 +138,7 @@ def _settled(search: Search, declared: Fitted, draft: Draft) -> Fitted:
     """
     fitted = draft.fitted
     for _ in range(AGAIN):
-        near = search.sharpened(fitted, declared, draft=True)
+        near = search.sharpened(fitted, declared, DRAFT)
         gained = search.gains(fitted, near)[0]
         fitted = near if gained > 0.0 else fitted
         if gained <= GATE:

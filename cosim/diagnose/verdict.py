@@ -98,16 +98,18 @@ def proposal(table: Table) -> int | None:
 
 
 def unasked(table: Table, best: int) -> list[int]:
-    """Sets with fewer laws that the data do not tell from a set, but for being asked law by law.
+    """Sets that would be the answer in the place of one if each of their laws is missed.
 
-    They would be the answer if each of their laws is missed without it.
+    Those with fewer laws that the data do not tell from it, and those with as many that do better:
+    they have not been asked law by law.
     """
+    count, score = len(table.models[best].laws), table.models[best].score
     return [
         i
         for i, model in enumerate(table.models)
-        if 1 < len(model.laws) < len(table.models[best].laws)
+        if 1 < len(model.laws) <= count
         and not model.rough
-        and not _apart(table, best, i)
+        and (model.score > score if len(model.laws) == count else not _apart(table, best, i))
         and all(law.there for law in model.laws)
         and any(law.missed is None for law in model.laws)
     ]

@@ -507,6 +507,19 @@ def test_fewer_laws_are_asked_where_the_data_do_not_tell_them_from_the_best() ->
     assert unasked(table(FAR, open_, three, alike=((1, 2),)), 1) == []  # more laws
 
 
+def test_as_many_laws_that_do_better_are_asked_law_by_law() -> None:
+    """They are told from the best only once it is known that each of them is missed."""
+    friction = law("coulomb", "load.flange")
+    scrub, turning = (law(name, "crawler.body") for name in ("pivot_torque", "turning_friction"))
+    known = model(scrub, friction)
+    better, worse = (
+        model(replace(turning, missed=None), friction, gain=gain) for gain in (70.0, -70.0)
+    )
+    assert unasked(table(FAR, known, better), 1) == [2]
+    assert unasked(table(FAR, known, worse), 1) == []
+    assert unasked(table(FAR, known, model(turning, friction, gain=70.0)), 1) == []  # asked before
+
+
 @pytest.mark.parametrize(("value", "kind"), [(3e-4, "nothing_missing"), (6e-4, "effect_found")])
 def test_a_time_within_a_tick_of_the_rig_is_no_cause(value: float, kind: str) -> None:
     late = law("delay", "log.speed", value=value, half=1e-4, gain=40.0, z=5.0, tick=5e-4)
