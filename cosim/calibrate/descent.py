@@ -320,7 +320,8 @@ class Descent:
             bent = not (draft or self.jumps or self.problem.unstable)
             self.step(normal, FIRM)
             promised = self.promised
-            if self.cost - CORRECTIONS * promised > goal:
+            # where it jumps, information is taken off, and too little is promised
+            if not self.uneven and self.cost - CORRECTIONS * promised > goal:
                 break
             settled = self.settle(normal, CORRECTIONS)
             # more damped, any step promises nothing

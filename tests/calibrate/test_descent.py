@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from cosim.calibrate import descent
-from cosim.calibrate.descent import STEPS, Descent
+from cosim.calibrate.descent import CORRECTIONS, FIRM, STEPS, Descent
 from cosim.calibrate.making_up import walk
+from cosim.calibrate.normal import Normal
 from cosim.calibrate.problem import Problem
 from cosim.calibrate.simulator import Simulator
 from tests.problems import simulator
@@ -131,3 +132,31 @@ def test_a_bent_valley_is_walked(
     # one over the root of so many samples is what the noise leaves: four deviations
     assert run.theta[run.problem.index(MASS)] == pytest.approx(1.0, abs=4.0 / np.sqrt(samples))
     assert bool(walks) == bool(bend)
+
+
+@pytest.mark.parametrize("within", [True, False])
+def test_a_fit_is_left_if_what_it_promises_is_of_no_use(
+    short: Problem, monkeypatch: pytest.MonkeyPatch, within: bool
+) -> None:
+    """Four times what the quadratic promises is the most that a good one gives."""
+    run = away(short, monkeypatch, 10.0)
+    run.step(run.normal(run.length, central=True), FIRM)
+    before, reach = run.cost, CORRECTIONS * run.promised
+    run.correct(goal=before - (0.5 if within else 2.0) * reach)
+    assert (run.cost < before) is within
+
+
+def test_what_jumps_promises_too_little_to_be_left(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = away(short, monkeypatch, 10.0)
+    before, usual = run.cost, Descent.normal
+
+    def uneven(self: Descent, relative: float, central: bool) -> Normal:
+        found = usual(self, relative, central)
+        self.uneven = True
+        return found
+
+    monkeypatch.setattr(Descent, "normal", uneven)
+    run.correct(goal=0.0)
+    assert run.cost < before
