@@ -212,7 +212,7 @@ def independent(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[st
         if arguments.withheld:
             known = {candidate.effect for candidate in catalogue(problem)}
             without = known & {n for law in bench.laws for n in plant.EFFECTS[law.name][1]}
-        result = diagnose(problem, workers=arguments.workers, without=without)
+        result = diagnose(problem, workers=arguments.workers, without=without, law=False)
         row = judged(result, bench.effect, bench.size, accepted, bench.parameters)
         row |= {"shape": bench.shape, "shown": sizes[0]}
         if bench.effect != "none":
@@ -236,7 +236,7 @@ def mirrored(arguments: argparse.Namespace, example_set: Path) -> Iterator[dict[
             one = made(rig, item, factor, seed, wide=arguments.wide)
         effect = "none" if item is None else item.effect
         size = shown(one.problem, one.parameters, one.change)
-        result = diagnose(one.problem, workers=arguments.workers)
+        result = diagnose(one.problem, workers=arguments.workers, law=False)
         row = judged(result, effect, one.size, (effect,), one.parameters)
         yield {**row, "label": one.effect, "shown": size}
 

@@ -9,7 +9,7 @@ import types
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,23 @@ class Gain:
     fitted_z: float
     unused_z: float
     change: float
+
+
+class Effect(Protocol):
+    """What the catalogue says of a law: its name, and those of its special cases."""
+
+    @property
+    def effect(self) -> str:
+        """Name in the catalogue."""
+
+    @property
+    def contains(self) -> tuple[str, ...]:
+        """Effects that its law becomes for some values of its parameters."""
+
+
+def one_law(first: Effect, second: Effect) -> bool:
+    """Whether two effects are one, or one of them a case of the other, wherever they are."""
+    return first.effect in (second.effect, *second.contains) or second.effect in first.contains
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..calibrate.fit import MINIMUM
 from ..errors import CosimError
-from .candidates import Candidate
+from .facts import one_law
 from .late_values import LateValueFitter
 from .memo import Labels
 from .models import GATE, Fitted, compare
@@ -27,24 +27,26 @@ CLOSEST = 2
 def levelled(search: LateValueFitter, fitted: Fitted, done: set[Labels]) -> None:
     """Fit sets with another law in the place of one of a set's, that do nearly as much, to the end.
 
-    The memo gets the fits, and the verdict decides.
+    The memo gets the fits, and the verdict decides. Not asked where runs may turn unstable: where
+    fits end is chance there.
 
     Args:
         search: fits and judges.
         fitted: the set, thoroughly fitted.
         done: sets that have been fitted so, and are not again; gets those that are.
     """
-    for rival, less in _close(search, fitted, done)[:CLOSEST]:
+    close = [] if search.raw.unstable else _close(search, fitted, done)
+    for rival, less in close[:CLOSEST]:
         done.add(rival.labels)
         names = ", ".join(sorted(rival.labels))
         search.say(f"{names}: close enough to be fitted as far")
-        near = lowered(search, _from(search, rival, fitted), fitted, less)
+        near = to_minimum(search, _from(search, rival, fitted), fitted, less)
         search.say(f"{names}: {search.total(fitted, near):+.1f} nats on all runs")
         if search.total(fitted, near) > 0.0 or not search.apart(fitted, near):
-            search.sharpened(near, less)  # its intervals are asked for
+            search.sharpened(near, less)  # the memo gets it with intervals
 
 
-def lowered(search: LateValueFitter, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
+def to_minimum(search: LateValueFitter, trial: Fitted, goal: Fitted, base: Fitted) -> Fitted:
     """A model fitted to its minimum, as long as its derivatives promise that it may be as good.
 
     Args:
@@ -69,7 +71,7 @@ def _close(
     for rival in search.memo:
         mine = [e for e in fitted.effects if e.label not in rival.labels]
         other = [e for e in rival.effects if e.label not in fitted.labels]
-        if rival.labels in done or len(mine) != 1 or len(other) != 1 or _one(mine[0], other[0]):
+        if rival.labels in done or len(mine) != 1 or len(other) != 1 or one_law(mine[0], other[0]):
             continue
         less = search.memo.get(fitted.labels - {mine[0].label})
         if less is None:
@@ -79,14 +81,6 @@ def _close(
             found.append((behind, rival, less))
     found.sort(key=lambda item: item[0])
     return [(rival, less) for _, rival, less in found]
-
-
-def _one(first: Candidate, second: Candidate) -> bool:
-    """Whether two effects are one, elsewhere or a case of it."""
-    return first.effect == second.effect or (
-        first.place == second.place
-        and (first.effect in second.contains or second.effect in first.contains)
-    )
 
 
 def _from(search: LateValueFitter, rival: Fitted, fitted: Fitted) -> Fitted:

@@ -26,7 +26,7 @@ from .candidates import Candidate, new_parameters
 from .composed import composed
 from .fitter import QUICKLY
 from .late_values import LateValueFitter
-from .levelled import CLOSE, lowered
+from .levelled import CLOSE, to_minimum
 from .models import GATE, Fitted, compare, more_general
 from .probes import single
 from .rounds import Round
@@ -267,7 +267,7 @@ def challenged(search: LateValueFitter, base: Fitted, stage: Round) -> Fitted:
                 trial = search.refined(base, trial, quick=True, share=0.0)
                 almost = search.total(base, trial) > CLOSE * search.total(base, winner)
                 if almost and item.candidate.effect != last.effect and not search.raw.unstable:
-                    trial = lowered(search, trial, winner, base)
+                    trial = to_minimum(search, trial, winner, base)
                 else:
                     trial = search.approached(trial, winner, base)
             else:

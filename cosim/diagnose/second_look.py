@@ -1,18 +1,13 @@
-"""What is asked once more where the rounds' model leaves more than noise.
-
-without_slow_parts   laws that promised something, beside the model: does one do better instead?
-around_nominal       all laws around the sheet's values, where calibration has hidden nothing yet
+"""What is asked once more where the rounds' model leaves more than noise: all laws around the
+sheet's values, where calibration has hidden nothing yet.
 """
 
 from __future__ import annotations
 
-from .established import examined
-from .models import GATE, Fitted
+from .models import Fitted
 from .result import PURPOSES
 from .rounds import Round
 from .search import Search
-from .shortlist import PART
-from .table import candidates_of
 from .verdict import TENTH
 from .whiteness import WhitenessTest, whiteness_tests
 
@@ -43,27 +38,3 @@ def around_nominal(search: Search, current: Fitted) -> Round | None:
         return None
     search.say("more than noise is left: which law explains most around nominal values?")
     return search.around_nominal(current)
-
-
-def without_slow_parts(search: Search, fitted: Fitted) -> Fitted:
-    """A model that leaves noise, or one with as many laws that leaves less of slow parts.
-
-    A law that does nearly the same as the right one leaves next to noise, but not white noise; it
-    goes when the right one comes beside it.
-    """
-    slow = [t.channel for p in PURPOSES for t in tests_of(search, fitted, p) if t.slow_parts]
-    if not slow or search.raw.unstable or not fitted.effects:
-        return fitted
-    search.say(f"slow parts are left in {', '.join(dict.fromkeys(slow))}: does another law do?")
-    seen = [s for stage in search.rounds for s in stage.signatures]
-    least = PART * max(s.score.gain for s in seen)
-    near = {s.candidate.label for s in seen if s.score.gain >= least}
-    found = search.round(fitted, near).winner
-    search.rounds.pop()
-    if found is None:
-        return fitted
-    found = examined(search, found, candidates_of(search.rounds))
-    if len(found.effects) > len(fitted.effects) or search.gains(fitted, found)[0] <= GATE:
-        return fitted
-    search.say(f"instead: {', '.join(sorted(found.labels))}")
-    return found

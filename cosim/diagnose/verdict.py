@@ -21,7 +21,7 @@ from dataclasses import replace
 from itertools import permutations
 
 from .answer import Hint, Verdict, over, percent
-from .facts import Force, Gain, Law, Left, Model, Table
+from .facts import Force, Gain, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
 from .whiteness import CALIBRATED, structured
@@ -313,10 +313,7 @@ def _one_answer(first: Model, second: Model) -> bool:
     """Whether two sets differ by laws of which each is one of the other's, or a case of it."""
     mine, other = _differ(first, second)
     return len(mine) == len(other) > 0 and any(
-        all(
-            one.effect in (two.effect, *two.contains) or two.effect in one.contains
-            for one, two in zip(mine, order, strict=True)
-        )
+        all(one_law(one, two) for one, two in zip(mine, order, strict=True))
         for order in permutations(other)
     )
 
