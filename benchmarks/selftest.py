@@ -26,7 +26,7 @@ import json
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -290,8 +290,12 @@ def summary(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    """Run."""
+def main(words: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """Run; the rows of all sets.
+
+    Args:
+        words: of the command line, that of the program if not given.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--example", type=Path, help="data set whose rig our own FMUs play; else a plant of "
@@ -312,7 +316,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, help="duration of the runs")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/selftest"))
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(words)
     arguments.out.mkdir(parents=True, exist_ok=True)
     kept = arguments.out / "selftest.json"
     rows = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
@@ -330,6 +334,7 @@ def main() -> None:
     table = summary(rows)
     (arguments.out / "selftest.md").write_text(table, encoding="utf-8")
     print(table)
+    return rows
 
 
 if __name__ == "__main__":
