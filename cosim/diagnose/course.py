@@ -258,5 +258,5 @@ def shortened(result: Diagnosis, winners: list[Round], current: Fitted) -> Fitte
     search.say(f"unstable from there on, so runs count up to where the model leaves them: {until}")
     current = reconsidered(search, current, winners)
     for stage in winners:
-        stage.open = False  # their rivals have had their turn
+        stage.open, stage.cut = False, True
     return search.shortened(current, sizes)

@@ -369,7 +369,7 @@ class Fitter(Judge):
             return winner
         self.say(f"{winner.effects[-1].label}: sticks more nearly than usual")
         found = self.again(found, winner, base)
-        found.signature = replace(item, fixed={**item.fixed, **fixed})
+        found.signature = item.at(fixed)
         return found
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
@@ -487,6 +487,6 @@ class Fitter(Judge):
         less = self.simulator.of(problem.hold(held))
         result = self.fitted(less, fitted.estimate.theta[keep], fitted.estimate)
         result.effects = tuple(e for e in fitted.effects if e != effect)
-        result.signature = fitted.signature
+        result.signature = None if effect == fitted.effects[-1] else fitted.signature
         self.note(result)
         return result

@@ -40,7 +40,8 @@ class Fitted:
         estimate: parameters.
         values: what it gives in all runs.
         signature: score of the effect that was added last.
-        gate: gain on unused runs against the model of the round before.
+        gate: gain on unused runs against the model that it was last compared with: that of the
+            round before, if a round has fitted it.
     """
 
     effects: tuple[Candidate, ...]

@@ -83,7 +83,7 @@ def reconsidered(search: LateValueFitter, fitted: Fitted, rounds: list[Round]) -
         rounds: those that found them.
     """
     for stage in rounds:
-        if stage.winner is None:
+        if stage.winner is None or stage.cut:
             continue
         effects = frozenset(fitted.effects)
         if not stage.open and effects <= (stage.compared or set(stage.winner.effects)):
@@ -429,7 +429,7 @@ def exchanged(
     simulator = search.simulator.of(problem)
     result = search.fitted(simulator, start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
-    result.signature = replace(item, fixed={**item.fixed, **fixed})
+    result.signature = item.at(fixed)
     search.note(result)
     return result
 

@@ -37,6 +37,8 @@ class Round:
             were simulated in.
         quick: what the best quick fit gained on all runs [nats].
         near: candidates whose quick fits gained nearly as much.
+        cut: whether runs were ended after it, so its fits are of others: its rivals have had their
+            turn.
         failed: candidates that could not be simulated at any strength, and why.
         compared: effects of the model in which its winner was last compared with others; empty if
             that was the round's own.
@@ -53,6 +55,7 @@ class Round:
     quick: float = 0.0
     near: frozenset[Candidate] = frozenset()
     compared: frozenset[Candidate] = frozenset()
+    cut: bool = False
     failed: dict[str, str] = field(default_factory=dict)
 
     @property

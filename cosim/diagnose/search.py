@@ -164,9 +164,8 @@ class Search(LateValueFitter):
             raw = self.taken(raw.changed(shafts=shafts, turns=turns))
             whole = first.problem.changed(shafts=shafts, turns=turns)
             first = replace(first, simulator=self.simulator.of(whole))
-        self.say(
-            f"declared parameters fitted: cost per residual {2 * first.cost / first.count:.3f}"
-        )
+        left = 2.0 * first.cost / first.count
+        self.say(f"declared parameters fitted, steps of {step:g} s: {left:.3f} per residual left")
         if exact:
             return self.judged(first)
         if raw.far:  # errors at such parameters are not those at the right ones, and small beside

@@ -18,7 +18,7 @@ REFITS = 6
 unless they are rivals of the winner (`rivals.challenged`)."""
 PART = 0.2
 """A candidate that gains less than this share of what the best one gains, to first order, is not
-refitted: it is no rival, and if the winner leaves more than noise, another round asks again."""
+refitted: it is no rival, and another round asks again."""
 MEMBERS = 2
 """Members of a group (swivels of casters) that are refitted with one effect at most, the best."""
 IMITATED = 2

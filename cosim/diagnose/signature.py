@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,12 @@ class Signature:
         """Whether it stands at one of a few places that were tried."""
         others = (p for p in self.probe.others if p.hints.tries or p.hints.visits)
         return any(p.name in self.fixed for p in others)
+
+    def at(self, held: Mapping[str, float]) -> Signature:
+        """The candidate with parameters of its own at other values than usual, if they are."""
+        usual = {p.name: p.nominal for p in self.probe.others}
+        fixed = {name: value for name, value in held.items() if value != usual.get(name)}
+        return replace(self, fixed={**self.fixed, **fixed})
 
     @property
     def strength(self) -> Parameter:

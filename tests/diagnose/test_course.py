@@ -19,6 +19,8 @@ from tests.problems import simulator
 
 DRAG, WEIGHT, HIDDEN = 0.01, 0.2, 2.0
 """Of drag [N.m.s2/rad2], an unbalance, and a push that no catalogue has [N.m]."""
+LIGHT = 2e-3
+"""Of either, so small that a fit from near is at its minimum."""
 ASKED = ("quadratic_drag", "unbalance", "coulomb")
 
 
@@ -28,6 +30,10 @@ def two(w: float, theta: float, t: float) -> float:
 
 def pushed(w: float, theta: float, t: float) -> float:
     return two(w, theta, t) + HIDDEN * math.sin(9.0 * t)
+
+
+def light(w: float, theta: float, t: float) -> float:
+    return LIGHT * (math.sin(theta) + w * abs(w))
 
 
 def followed(
@@ -81,3 +87,29 @@ def test_what_a_law_takes_is_a_share_of_what_is_beyond_noise(tmp_path: Path) -> 
     assert 0.5 < shares[0] < 0.99
     # noise is a thousandth of what is missing
     assert shares[1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_law_after_runs_were_ended_is_not_compared_with_fits_of_whole_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first law's rivals have had their turn, and their fits are longer than what is left."""
+    until = 100
+    with built.rig(tmp_path, light, unstable=True) as rig:
+        search = rig.search
+        names = {*search.fitting.names, *search.checking.names}
+        ended = iter([dict.fromkeys(names, until), {}])
+        monkeypatch.setattr("cosim.diagnose.course.ends", lambda *model: next(ended))
+        drag = rig.added(rig.base, "quadratic_drag", {"c": LIGHT})
+        other = rig.added(rig.base, "bearing_drag", {"tau_ref": 1e-3})
+        first = Round(rig.base, [], {}, fitted=[drag, other], winner=drag,
+                      near=frozenset(other.effects))  # fmt: skip
+        course = Course(
+            Diagnosis(search.raw, Verdict(""), search=search, before=rig.base), search, rig.base
+        )
+        course.proposed = True
+        assert course._added(first)
+        assert {run.times.size for run in search.raw.runs} == {until}
+        both = rig.added(course.current, "unbalance", {"m_u": LIGHT, "psi": 0.0})
+        assert not search.lacking(both)
+        course._added(Round(course.current, [], {}, fitted=[both], winner=both))
+    assert {e.effect for e in course.current.effects} == {"quadratic_drag", "unbalance"}
