@@ -90,7 +90,11 @@ def equations(m: Model) -> None:
     along = ca.vertcat(spacing, spacing) * p.a
     side = ca.vertcat(-ca.DM.ones(count), ca.DM.ones(count))
     across = side * p.B / 2
-    belt = p.r * ca.vertcat(ca.repmat(speeds.w2, count), ca.repmat(speeds.w3, count))
+    r2, r3 = (
+        p.r + m.balance(name, "coefficient", unit="m", value=p.r, turning=w).effort
+        for name, w in (("radius_right", speeds.w2), ("radius_left", speeds.w3))
+    )
+    belt = ca.vertcat(ca.repmat(r2 * speeds.w2, count), ca.repmat(r3 * speeds.w3, count))
     toe: SX = ca.vertcat(
         *(
             ca.repmat(m.balance(name, "coefficient", unit="rad", value=0).effort, count)
@@ -158,7 +162,7 @@ def equations(m: Model) -> None:
     m.output(V_Y, v_y)
     m.output(X_AXIS, -v_y * w_z / (w_z**2 + YAW_RATE_FLOOR**2))
 
-    pull2, pull3 = p.r * ca.sum1(grip[:count]), p.r * ca.sum1(grip[count:])
+    pull2, pull3 = r2 * ca.sum1(grip[:count]), r3 * ca.sum1(grip[count:])
     right = m.balance("sprocket_right", "rotation", velocity=speeds.w2_in, load=pull2)
     left = m.balance("sprocket_left", "rotation", velocity=speeds.w3_in, load=pull3)
     m.port(qs.SPROCKET_RIGHT, m.output(qs.TAU2, pull2 - right.effort), speeds.w2_in)

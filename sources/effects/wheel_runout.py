@@ -1,4 +1,4 @@
-"""Eccentric wheel: its rolling radius changes over a turn.
+"""Eccentric wheel or sprocket: its rolling radius changes over a turn.
 
     r -> r + e cos(phi - phi_0)
 
@@ -15,6 +15,7 @@ from cosim.spec.hints import SearchHints
 
 from ..effect import Effect
 from ..effect_model import EffectModel
+from ..laws.angle import shaft_angle
 from ..quantity import Quantity
 
 E = Quantity(
@@ -26,10 +27,9 @@ PHI_0 = Quantity(
 
 EFFECT = Effect(
     "wheel_runout",
-    "Eccentric wheel.",
+    "Eccentric wheel or sprocket.",
     ("coefficient",),
     E,
-    needs=("angle",),
     unit="m",
     source="kinematics",
 )
@@ -37,5 +37,5 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Modulate the radius."""
-    p, phi = e.parameters(E, PHI_0), e.signal("angle")
+    p, phi = e.parameters(E, PHI_0), shaft_angle(e, "turning")
     e.add(p.e * ca.cos(phi - p.phi_0))

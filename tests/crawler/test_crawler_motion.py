@@ -359,3 +359,18 @@ def test_what_is_dragged_pulls_against_the_motion_of_its_point() -> None:
     assert float(values["mass"]) * change == pytest.approx(pull, rel=1e-12)
     turned = float(values["yaw_inertia"]) * (some["yaw_rate"] - none["yaw_rate"])
     assert turned == pytest.approx((place.conjugate() * pull).imag, rel=1e-12)
+
+
+def test_eccentric_sprockets_carry_a_crawler_back_and_forth_over_a_turn() -> None:
+    """Both alike: no turn, and x = r phi + e sin(phi) but for the slip that acceleration asks."""
+    e, w, r = 5e-4, 2.0, device_values("crawler", "lab")["r"].value
+    both = oracle(".lab/track_contact+wheel_runout@radius_right+wheel_runout@radius_left")
+    names = ("radius_right.wheel_runout.e", "radius_left.wheel_runout.e")
+    values = {"w2": w, "w3": w, "x_G": 0.0, "y_G": 0.0, "f_r": 0.0, **dict.fromkeys(names, e)}
+    times = np.linspace(0.0, 2 * math.pi / w, 9)
+    run = both.simulate(times, {**values, "vel_x": (r + e) * w})
+    phi = w * times
+    # slip speeds are u_0 a/(mu g) with accelerations a of e w^2: 4e-7 m/s
+    np.testing.assert_allclose(run["x"], r * phi + e * np.sin(phi), atol=2e-6)
+    assert np.ptp(run["x"] - r * phi) == pytest.approx(2 * e, rel=0.01)
+    np.testing.assert_allclose(run["beta"], 0.0, atol=1e-12)
