@@ -37,7 +37,7 @@ ONE, SOME, WITHHELD = "--clean {} --repeats 1", "--clean 0 --repeats 0 --pairs {
     "--clean 0 --repeats 1 --withheld"
 )  # fmt: skip
 SERIES = (
-    *(Series("motor", "one", 140001 + i, ONE.format(7)) for i in range(5)),
+    *(Series("motor", "one", 140002 + i, ONE.format(7)) for i in range(5)),
     *(Series("motor", "several", 140101 + i, SOME.format(10, 5)) for i in range(4)),
     *(Series("motor", "withheld", 140201 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141001 + i, ONE.format(6)) for i in range(2)),
