@@ -113,7 +113,8 @@ def _waited(pid: int, memory: mmap.mmap) -> int:
     finally:
         signal.alarm(0)
         for number, handler in before.items():
-            signal.signal(number, handler)
+            second = number == signal.SIGTERM and number in told  # this process ends, too
+            signal.signal(number, signal.SIG_IGN if second else handler)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(pid, signal.SIGKILL)  # what FMUs have started
     if told and code < 0:

@@ -83,10 +83,14 @@ class Signature:
         return any(p.name in self.fixed for p in others)
 
     def at(self, held: Mapping[str, float]) -> Signature:
-        """The candidate with parameters of its own at other values than usual, if they are."""
-        usual = {p.name: p.nominal for p in self.probe.others}
-        fixed = {name: value for name, value in held.items() if value != usual.get(name)}
-        return replace(self, fixed={**self.fixed, **fixed})
+        """The candidate with parameters of its own held at other values.
+
+        As usual they are not chosen, unless they had been.
+        """
+        usual, known = {p.name: p.nominal for p in self.probe.others}, self.fixed
+        fixed = {n: v for n, v in {**known, **held}.items()
+                 if v != usual.get(n) or known.get(n) == v}  # fmt: skip
+        return replace(self, fixed=fixed)
 
     @property
     def strength(self) -> Parameter:

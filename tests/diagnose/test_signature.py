@@ -31,7 +31,12 @@ def test_a_parameter_held_as_usual_is_not_chosen_however_a_law_came_in(tmp_path:
     assert same.complexity == plain.complexity == plain.free
     (width,) = (p for p in probe.others if p.name.endswith(".w_0"))
     assert not item.at({width.name: width.nominal}).fixed
-    assert item.at({width.name: SHARP}).fixed == {width.name: SHARP}
+    sharp = item.at({width.name: SHARP})
+    assert sharp.fixed == {width.name: SHARP}
+    assert not sharp.at({width.name: width.nominal}).fixed
+    # a value of a list that happens to be the usual one was chosen
+    chosen = replace(item, fixed={width.name: width.nominal})
+    assert chosen.at(chosen.fixed).fixed == chosen.fixed
 
 
 def test_a_model_without_its_last_law_is_not_described_by_that_one(tmp_path: Path) -> None:

@@ -176,14 +176,18 @@ def work():
     print("reported", flush=True)
 
 guard.GRACE = 1
-guard.guarded(work)
+try:
+    guard.guarded(work)
+finally:
+    print("ended", flush=True)
+    time.sleep({after})
 """
 """A command that takes a while to end once it is told to."""
 
 
 def told(heard: bool, seconds: float, numbers: list[signal.Signals]) -> tuple[int, list[str]]:
     """Exit code and words of a command that gets signals, a moment apart."""
-    text = TOLD.format(heard=heard, seconds=seconds)
+    text = TOLD.format(heard=heard, seconds=seconds, after=0.0)
     with subprocess.Popen(
         [sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
     ) as process:
@@ -193,7 +197,7 @@ def told(heard: bool, seconds: float, numbers: list[signal.Signals]) -> tuple[in
             process.send_signal(number)
             time.sleep(0.3)
         rest, _ = process.communicate(timeout=60.0)
-    return process.returncode, [begun.strip(), *rest.split()]
+    return process.returncode, [begun.strip(), *rest.split()[:-1]]
 
 
 def test_a_command_that_has_heard_reports_as_long_as_it_takes() -> None:
@@ -203,6 +207,18 @@ def test_a_command_that_has_heard_reports_as_long_as_it_takes() -> None:
 def test_a_second_sigterm_is_the_first() -> None:
     """`timeout` sends its signal to the command and to its group."""
     assert told(True, 3.0, [signal.SIGTERM] * 2) == (0, ["begun", "told", "reported"])
+
+
+def test_so_it_is_where_the_report_was_quicker() -> None:
+    text = TOLD.format(heard=True, seconds=0.1, after=1.0)
+    with subprocess.Popen(
+        [sys.executable, "-c", text], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.strip() in ("begun", "ended"):
+                process.send_signal(signal.SIGTERM)
+    assert process.returncode == 0
 
 
 def test_one_that_has_not_is_killed() -> None:
