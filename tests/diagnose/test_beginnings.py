@@ -148,7 +148,7 @@ def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(rig:
     assert found.estimate.robust < 0.5 * model.estimate.robust
     assert found.problem.constants[SMOOTHING] == pytest.approx(USUAL)
     assert found.signature is not None and found.labels == model.labels
-    assert found.signature.fixed == {SMOOTHING: pytest.approx(USUAL)}
+    assert not found.signature.fixed  # it is where it is usual, which nobody chose
     assert rig.said[-1] == "coulomb at load.flange: sticks more nearly than usual"
 
 
