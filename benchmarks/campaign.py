@@ -33,9 +33,9 @@ class Series(NamedTuple):
     """Options of `benchmarks.selftest`."""
 
 
-ONE, SOME, WITHHELD = "--clean {} --repeats 1", "--clean 0 --repeats 0 --pairs {} --triples {}", (
-    "--clean 0 --repeats 1 --withheld"
-)  # fmt: skip
+ONE = "--clean {} --repeats 1"
+SOME = "--clean 0 --repeats 0 --pairs {} --triples {}"
+WITHHELD = "--clean 0 --repeats 1 --withheld"
 SERIES = (
     *(Series("motor", "one", 140002 + i, ONE.format(7)) for i in range(5)),
     *(Series("motor", "several", 140101 + i, SOME.format(10, 5)) for i in range(4)),

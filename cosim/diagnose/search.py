@@ -267,7 +267,7 @@ class Search(LateValueFitter):
             self.say(current.unasked)
         return current
 
-    def round(self, base: Fitted, among: Collection[str] | None = None) -> Round:
+    def round(self, base: Fitted) -> Round:
         """Score, refit the best, choose.
 
         Where that finds nothing for a model whose parameters were driven to their bounds, once more
@@ -275,28 +275,26 @@ class Search(LateValueFitter):
 
         Args:
             base: the model.
-            among: labels of the candidates, all if not given.
         """
-        current = self._round(base, base, among)
+        current = self._round(base, base)
         if current.winner is None and self.far(base):
             self.say("parameters stand at their bounds: once more around their nominal values")
             nominal = self.unfitted(base)
             if nominal is not None:
-                current = self._round(base, nominal, among)
+                current = self._round(base, nominal)
         self.rounds.append(current)
-        if self.whole and current.winner is not None and among is None:
+        if self.whole and current.winner is not None:
             self.prepare(current.winner.problem)
         return current
 
-    def _round(self, base: Fitted, start: Fitted, among: Collection[str] | None = None) -> Round:
+    def _round(self, base: Fitted, start: Fitted) -> Round:
         """A round whose candidates are scored, and fits begun, around another model's parameters.
 
         Args:
             base: from which gains count.
             start: the same model with parameters to begin with.
-            among: see `round`.
         """
-        return self._decided(base, start, self.scored(start, among))
+        return self._decided(base, start, self.scored(start))
 
     def around_nominal(self, fitted: Fitted) -> Round | None:
         """A round of the declared model around its nominal values.
