@@ -5,7 +5,9 @@
 
 The series of `SERIES` one after the other, as `benchmarks.selftest` runs them; a series of one rig
 is short, so a campaign that ends early holds a bit of everything. A set that is there is not
-diagnosed again, so the same command goes on, and one command for each rig may run beside others.
+diagnosed again, so the same command goes on, and one command for each rig may run beside others;
+with another state of the program (the files of `STATE`) it is refused, since figures of two states
+are figures of none.
 Prints, and writes as `campaign.md`, a table of outcomes for each rig and kind of series:
 
     one      one effect or none
@@ -16,6 +18,7 @@ Prints, and writes as `campaign.md`, a table of outcomes for each rig and kind o
 from __future__ import annotations
 
 import argparse
+import hashlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -61,6 +64,35 @@ def turns(chosen: list[Series]) -> list[Series]:
     return [series for _, _, series in sorted(order)]
 
 
+STATE = ("cosim/**/*.py", "cosim/**/*.toml", "sources/**/*.py", "sources/**/*.c", "benchmarks/*.py")
+"""Files that rows come from."""
+
+
+def state(top: Path = Path(__file__).parents[1]) -> str:
+    """What tells this state of the program from others: a digest of its files."""
+    digest = hashlib.sha256()
+    for path in sorted({path for pattern in STATE for path in top.glob(pattern)}):
+        digest.update(f"{path.relative_to(top).as_posix()}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def claim(out: Path) -> None:
+    """Mark a folder as one of this state.
+
+    Raises:
+        SystemExit: its rows are of another.
+    """
+    mark, mine = out / "state.txt", state()
+    if mark.exists() and (theirs := mark.read_text(encoding="utf-8").strip()) != mine:
+        raise SystemExit(
+            f"{out}: its sets were diagnosed by state {theirs} of the program, which is {mine} "
+            "now; go on with the commit that made it, or give another --out"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    with atomic(mark) as place:
+        place.write_text(mine + "\n", encoding="utf-8")
+
+
 def main() -> None:
     """Run."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -68,6 +100,7 @@ def main() -> None:
     parser.add_argument("--workers", default="2")
     parser.add_argument("--out", type=Path, default=Path("out/campaign"))
     arguments = parser.parse_args()
+    claim(arguments.out)
     chosen = [s for s in SERIES if arguments.rig in (None, s.rig)]
     rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for series in turns(chosen):

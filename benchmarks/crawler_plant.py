@@ -115,7 +115,8 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     Args:
         benches: individuals.
         seconds: duration of each run.
-        starts: pose of each run at time 0, and where within a count its encoders are, (runs, 5).
+        starts: pose of each run at time 0, and where within a count its encoders are,
+            (runs, benches, 5).
     """
     count, runs = len(benches), len(RUNS)
 
@@ -172,8 +173,7 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         values, shift, index = table
         return np.asarray(values[np.minimum(step + shift, steps), index])
 
-    pose = np.repeat(starts[:, :3], count, axis=0).T.copy()
-    x, y, yaw = pose
+    x, y, yaw = starts[..., :3].reshape(runs * count, 3).T
     v_x, v_y, rate = np.zeros(runs * count), np.zeros(runs * count), np.zeros(runs * count)
     angle_l, angle_r = np.zeros(runs * count), np.zeros(runs * count)
     pulled_l = pulled_r = a_x = a_y = np.zeros(runs * count)
@@ -241,23 +241,31 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     # what is logged is the command, of which late encoders know an earlier part
     for k, (name, values) in enumerate((("sprocket_speed_l", left), ("sprocket_speed_r", right))):
         angle = np.vstack([np.zeros(runs), np.cumsum(values[:-1], axis=0) * STEP])[::every]
-        counts = np.floor(angle / COUNT + starts[:, 3 + k])
-        found[name] = np.repeat(np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE,
-                                count, axis=1)  # fmt: skip
+        counts = np.floor(np.repeat(angle, count, axis=1) / COUNT + starts[..., 3 + k].ravel())
+        found[name] = np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE
     return found
 
 
-def _starts(seed: int) -> Vector:
-    """Start poses of the runs, and where within a count their encoders are."""
-    random = np.random.default_rng([seed, 2])
-    poses = random.uniform([-0.1, -0.1, -np.pi], [0.1, 0.1, np.pi], (len(RUNS), 3))
-    return np.hstack([poses, random.uniform(0.0, 1.0, (len(RUNS), 2))])
+def _starts(seed: int, benches: list[Bench]) -> Vector:
+    """Start poses of the runs, and where within a count their encoders are, (runs, benches, 5).
+
+    Drawn for each robot from its parameters: what counts hide moves estimates, of all robots
+    together if they share it; a robot and its twin without effects start alike.
+    """
+    found = []
+    for bench in benches:
+        own = np.array([bench.parameters[name] for name in DECLARED]).view(np.uint32)
+        random = np.random.default_rng([seed, 2, *own.tolist()])
+        poses = random.uniform([-0.1, -0.1, -np.pi], [0.1, 0.1, np.pi], (len(RUNS), 3))
+        found.append(np.hstack([poses, random.uniform(0.0, 1.0, (len(RUNS), 2))]))
+    return np.stack(found, axis=1)
 
 
 def changes(benches: list[Bench], seed: int, seconds: float) -> list[dict[str, dict[str, Vector]]]:
     """What each robot's effects change, without noise: run -> channel -> values."""
     twins = [Bench(bench.parameters) for bench in benches]
-    values = simulate([*benches, *twins], seconds, _starts(seed))
+    both = [*benches, *twins]
+    values = simulate(both, seconds, _starts(seed, both))
     count = 2 * len(benches)
     return [
         {
@@ -276,7 +284,7 @@ def write_sets(
 ) -> list[Path]:
     """Write one data set per robot, with the sheet's noise; return their folders."""
     random = np.random.default_rng([seed, 1])
-    starts = _starts(seed)
+    starts = _starts(seed, benches)
     values = simulate(benches, seconds, starts)
     names = ["sprocket_speed_l", "sprocket_speed_r"]
     names += [f"m{k}_{axis}" for k in range(1, 6) for axis in "xy"]
@@ -289,7 +297,7 @@ def write_sets(
                 clean = values[name][:, k * len(benches) + column]
                 sigma = CAMERA if name.startswith("m") else SPEED_NOISE
                 table[name] = clean + sigma * random.standard_normal(clean.size)
-            near = starts[k, :3] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
+            near = starts[k, column, :3] + random.standard_normal(3) * [1e-3, 1e-3, 3e-3]
             purpose = "identification" if run.startswith(FITTED) else "validation"
             pose = [round(float(v), 4) for v in near]
             logged.append(Logged(run, purpose, table, {"initial_pose": pose}))

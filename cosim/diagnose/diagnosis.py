@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.budget import Budget, StoppedError
 from ..calibrate.checks.examine import check_fit, examine
 from ..calibrate.checks.finding import Finding, lines
+from ..calibrate.estimate import Estimate
 from ..calibrate.input_noise import propagated
 from ..calibrate.pool import SessionPool
 from ..calibrate.problem import Problem
@@ -39,6 +40,7 @@ from .result import Diagnosis
 from .rivals import elsewhere, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
+from .small import allow, small_laws
 from .table import candidates_of, table_of
 from .verdict import above, decide, proposal, unasked
 
@@ -274,7 +276,9 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     simple: set[frozenset[str]] = set()
     level: set[frozenset[str]] = set()
     offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
+    wide: list[Estimate] = []
     for _ in range(TURNS):
+        allow(search, current, wide)
         if current.effects:
             search.memo.keep(current)
             if current.labels not in simple:
@@ -310,7 +314,12 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     else:  # a force was asked last, or another set proposed
         result.table = table_of(search, rounds, forces, ended)
     result.answer = answer = decide(result.table)
-    result.after = current if answer.laws else result.before
+    result.after = after = current if answer.laws else result.before
+    assert after is not None
+    if answer.laws or answer.kind == "nothing_missing":
+        allow(search, after, wide)
+        result.small = small_laws(search, after)
+        result.warnings += [law.sentence for law in result.small]
     if answer.rivals:
         names = result.table.models[answer.rivals[0][0]].labels
         rival = search.memo.get(names)

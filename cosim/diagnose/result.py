@@ -23,6 +23,7 @@ from .grey_box import Begun, LawFromData
 from .localise import Place
 from .models import Fitted
 from .search import Search
+from .small import Small
 from .whiteness import WhitenessTest
 
 Vector = NDArray[np.float64]
@@ -45,6 +46,7 @@ class Diagnosis:
         residuals: (`before`/`after`, run) -> residuals over sigma, free of the step's error.
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
+        small: laws that show beside the model of the answer, too small to be named.
         withheld: effects that were left out of the catalogue.
         experiment: proposed to separate rivals.
         ended: run -> time from which it does not count: what happens there hangs on small changes
@@ -70,6 +72,7 @@ class Diagnosis:
     residuals: dict[tuple[str, str], Vector] = field(default_factory=dict)
     structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
+    small: list[Small] = field(default_factory=list)
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
     further: list[Further] = field(default_factory=list)
@@ -140,6 +143,7 @@ class Diagnosis:
             "localisation": [place.to_dict() for place in self.located],
             "law_from_data": None if self.law is None else self.law.to_dict(),
             "power": self.power,
+            "small_laws": [law.to_dict() for law in self.small],
             "proposed_experiment": self.experiment,
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],

@@ -99,7 +99,7 @@ def table(verdict: str) -> dict[str, Any]:
             "R_a": {"unit": "ohm", "before": value, "after": value},
             "eta": {"unit": "-", "before": unknown, "after": unknown},
         },
-        "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {},
+        "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {}, "small_laws": [],
         "structure": {
             f"{which} {purpose}": structured(*([] if which == "after" and after < 1.1
                                                else ["speed"]))
