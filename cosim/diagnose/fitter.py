@@ -227,9 +227,8 @@ class Fitter(Judge):
                     min(costs), item.strength.name, usual,
                 )  # fmt: skip
             result = self.fitted(simulator, first, base.estimate)
-            gain = self.gain(base, result)
-            if result.estimate.unkept > max(GATE, goal - gain) or gain < -GATE:
-                result = self._from_others(simulator, rest, result, base)
+            if result.estimate.unkept > max(GATE, goal - self.gain(base, result)):
+                result = self._from_others(simulator, rest, result)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
@@ -243,15 +242,9 @@ class Fitter(Judge):
         result.signature = item
         return result
 
-    def _from_others(
-        self, simulator: Simulator, starts: list[Vector], stalled: Fitted, base: Fitted
-    ) -> Fitted:
-        """The best fit from other starts, with derivatives of the model itself.
-
-        Enough is what a stalled fit promised, and never less than the base, which the model holds.
-        """
-        best = stalled
-        enough = min(stalled.estimate.robust - stalled.estimate.unkept, base.estimate.robust)
+    def _from_others(self, simulator: Simulator, starts: list[Vector], stalled: Fitted) -> Fitted:
+        """The best fit from other starts, with derivatives of the model itself."""
+        best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:
             found = self.judged(fit(simulator, start, effort=DRAFT))
             best = min(best, found, key=lambda f: f.estimate.robust)
