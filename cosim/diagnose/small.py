@@ -67,9 +67,11 @@ def small_laws(search: Search, fitted: Fitted) -> list[Small]:
         search: its rounds have scored the laws; none has, if no round began with this model.
         fitted: the model.
     """
-    if search.raw.unstable:  # every law moves the moment a little there, and seems one
+    if (
+        search.raw.late
+    ):  # every law moves the moment a little in which a caster turns, and seems one
         return []
-    stages = [s for s in search.rounds if s.base.labels == fitted.labels and not s.cut]
+    stages = [s for s in search.rounds if s.base.labels == fitted.labels and not s.elsewhere]
     if not stages:
         return []
     stage, base = stages[-1], stages[-1].base

@@ -8,6 +8,7 @@ import pytest
 
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose import diagnose
+from cosim.diagnose.small import small_laws
 from tests.diagnose import disc
 
 DRAG = 4e-7
@@ -41,3 +42,7 @@ def test_intervals_hold_the_truth_beside_a_law_without_a_name(tmp_path: Path, si
         (law,) = found.small
         assert law.change < 0.15 and law.shifts["b"] < -3.0 * half["b"]
         assert "quadratic_drag at load.flange shows, too" in law.sentence
+        assert found.search is not None
+        for stage in found.search.rounds:  # scored around other values, it says nothing of these
+            stage.elsewhere = True
+        assert not small_laws(found.search, found.after)
