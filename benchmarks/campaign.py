@@ -6,8 +6,8 @@
 The series of `SERIES` one after the other, as `benchmarks.selftest` runs them; a series of one rig
 is short, so a campaign that ends early holds a bit of everything. A set that is there is not
 diagnosed again, so the same command goes on, and one command for each rig may run beside others;
-with another state of the program (the files of `STATE`) it is refused, since figures of two states
-are figures of none.
+with another state of the program or of the rig's plant (the files of `STATE`) a series is refused,
+since figures of two states are figures of none.
 Prints, and writes as `campaign.md`, a table of outcomes for each rig and kind of series:
 
     one      one effect or none
@@ -64,31 +64,36 @@ def turns(chosen: list[Series]) -> list[Series]:
     return [series for _, _, series in sorted(order)]
 
 
-STATE = ("cosim/**/*.py", "cosim/**/*.toml", "sources/**/*.py", "sources/**/*.c", "benchmarks/*.py")
-"""Files that rows come from."""
+STATE = (
+    "cosim/**/*.py", "cosim/**/*.toml", "sources/**/*.py", "sources/**/*.c",
+    "benchmarks/bench.py", "benchmarks/own_plant.py", "benchmarks/selftest.py",
+    "benchmarks/{rig}_plant.py",
+)  # fmt: skip
+"""Files that the rows of a rig come from."""
 
 
-def state(top: Path = Path(__file__).parents[1]) -> str:
-    """What tells this state of the program from others: a digest of its files."""
+def state(rig: str, top: Path = Path(__file__).parents[1]) -> str:
+    """What tells the present state of all that a rig's rows come from: a digest of the files."""
     digest = hashlib.sha256()
-    for path in sorted({path for pattern in STATE for path in top.glob(pattern)}):
+    patterns = [pattern.format(rig=rig) for pattern in STATE]
+    for path in sorted({path for pattern in patterns for path in top.glob(pattern)}):
         digest.update(f"{path.relative_to(top).as_posix()}\0".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def claim(out: Path) -> None:
-    """Mark a folder as one of this state.
+def claim(folder: Path, rig: str) -> None:
+    """Mark the folder of a series as one of this state.
 
     Raises:
         SystemExit: its rows are of another.
     """
-    mark, mine = out / "state.txt", state()
+    mark, mine = folder / "state.txt", state(rig)
     if mark.exists() and (theirs := mark.read_text(encoding="utf-8").strip()) != mine:
         raise SystemExit(
-            f"{out}: its sets were diagnosed by state {theirs} of the program, which is {mine} "
+            f"{folder}: its sets were diagnosed by state {theirs} of the program, which is {mine} "
             "now; go on with the commit that made it, or give another --out"
         )
-    out.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     with atomic(mark) as place:
         place.write_text(mine + "\n", encoding="utf-8")
 
@@ -100,12 +105,12 @@ def main() -> None:
     parser.add_argument("--workers", default="2")
     parser.add_argument("--out", type=Path, default=Path("out/campaign"))
     arguments = parser.parse_args()
-    claim(arguments.out)
     chosen = [s for s in SERIES if arguments.rig in (None, s.rig)]
     rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for series in turns(chosen):
         words = ["--rig", series.rig, "--wide", "--seed", str(series.seed), *series.sizes.split()]
         folder = arguments.out / f"{series.rig}_{series.kind}_{series.seed}"
+        claim(folder, series.rig)
         words += ["--workers", arguments.workers, "--out", str(folder)]
         rows.setdefault((series.rig, series.kind), []).extend(selftest.main(words))
     text = "\n".join(
