@@ -13,6 +13,9 @@ these counts, the one is taken whose speed bends least,
 by a barrier method whose banded systems cost next to nothing. Where the speed does jump, bounds
 keep the jump.
 
+A log may show counts with noise on top. Rounding gives them back but for one in thousands, which
+moves all angles after it by a count; that one bends the motion, so it is told (`whole`).
+
 Not modelled: marks that are not equally far from each other.
 
 Source: Boyd, Vandenberghe, Convex Optimization (2004), 11.3.
@@ -39,6 +42,42 @@ INSIDE = 0.99
 """Share of the way to a bound that a step may go."""
 UNEVEN = 0.1
 """Share of an interval by which others may differ: time stamps jitter, a lost sample doubles it."""
+DOUBT = 0.1
+"""Distance from the middle between two counts within which rounding is asked again [counts]. Noise
+of an eighth of a count goes beyond the middle in one of 16 000 samples, and comes that near in one
+of 700."""
+BESIDE = 20
+"""Samples on each side by whose motion it is told: a count is spread over a few of them at most."""
+CLEARLY = 0.5
+"""Share to which the other count must lower the bending. In 24 generated logs of crawlers 15 of 21
+wrong counts do, to a sixth and less; where the speed rises or falls, those and 22 right ones lower
+it to 0.62 to 1, and nothing is known."""
+
+
+def whole(values: Vector) -> Vector:
+    """Whole counts from values with noise on top.
+
+    The nearest; where a value is nearly in the middle of two, the other one if the motion beside it
+    bends less by far.
+
+    Args:
+        values: counts within each interval, with noise far below one.
+    """
+    found = np.rint(values)
+    for i in np.flatnonzero(np.abs(values - found) > 0.5 - DOUBT):
+        first = max(int(i) - BESIDE, 0)
+        mine = found[first : i + BESIDE + 1]
+        other = mine.copy()
+        other[i - first] += np.sign(values[i] - found[i])
+        if _bending(other) < CLEARLY * _bending(mine):
+            found[i] = other[i - first]
+    return found
+
+
+def _bending(differences: Vector) -> float:
+    """Sum of squares of third differences of the smoothest motion with some counts."""
+    motion = smoothest(np.concatenate([[0.0], np.cumsum(differences)]))
+    return float(np.sum(np.diff(motion, ORDER) ** 2))
 
 
 def steady(differences: Vector, times: Vector) -> Vector:

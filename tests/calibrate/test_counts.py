@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cosim.calibrate.counts import smoothest, steady
+from cosim.calibrate.counts import smoothest, steady, whole
 
 Vector = NDArray[np.float64]
 INTERVAL, COUNT = 0.02, 2.0 * np.pi / 25600
@@ -44,8 +44,8 @@ def test_no_angle_leaves_its_count_even_where_the_speed_jumps(jump: float) -> No
 
 def test_at_rest_and_at_whole_counts_nothing_changes() -> None:
     times: Vector = np.asarray(INTERVAL * np.arange(100.0))
-    for whole in (0.0, 7.0):
-        assert steady(np.full(100, whole), times) == pytest.approx(np.full(100, whole), abs=1e-6)
+    for count in (0.0, 7.0):
+        assert steady(np.full(100, count), times) == pytest.approx(np.full(100, count), abs=1e-6)
 
 
 def test_it_begins_anew_after_a_lost_sample() -> None:
@@ -61,3 +61,35 @@ def test_it_begins_anew_after_a_lost_sample() -> None:
 
 def test_a_few_samples_are_what_they_are() -> None:
     assert smoothest(np.array([0.0, 2.0, 5.0])).tolist() == [0.0, 2.0, 5.0]
+
+
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize("beyond", [0.42, 0.48, 0.52, 0.58])
+def test_a_count_whose_noise_passes_the_middle_is_told_by_the_motion(
+    beyond: float, above: bool
+) -> None:
+    counts = counted(ramped(4.8)[1])
+    noisy = counts + 0.02 * np.random.default_rng(1).standard_normal(counts.size)
+    noisy[200] = counts[200] + (beyond if above else -beyond)
+    assert (np.rint(noisy)[200] == counts[200]) == (beyond < 0.5)
+    assert whole(noisy).tolist() == counts.tolist()
+
+
+def test_where_the_motion_does_not_tell_a_count_is_the_nearest() -> None:
+    random = np.random.default_rng(2)
+    counts = np.asarray(random.integers(-50, 50, 200), dtype=np.float64)  # shaken
+    noisy = counts + np.where(np.arange(200) % 20 == 10, 0.55, 0.0)
+    assert whole(noisy).tolist() == np.rint(noisy).tolist()
+
+
+def test_counts_of_a_noisy_log_come_back() -> None:
+    """But for those during a ramp, of which nothing is known, and for some that are near others."""
+    times, true = ramped(3.3)
+    wrong = rounded = 0
+    for seed in range(40):
+        counts = counted(true, seed / 40.0)
+        noisy = counts + 0.18 * np.random.default_rng(seed).standard_normal(counts.size)
+        level = (times > 1.5) & (times < 6.3)
+        rounded += int(np.sum((np.rint(noisy) != counts)[level]))
+        wrong += int(np.sum((whole(noisy) != counts)[level]))
+    assert rounded > 30 and wrong < rounded / 4  # noise of 0.18: every 190th is wrong
