@@ -31,8 +31,8 @@ class Small:
         effect, place: of the catalogue, and where.
         change: largest RMS over the noise that it adds to a channel of a run.
         p_value: of its score on identification runs, corrected for the number of candidates.
-        shifts: parameter -> what the law moves it by, to first order; up to the end of the 95 %
-            interval of its strength.
+        shifts: parameter whose interval is told -> what the law moves it by, to first order; up to
+            the end of the 95 % interval of its strength.
     """
 
     effect: str
@@ -86,7 +86,8 @@ def small_laws(search: Search, fitted: Fitted) -> list[Small]:
         change = np.asarray(root * item.score.amplitude * item.change, dtype=np.float64)
         farthest = 1.0 + BAND / abs(item.score.z)
         moved = -farthest * absorber.change(change) * base.problem.scale
-        shifts = dict(zip(base.problem.names, moved.tolist(), strict=True))
+        pairs = zip(base.problem.parameters, moved.tolist(), strict=True)
+        shifts = {p.name: shift for p, shift in pairs if p.role != "nuisance"}
         candidate = item.candidate
         found.append(
             Small(candidate.effect, candidate.place, _size(search, item),

@@ -40,6 +40,7 @@ def test_intervals_hold_the_truth_beside_a_law_without_a_name(tmp_path: Path, si
             assert high - low == pytest.approx(2.0 * half[name], rel=0.05)
     if size:
         (law,) = found.small
+        assert law.shifts.keys() == half.keys()
         assert law.change < 0.15 and law.shifts["b"] < -3.0 * half["b"]
         assert "quadratic_drag at load.flange shows, too" in law.sentence
         assert found.search is not None
