@@ -241,8 +241,8 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
         found[f"m{k + 1}_y"] = scale * (seen[:, 1] + m_x * sin + m_y * cos)
     # what is logged is the command, of which late encoders know an earlier part
     for k, (name, values) in enumerate((("sprocket_speed_l", left), ("sprocket_speed_r", right))):
-        steps_of = 0.5 * STEP * (values[:-1] + values[1:])
-        angle = np.vstack([np.zeros(runs), np.cumsum(steps_of, axis=0)])[::every]
+        advance = 0.5 * STEP * (values[:-1] + values[1:])
+        angle = np.vstack([np.zeros(runs), np.cumsum(advance, axis=0)])[::every]
         counts = np.floor(np.repeat(angle, count, axis=1) / COUNT + starts[..., 3 + k].ravel())
         found[name] = np.diff(counts, axis=0, prepend=counts[:1]) * COUNT / SAMPLE
     return found

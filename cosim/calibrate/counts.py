@@ -14,7 +14,7 @@ by a barrier method whose banded systems cost next to nothing. Where the speed d
 keep the jump.
 
 A log may show counts with noise on top. Rounding gives them back but for one in thousands, which
-moves all angles after it by a count; that one bends the motion, so it is told (`whole`).
+moves all angles after it by a count; that one bends the motion, so it is told (`whole_counts`).
 
 Not modelled: marks that are not equally far from each other.
 
@@ -54,7 +54,7 @@ wrong counts do, to a sixth and less; where the speed rises or falls, those and 
 it to 0.62 to 1, and nothing is known."""
 
 
-def whole(values: Vector) -> Vector:
+def whole_counts(values: Vector) -> Vector:
     """Whole counts from values with noise on top.
 
     The nearest; where a value is nearly in the middle of two, the other one if the motion beside it

@@ -24,7 +24,7 @@ from .checks.finding import Finding, Source, check_allowed
 from .checks.undriven import check_undriven, mappings
 from .clocks import bounds, check_clock, clock_unit, masked
 from .columns import ITEM, apart, expand
-from .counts import steady, whole
+from .counts import steady, whole_counts
 from .mapped_logs import MappedLogs
 from .model import Model
 from .named import named, readings
@@ -466,7 +466,7 @@ class Joined(MappedLogs):
         times, values = self._course(log, column, lead)
         if "quantum" in entry:  # a count with a little noise on top: the count is exact
             quantum = float(entry["quantum"])
-            values = whole(values / quantum)
+            values = whole_counts(values / quantum)
             if entry.get("interpolation") == "window":
                 values = steady(values, times)
             values = values * quantum

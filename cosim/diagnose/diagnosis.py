@@ -40,7 +40,7 @@ from .result import Diagnosis
 from .rivals import elsewhere, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
-from .small import allow, small_laws
+from .small import small_laws, widen
 from .table import candidates_of, table_of
 from .verdict import above, decide, proposal, unasked
 
@@ -278,7 +278,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
     wide: list[Estimate] = []
     for _ in range(TURNS):
-        allow(search, current, wide)
+        widen(search, current, wide)
         if current.effects:
             search.memo.keep(current)
             if current.labels not in simple:
@@ -317,7 +317,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     result.after = after = current if answer.laws else result.before
     assert after is not None
     if answer.laws or answer.kind == "nothing_missing":
-        allow(search, after, wide)
+        widen(search, after, wide)
         result.small = small_laws(search, after)
         result.warnings += [law.sentence for law in result.small]
     if answer.rivals:

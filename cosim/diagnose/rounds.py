@@ -39,7 +39,8 @@ class Round:
         near: candidates whose quick fits gained nearly as much.
         cut: whether runs were ended after it, so its fits are of others: its rivals have had their
             turn.
-        elsewhere: whether candidates were scored around other parameters than those of the base.
+        scored_elsewhere: whether candidates were scored around other parameters than those of the
+            base.
         failed: candidates that could not be simulated at any strength, and why.
         compared: effects of the model in which its winner was last compared with others; empty if
             that was the round's own.
@@ -57,7 +58,7 @@ class Round:
     near: frozenset[Candidate] = frozenset()
     compared: frozenset[Candidate] = frozenset()
     cut: bool = False
-    elsewhere: bool = False
+    scored_elsewhere: bool = False
     failed: dict[str, str] = field(default_factory=dict)
 
     @property

@@ -327,7 +327,7 @@ class Search(LateValueFitter):
 
     def _decided(self, base: Fitted, start: Fitted, current: Round) -> Round:
         """Refit the best of a round's candidates, and choose."""
-        current.base, current.elsewhere = base, start is not base
+        current.base, current.scored_elsewhere = base, start is not base
         first = promising(self, current)
         base = self.attempted(start, current, first)
         if current.winner is None and self.lacking(base):

@@ -67,11 +67,9 @@ def small_laws(search: Search, fitted: Fitted) -> list[Small]:
         search: its rounds have scored the laws; none has, if no round began with this model.
         fitted: the model.
     """
-    if (
-        search.raw.late
-    ):  # every law moves the moment a little in which a caster turns, and seems one
+    if search.raw.late:  # there, every law moves the moments at which casters turn, and seems one
         return []
-    stages = [s for s in search.rounds if s.base.labels == fitted.labels and not s.elsewhere]
+    stages = [s for s in search.rounds if s.base.labels == fitted.labels and not s.scored_elsewhere]
     if not stages:
         return []
     stage, base = stages[-1], stages[-1].base
@@ -111,7 +109,7 @@ def _size(judge: Judge, item: Signature) -> float:
     return judge.fitting.largest(item.asked)
 
 
-def allow(search: Search, fitted: Fitted, known: list[Estimate]) -> None:
+def widen(search: Search, fitted: Fitted, known: list[Estimate]) -> None:
     """Let the intervals of a model hold its parameters with each small law.
 
     Args:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cosim.calibrate.counts import smoothest, steady, whole
+from cosim.calibrate.counts import smoothest, steady, whole_counts
 
 Vector = NDArray[np.float64]
 INTERVAL, COUNT = 0.02, 2.0 * np.pi / 25600
@@ -72,14 +72,14 @@ def test_a_count_whose_noise_passes_the_middle_is_told_by_the_motion(
     noisy = counts + 0.02 * np.random.default_rng(1).standard_normal(counts.size)
     noisy[200] = counts[200] + (beyond if above else -beyond)
     assert (np.rint(noisy)[200] == counts[200]) == (beyond < 0.5)
-    assert whole(noisy).tolist() == counts.tolist()
+    assert whole_counts(noisy).tolist() == counts.tolist()
 
 
 def test_where_the_motion_does_not_tell_a_count_is_the_nearest() -> None:
     random = np.random.default_rng(2)
     counts = np.asarray(random.integers(-50, 50, 200), dtype=np.float64)  # shaken
     noisy = counts + np.where(np.arange(200) % 20 == 10, 0.55, 0.0)
-    assert whole(noisy).tolist() == np.rint(noisy).tolist()
+    assert whole_counts(noisy).tolist() == np.rint(noisy).tolist()
 
 
 def test_counts_of_a_noisy_log_come_back() -> None:
@@ -91,5 +91,5 @@ def test_counts_of_a_noisy_log_come_back() -> None:
         noisy = counts + 0.18 * np.random.default_rng(seed).standard_normal(counts.size)
         level = (times > 1.5) & (times < 6.3)
         rounded += int(np.sum((np.rint(noisy) != counts)[level]))
-        wrong += int(np.sum((whole(noisy) != counts)[level]))
+        wrong += int(np.sum((whole_counts(noisy) != counts)[level]))
     assert rounded > 30 and wrong < rounded / 4  # noise of 0.18: every 190th is wrong

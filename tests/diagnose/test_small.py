@@ -12,7 +12,7 @@ from cosim.diagnose.small import small_laws
 from tests.diagnose import disc
 
 DRAG = 4e-7
-"""[N.m.s2/rad2]: 0.13 of the noise beside friction that makes up for it, and fourteen half
+"""[N.m.s2/rad2]: 0.13 of the noise beside friction that makes up for it, and a hundred half
 intervals of that friction; in runs of 40 s it shows."""
 SECONDS = 40.0
 
@@ -45,5 +45,5 @@ def test_intervals_hold_the_truth_beside_a_law_without_a_name(tmp_path: Path, si
         assert "quadratic_drag at load.flange shows, too" in law.sentence
         assert found.search is not None
         for stage in found.search.rounds:  # scored around other values, it says nothing of these
-            stage.elsewhere = True
+            stage.scored_elsewhere = True
         assert not small_laws(found.search, found.after)
