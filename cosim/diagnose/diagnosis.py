@@ -316,10 +316,9 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     result.answer = answer = decide(result.table)
     result.after = after = current if answer.laws else result.before
     assert after is not None
-    if answer.laws or answer.kind == "nothing_missing":
-        widen(search, after, wide)
-        result.small = small_laws(search, after)
-        result.warnings += [law.sentence for law in result.small]
+    widen(search, after, wide)
+    result.small = small_laws(search, after)
+    result.warnings += [law.sentence for law in result.small]
     if answer.rivals:
         names = result.table.models[answer.rivals[0][0]].labels
         rival = search.memo.get(names)
