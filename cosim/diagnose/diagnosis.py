@@ -19,6 +19,7 @@ from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .adding import made_of
+from .anew import asked_anew
 from .answer import Verdict
 from .bursts import bursts, times
 from .candidates import candidates
@@ -219,7 +220,11 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         if search.narrow and search.lacking(current):
             search.widened()
             current = Course(result, search, current, rounds).followed()
-        _judged(result, search, current)
+        wide: list[Estimate] = []
+        current = _judged(result, search, current, wide)
+        while (found := _asked_anew(result, search, current)) is not None:
+            current = _judged(result, search, found, wide)
+        _completed(result, search, current, wide)
         assert result.after is not None
         if asked or (task.law and result.verdict == "unexplained"):
             if asked is None and not search.raw.late:
@@ -266,8 +271,18 @@ def _stopped(result: Diagnosis, search: Search, why: str) -> None:
     result.answer, result.after = decide(result.table), result.before
 
 
-def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
-    """The verdict on all fits; the set that it proposes is fitted to the end before it is named."""
+def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estimate]) -> Fitted:
+    """The verdict on all fits; the set that it proposes is fitted to the end before it is named.
+
+    Args:
+        result: gets table, verdict and model.
+        search: its rounds and fits.
+        current: the best model that they have led to.
+        wide: estimates that hold their parameters with small laws, see `widen`.
+
+    Returns:
+        The set that was proposed last, the given model if none was.
+    """
     rounds, ended = search.rounds, result.ended
     forces = {frozenset[str](): result.located} if result.located else {}
     current = examined(search, current, candidates_of(rounds))
@@ -276,7 +291,6 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
     simple: set[frozenset[str]] = set()
     level: set[frozenset[str]] = set()
     offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))
-    wide: list[Estimate] = []
     for _ in range(TURNS):
         widen(search, current, wide)
         if current.effects:
@@ -315,6 +329,24 @@ def _judged(result: Diagnosis, search: Search, current: Fitted) -> None:
         result.table = table_of(search, rounds, forces, ended)
     result.answer = answer = decide(result.table)
     result.after = after = current if answer.laws else result.before
+    assert after is not None
+    return current
+
+
+def _asked_anew(result: Diagnosis, search: Search, current: Fitted) -> Fitted | None:
+    """A better set than the proposed one, where that leaves more than noise; else None."""
+    place = proposal(result.table)
+    if result.asked or search.raw.late or place is None:
+        return None
+    best = result.table.models[place]
+    if best.labels != current.labels or not above(best):
+        return None
+    return asked_anew(search, current)
+
+
+def _completed(result: Diagnosis, search: Search, current: Fitted, wide: list[Estimate]) -> None:
+    """What is said beside the verdict: small laws, and what would tell its set from another."""
+    after, answer = result.after, result.answer
     assert after is not None
     widen(search, after, wide)
     result.small = small_laws(search, after)

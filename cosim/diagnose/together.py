@@ -31,6 +31,7 @@ from .models import GATE, Fitted, compare
 from .search import Search
 from .secant import patience
 from .signature import unscored
+from .verdict import HALF
 
 Vector = NDArray[np.float64]
 FITS, VARIANTS = (2, 4, 4, 3), 6
@@ -164,8 +165,14 @@ def _fitted(
 ) -> list[Draft]:
     """The best sets of each size, fitted; larger ones only where smaller leave more than noise."""
     evidence = Evidence(directions, responses.wanted)
+    levels = evidence.sets(len(FITS))
+    most = max((level[0].gain for level in levels if level), default=0.0)
+    beyond = 0.5 * (float(responses.wanted @ responses.wanted) - responses.wanted.size)
+    if most < HALF * beyond:
+        search.say(f"no {len(FITS)} laws explain half of that: first orders would mislead")
+        return []
     found: list[Draft] = []
-    for few, level in zip(FITS, evidence.sets(len(FITS)), strict=True):
+    for few, level in zip(FITS, levels, strict=True):
         families = evidence.families(level)[:few]
         best: tuple[Draft, list[Chosen]] | None = None
         now: list[Draft] = []
