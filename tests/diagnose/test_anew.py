@@ -15,7 +15,9 @@ from cosim.diagnose.search import Search
 from tests.diagnose import disc
 from tests.problems import simulator
 
-WEIGHT, DRAG, DRIFT = (f"{law} at load.flange" for law in ("unbalance", "quadratic_drag", "temperature_drift"))
+WEIGHT, DRAG, DRIFT = (
+    f"{law} at load.flange" for law in ("unbalance", "quadratic_drag", "temperature_drift")
+)
 KNOWN = (WEIGHT, DRAG, DRIFT)
 
 
