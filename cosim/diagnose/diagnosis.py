@@ -41,6 +41,7 @@ from .result import Diagnosis
 from .rivals import elsewhere, simplified
 from .rounds import Round
 from .search import ROUNDS, Search
+from .second_look import leaves_more
 from .small import small_laws, widen
 from .table import candidates_of, table_of
 from .verdict import above, decide, proposal, unasked
@@ -334,12 +335,11 @@ def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estim
 
 
 def _asked_anew(result: Diagnosis, search: Search, current: Fitted) -> Fitted | None:
-    """A better set than the proposed one, where that leaves more than noise; else None."""
+    """A better set than the proposed one, if that leaves more than noise and there is one."""
     place = proposal(result.table)
     if result.asked or search.raw.late or place is None:
         return None
-    best = result.table.models[place]
-    if best.labels != current.labels or not above(best):
+    if result.table.models[place].labels != current.labels or not leaves_more(search, current):
         return None
     return asked_anew(search, current)
 

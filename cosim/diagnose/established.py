@@ -244,6 +244,6 @@ def freed(search: LateValueFitter, less: Fitted, fitted: Fitted) -> Fitted:
         return less
     found = at_usual(search, found, {p.name: values.get(p.name, p.nominal) for p in held})
     more = [p.name for p in held if p.name in found.estimate.values]
-    search.say(f"{', '.join(more)} instead of a further effect")
+    search.say(f"{', '.join(more) or 'other values'} instead of a further effect")
     search.note(found)
     return found

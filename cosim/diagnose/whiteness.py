@@ -49,11 +49,6 @@ class WhitenessTest:
         """More than noise, and enough to look for a cause."""
         return structured(self.lasting, self.p_value)
 
-    @property
-    def slow_parts(self) -> bool:
-        """Slow parts of which no error of the sheet's noise makes as much."""
-        return structured(self.slow, self.p_value)
-
     def to_dict(self) -> dict[str, float | bool | str]:
         """As in the JSON."""
         return {
