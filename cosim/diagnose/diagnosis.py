@@ -341,7 +341,12 @@ def _asked_anew(result: Diagnosis, search: Search, current: Fitted) -> Fitted | 
         return None
     if result.table.models[place].labels != current.labels or not leaves_more(search, current):
         return None
-    return asked_anew(search, current)
+    try:
+        return asked_anew(search, current)
+    except CosimError as error:  # the set that is proposed stays
+        result.warnings.append(f"laws were not asked for anew: {error}")
+        search.say(result.warnings[-1])
+        return None
 
 
 def _completed(result: Diagnosis, search: Search, current: Fitted, wide: list[Estimate]) -> None:

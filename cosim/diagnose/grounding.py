@@ -25,39 +25,30 @@ STEPS = Effort("near", "draft", iterations=4)
 """Each costs as many simulations as there are parameters, at a step that is ten times as fine."""
 
 
-def thorough(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
-    """The model fitted to its minimum, with intervals.
-
-    These cost several times as much as the fit, so they come last.
+def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
+    """The model, with parameters from the rig's own step where they are better.
 
     Args:
         fitter: of the search.
-        winner: a rough fit.
+        winner: a thorough fit.
         base: from which gains count.
     """
     raw = fitter.raw
-    if raw.unstable or raw.tick is None or raw.search.step == raw.step:
-        return fitter.sharpened(winner, base)
-    fitted = fitter.sharpened(winner, base, MINIMUM)
-    return fitter.sharpened(_grounded(fitter, fitted, base), base)
-
-
-def _grounded(fitter: Fitter, fitted: Fitted, base: Fitted) -> Fitted:
-    """The model, with parameters from the rig's own step where they are better."""
-    raw, noise = fitter.raw, 0.5 * fitted.estimate.count
-    if fitted.estimate.cost < noise + EVIDENT * noise**0.5:
-        return fitted
+    coarse = raw.tick is not None and raw.search.step != raw.step
+    noise = 0.5 * winner.estimate.count
+    if not coarse or raw.unstable or winner.estimate.cost < noise + EVIDENT * noise**0.5:
+        return winner
     measured = {run.name: run.data for run in raw.runs}
-    problem = fitted.simulator.problem.with_data(measured).changed(step=raw.step)
+    problem = winner.simulator.problem.with_data(measured).changed(step=raw.step)
     try:
-        simulator = fitted.simulator.limited({}).of(problem.counting())
-        fine = fit(simulator, fitted.estimate.theta, effort=STEPS)
+        simulator = winner.simulator.limited({}).of(problem.counting())
+        fine = fit(simulator, winner.estimate.theta, effort=STEPS)
     except CosimError as error:
-        fitter.say(f"{fitted.effects[-1].label} could not be fitted at the rig's step: {error}")
-        return fitted
-    found = fitter.again(fitter.judged(fine), fitted, base)
-    found = fitter.sharpened(found, base, MINIMUM)
-    if fitter.total(base, found) <= fitter.total(base, fitted):
-        return fitted
-    fitter.say(f"{fitted.effects[-1].label}: a better minimum at the rig's own step")
-    return found
+        fitter.say(f"{winner.effects[-1].label} could not be fitted at the rig's step: {error}")
+        return winner
+    found = fitter.again(fitter.judged(fine), winner, base)
+    found = fitter.sharpened(found, base, MINIMUM)  # intervals take several times as long
+    if fitter.total(base, found) <= fitter.total(base, winner):
+        return winner
+    fitter.say(f"{winner.effects[-1].label}: a better minimum at the rig's own step")
+    return fitter.sharpened(found, base)

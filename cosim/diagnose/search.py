@@ -23,7 +23,7 @@ from .candidates import Candidate, candidates
 from .completing import completed, freed
 from .established import needed, settle
 from .fitter import ITERATIONS, Say
-from .grounding import thorough
+from .grounding import grounded
 from .judge import OFF
 from .late_values import LateValueFitter
 from .linear import SampleStack, holm
@@ -346,7 +346,8 @@ class Search(LateValueFitter):
             needed(self, base, current)
             if current.winner is None:
                 return current
-            current.follow(thorough(self, current.winner, base))
+            current.follow(self.sharpened(current.winner, base))
+            current.follow(grounded(self, current.winner, base))
             settle(self, base, current)
         return current
 
