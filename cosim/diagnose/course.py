@@ -49,7 +49,7 @@ class Course:
         """A set found along the log's motion that leaves noise."""
         self.proposed = rounds == 0
         """Whether such sets have been asked for."""
-        self.anew = False
+        self.at_nominal = False
         """Whether laws were asked around nominal values, and one was better there."""
         self.waiting: Round | None = None
         """The round there; it takes the place of all rounds so far."""
@@ -121,7 +121,7 @@ class Course:
         if found is not self.current:
             self.current = found
             return True
-        return self._asked_anew()
+        return self._asked_at_nominal()
 
     def _added(self, stage: Round) -> bool:
         """After a round that added a law; whether there is a further one."""
@@ -150,13 +150,13 @@ class Course:
         # every law moves the moment a little, and seems one
         return not search.raw.unstable
 
-    def _asked_anew(self) -> bool:
+    def _asked_at_nominal(self) -> bool:
         """Ask once around nominal values; whether a law there is better."""
-        if self.anew:
+        if self.at_nominal:
             return False
         self.waiting = around_nominal(self.search, self.current)
-        self.anew = self.waiting is not None
-        return self.anew
+        self.at_nominal = self.waiting is not None
+        return self.at_nominal
 
     def _ended(self) -> Fitted:
         """The best of what rounds and sets have led to, fitted to the end."""
