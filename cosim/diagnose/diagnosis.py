@@ -214,7 +214,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
     result.warnings = lines(findings)
     result.withheld = tuple(sorted(search.withheld))
     search.note(base)
-    result.asked, why = asked is not None, ""
+    result.asked, why, settled = asked is not None, "", False
     rounds = ROUNDS if asked is None else 0
     try:
         current = Course(result, search, base, rounds).followed()
@@ -225,6 +225,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         current = _judged(result, search, current, wide)
         while (found := _asked_anew(result, search, current)) is not None:
             current = _judged(result, search, found, wide)
+        settled = True
         _completed(result, search, current, wide)
         assert result.after is not None
         if asked or (task.law and result.verdict == "unexplained"):
@@ -237,7 +238,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         why = str(stopped)
     with task.budget.lifted():
         if why:
-            _stopped(result, search, why)
+            _stopped(result, search, why, settled=settled)
         assert result.after is not None
         cut = result.ended and result.after is base  # runs were ended since it was fitted: it lacks
         if not cut and not search.lacking(result.after):
@@ -261,10 +262,10 @@ def _written(result: Diagnosis, task: _Task) -> Diagnosis:
     return result
 
 
-def _stopped(result: Diagnosis, search: Search, why: str) -> None:
-    """The verdict on the fits that there are; one that was reached before stays."""
+def _stopped(result: Diagnosis, search: Search, why: str, *, settled: bool) -> None:
+    """The verdict on the fits that there are; one that is settled stays."""
     search.say(f"stopped {why}")
-    if result.verdict:
+    if settled:
         result.warnings.append(f"no law was made from the data: stopped {why}")
         return
     forces = {frozenset[str](): result.located} if result.located else {}
@@ -328,9 +329,8 @@ def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estim
             break
     else:  # a force was asked last, or another set proposed
         result.table = table_of(search, rounds, forces, ended)
-    result.answer = answer = decide(result.table)
-    result.after = after = current if answer.laws else result.before
-    assert after is not None
+    result.answer = decide(result.table)
+    result.after = current if result.answer.laws else result.before
     return current
 
 

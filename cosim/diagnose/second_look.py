@@ -26,9 +26,8 @@ def leaves_more(search: Search, fitted: Fitted) -> bool:
     seconds all the same.
     """
     left = [t for p in PURPOSES for t in tests_of(search, fitted, p)]
-    slow = any(
-        structured(t.slow, len(left) * t.p_value) for t in left
-    )  # one of so many (Bonferroni)
+    count = len(left)  # one of so many tests (Bonferroni)
+    slow = any(structured(t.slow, count * t.p_value) for t in left)
     return any(t.structured for t in left) or (slow and bool(fitted.effects))
 
 

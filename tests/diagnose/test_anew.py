@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from cosim.calibrate.budget import StoppedError
 from cosim.calibrate.mapping import read_problem
+from cosim.diagnose import diagnose
 from cosim.diagnose.anew import asked_anew
 from cosim.diagnose.candidates import candidates
 from cosim.diagnose.models import Fitted
@@ -59,3 +61,21 @@ def test_a_law_chosen_beside_another_gives_way_to_a_better_one(tmp_path: Path, s
             assert [stage.base.labels for stage in search.rounds] == begun
     finally:
         search.close()
+
+
+def test_a_set_is_not_named_if_the_search_is_stopped_while_it_is_asked_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The verdict that it had before was still to be challenged."""
+    asked: list[str] = []
+
+    def stopped(search: Search, proposed: Fitted) -> None:
+        asked.append(f"asked beside {len(proposed.effects)}")
+        raise StoppedError("by the test")
+
+    monkeypatch.setattr("cosim.diagnose.diagnosis.leaves_more", lambda search, fitted: True)
+    monkeypatch.setattr("cosim.diagnose.diagnosis.asked_anew", stopped)
+    found = diagnose(read_problem(disc.write(tmp_path, lambda w, theta, t: 2e-3 * w * abs(w))))
+    assert asked == ["asked beside 1"]
+    assert found.verdict == "unexplained" and not found.answer.laws
+    assert found.answer.stopped == "by the test" and found.answer.hints
