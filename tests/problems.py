@@ -10,5 +10,5 @@ SESSIONS = SessionPool()
 
 
 def simulator(problem: Problem, workers: int | None = None) -> Simulator:
-    """Without limits on time; as many threads as this worker of the tests has processors."""
+    """Without limits on work; as many threads as this worker of the tests has processors."""
     return Simulator(problem, workers=workers, pool=SESSIONS)

@@ -58,7 +58,7 @@ class Budget:
         """
         with self._lock:
             if not self._lifted:
-                if self.spent == self.runs:
+                if self.runs is not None and self.spent >= self.runs:
                     self.stop(f"after {self.runs} simulated runs")
                 if self.stopped:
                     raise StoppedError(self.stopped)

@@ -38,7 +38,7 @@ def step_error(
     if ticks and step == problem.step:
         return {name: np.zeros(problem.run(name).data.shape) for name in names}
     factor, fine = (1.0, problem.step) if ticks else (2.0, step / 2.0)
-    # limits on time are those of another step
+    # limits are those of another step
     coarse, exact = (
         simulator.limited({}).of(problem.changed(step=size)).residuals(theta, names, plain=True)
         for size in (step, fine)

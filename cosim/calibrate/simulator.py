@@ -135,8 +135,7 @@ class Simulator:
         problem = self.problem
         run = problem.run(run) if isinstance(run, str) else run
         errors = problem.log_errors(theta, run)
-        later = {name: -errors[name] for name in run.inputs if errors.get(name)}
-        ran = self._ran(problem.values(theta, run), run, later)
+        ran = self._ran(problem.values(theta, run), run, _later(run, errors))
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
@@ -151,12 +150,12 @@ class Simulator:
             StepError, ValueRangeError: as of `simulate`.
         """
         problem, errors = self.problem, self.problem.log_errors(theta, run)
-        session = self.session(run)
+        session, later = self.session(run), _later(run, errors)
         found = []
         try:
             for given in inputs:
                 self.budget.spend()
-                session.drive(given)
+                session.drive(given, later)
                 times, rows = session.run(problem.values(theta, run))
                 ran = Ran(session.names, times, rows, session.work, run.inputs)
                 found.append(self._read(run, ran, errors))
@@ -249,3 +248,8 @@ class Simulator:
     def close(self) -> None:
         """Free the idle sessions of this kind of problem; it can still be simulated."""
         self._pool.close(self.problem.kind)
+
+
+def _later(run: MeasuredRun, errors: Mapping[str, float]) -> dict[str, float]:
+    """Inputs of a run whose column in the log is not in time -> by how much they come later [s]."""
+    return {name: -errors[name] for name in run.inputs if errors.get(name)}

@@ -2,8 +2,8 @@
 
 The course of docs/diagnosis.md: rounds add laws until one adds none; where one leaves far more than
 noise and its law took less than half of what was missing, a law of one place and sets along the
-log's motion are asked, once; where the last one leaves more than noise, laws are asked anew around
-the sheet's values, once. The verdict is another matter: it comes from the table of all fits.
+log's motion are asked, once; where one without a law leaves more than noise, laws are asked anew
+around the sheet's values, once. The verdict is another matter: it comes from the table of all fits.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Course:
         if stage.winner is not None or self._slow(self.base):
             search.say("where does it enter?")
             ranked = [s.candidate for s in stage.signatures]
-            result.located = localise(search, self.base, ranked, search.say)
+            result.located = localise(search, self.base, ranked)
 
     def _slow(self, model: Fitted) -> bool:
         """Whether a model leaves slow parts that noise does not have."""
@@ -201,7 +201,7 @@ def asked_everywhere(result: Diagnosis) -> None:
     assert search is not None and base is not None
     if not result.everywhere:
         search.say("where does it enter? Asked at all places")
-        result.located, result.everywhere = everywhere(search, base, search.say), True
+        result.located, result.everywhere = everywhere(search, base), True
 
 
 def asked_single(result: Diagnosis) -> None:

@@ -47,8 +47,8 @@ from .table import candidates_of, table_of
 from .verdict import above, decide, proposal, unasked
 
 TURNS = 4
-"""Times that a set is proposed: it and its special cases are fitted to the end, it is asked what a
-free force would still explain, and may give way to another one once."""
+"""Times at most that a proposed set is fitted to the end with its special cases, or a free force is
+asked for beside it; after each of them another set may be proposed."""
 
 
 def diagnose(
@@ -226,7 +226,8 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         while (found := _asked_anew(result, search, current)) is not None:
             current = _judged(result, search, found, wide)
         settled = True
-        _completed(result, search, current, wide)
+        with task.budget.lifted():  # what was found stands, and is told whole
+            _completed(result, search, current, wide)
         assert result.after is not None
         if asked or (task.law and result.verdict == "unexplained"):
             if asked is None and not search.raw.late:
@@ -324,11 +325,16 @@ def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estim
         elif above(best) and best.labels not in forces:
             search.say("does a force at a port explain what is left?")
             ranked = [s.candidate for s in rounds[0].signatures]
-            forces[best.labels] = localise(search, current, ranked, search.say)
+            forces[best.labels] = localise(search, current, ranked)
         else:
             break
     else:  # a force was asked last, or another set proposed
         result.table = table_of(search, rounds, forces, ended)
+        place = proposal(result.table)
+        if place is not None and result.table.models[place].labels != current.labels:
+            known = search.memo.get(result.table.models[place].labels)
+            assert known is not None
+            current = search.recalled(known, declared)
     result.answer = decide(result.table)
     result.after = current if result.answer.laws else result.before
     return current

@@ -130,13 +130,14 @@ class Responses:
     def _direction(self, probe: Probe, fixed: Mapping[str, float], size: float) -> Direction | None:
         """None if it shows nothing, or nothing that calibration cannot absorb."""
         p, (first, *others) = probe.strength, SECONDS[probe.mix]
+        trial = size
         for _ in range(TRIALS):
-            size = min(size, p.maximum - p.absent)
+            size = min(trial, p.maximum - p.absent)
             change = self._at(probe.problem, probe.values(p.absent + size, first, fixed))
             largest = self.stack.largest(change)
             if SMALL < largest < LARGE or (largest < SMALL and p.absent + size >= p.maximum):
                 break
-            size *= float(np.clip(AIM / max(largest, 1e-12), 1e-3, 1e3))
+            trial = size * float(np.clip(AIM / max(largest, 1e-12), 1e-3, 1e3))
         changes = [change]
         for second in others:
             other = self._at(probe.problem, probe.values(p.absent + size, second, fixed))

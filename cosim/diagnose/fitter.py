@@ -13,8 +13,6 @@ from ..calibrate.deferred import corrected
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import CORRECTION, DRAFT, INTERVALS, Effort, fit
 from ..calibrate.known import Known
-from ..calibrate.loss import loss_for
-from ..calibrate.normal import cost_of
 from ..calibrate.nuisance import settled, slopes
 from ..calibrate.parts import Sensitivity
 from ..calibrate.simulator import Simulator
@@ -54,7 +52,7 @@ class Fitter(Judge):
     """Fits models to one problem.
 
     Args:
-        simulator: of the declared system with the data as measured, without limits on time.
+        simulator: of the declared system with the data as measured, without limits (`patience`).
         check: purpose of the runs that are not used for fitting.
         say: told what is done.
 
@@ -217,18 +215,17 @@ class Fitter(Judge):
                 theta[problem.index(item.probe.second)] = item.second
             starts.append(np.clip(theta, problem.lower, problem.upper))
         try:
-            costs = [self.cost(simulator, theta) for theta in starts]
-            first, *rest = [starts[i] for i in np.argsort(costs, kind="stable")]
+            (cost, first), *rest = self.ranked(simulator, starts)
             bend = abs(item.score.amplitude - 1.0) > EXACT and self.lacking(base)
             if bend or is_open(base.estimate):
                 usual = item.strength.span if bend else 0.0
                 first = doubled(
                     lambda theta: self.cost(simulator, theta), simulator.problem, first,
-                    min(costs), item.strength.name, usual,
+                    cost, item.strength.name, usual,
                 )  # fmt: skip
             result = self.fitted(simulator, first, base.estimate)
             if result.estimate.unkept > max(GATE, goal - self.gain(base, result)):
-                result = self._from_others(simulator, rest, result)
+                result = self._from_others(simulator, [s for _, s in rest], result)
             if again and self.far(base) and self.far(result):
                 kept = self.effects(base)
                 kept |= {name: float(starts[0][problem.index(name)]) for name in own}
@@ -246,7 +243,11 @@ class Fitter(Judge):
         """The best fit from other starts, with derivatives of the model itself."""
         best, enough = stalled, stalled.estimate.robust - stalled.estimate.unkept
         for start in starts:
-            found = self.judged(fit(simulator, start, effort=DRAFT))
+            try:
+                found = self.judged(fit(simulator, start, effort=DRAFT))
+            except CosimError as error:  # what there is stays
+                self.say(f"not from another start: {error}")
+                continue
             best = min(best, found, key=lambda f: f.estimate.robust)
             if best.estimate.robust < enough:
                 break
@@ -309,12 +310,6 @@ class Fitter(Judge):
             return None
         found.effects, found.signature = base.effects, base.signature
         return found
-
-    def cost(self, simulator: Simulator, theta: Vector) -> float:
-        """Cost over the identification runs."""
-        problem = simulator.problem
-        residuals = simulator.residuals(theta, self.fitting.names)
-        return cost_of(problem, theta, residuals, loss_for(problem.unstable))
 
     def retried(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model fitted from nominal values, as the first one was, if that leads farther.

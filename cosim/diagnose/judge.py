@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
+from ..calibrate.simulator import Simulator
+from ..errors import CosimError
 from .candidates import SKEW, Candidate
 from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
@@ -75,6 +78,29 @@ class Judge:
             return second.estimate.robust - first.estimate.robust
         costs = [self.fitting.cost(self.fit_data - f.fit) for f in (first, second)]
         return costs[1] - costs[0]
+
+    def cost(self, simulator: Simulator, theta: Vector) -> float:
+        """Cost over the identification runs."""
+        problem = simulator.problem
+        residuals = simulator.residuals(theta, self.fitting.names)
+        return cost_of(problem, theta, residuals, loss_for(problem.unstable))
+
+    def ranked(self, simulator: Simulator, starts: Sequence[Vector]) -> list[tuple[float, Vector]]:
+        """Costs and places where a fit may begin, the best first, of those that can be simulated.
+
+        Raises:
+            CosimError: of the first one, if none can.
+        """
+        costs, found, errors = [], [], []
+        for theta in starts:
+            try:
+                costs.append(self.cost(simulator, theta))
+                found.append(theta)
+            except CosimError as error:
+                errors.append(error)
+        if not found:
+            raise errors[0]
+        return [(costs[i], found[i]) for i in np.argsort(costs, kind="stable")]
 
     def better(self, first: Fitted, second: Fitted) -> Gain:
         """What the second of two models is better by."""

@@ -15,7 +15,7 @@ Source: Bayesian linear regression (MacKay, Neural Computation 4, 1992: evidence
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +30,6 @@ from .judge import Judge
 from .linear import Absorber, SampleStack
 from .models import Fitted
 from .search import Search
-from .secant import model_values
 
 Vector = NDArray[np.float64]
 PROBE, TIME = "unknown_input", "time"
@@ -114,36 +113,32 @@ class Place:
         }  # fmt: skip
 
 
-def localise(
-    search: Search, base: Fitted, ranked: Sequence[Candidate], say: Callable[[str], None]
-) -> list[Place]:
+def localise(search: Search, base: Fitted, ranked: Sequence[Candidate]) -> list[Place]:
     """Places with promising candidates by evidence, the best first.
 
     Args:
         search: the data.
         base: calibrated model whose residual is asked about.
         ranked: candidates of the catalogue, the best first: they tell which places are probed.
-        say: told what is done.
     """
     known = _balances(base.problem)
     places = dict.fromkeys(p for c in ranked if (p := (c.instance, c.port)) in known)
-    return _probed(search, base, places, say, PLACES)
+    return _probed(search, base, places, PLACES)
 
 
-def everywhere(search: Search, base: Fitted, say: Callable[[str], None]) -> list[Place]:
+def everywhere(search: Search, base: Fitted) -> list[Place]:
     """Places by evidence, the best first; all are asked, whatever the catalogue has there.
 
     Where no law fits, the catalogue's scores say little of the place: what is missing may be the
     only law there that moves the model much.
     """
-    return _probed(search, base, _balances(base.problem), say, None)
+    return _probed(search, base, _balances(base.problem), None)
 
 
 def _probed(
     search: Search,
     base: Fitted,
     places: Iterable[tuple[str, str]],
-    say: Callable[[str], None],
     most: int | None,
 ) -> list[Place]:
     """The first places that can be probed, by evidence."""
@@ -154,12 +149,12 @@ def _probed(
         if probed == most:
             break
         try:
-            found += _Bench(search, base, runs, instance, port).places()
+            found += UnknownInput(search, base, runs, instance, port).places()
             probed += 1
         except VariantError:
             continue  # a mass centre or the direction of gravity: nothing can enter there
         except CosimError as error:
-            say(f"{instance}.{port} could not be probed: {error}")
+            search.say(f"{instance}.{port} could not be probed: {error}")
     found.sort(key=lambda p: -p.evidence)
     return found
 
@@ -182,7 +177,7 @@ def _balances(problem: Problem) -> list[tuple[str, str]]:
     return [place for place in names if place not in not_asked]
 
 
-class _Bench:
+class UnknownInput:
     """Responses of a system to the probe at one balance."""
 
     def __init__(
@@ -190,7 +185,6 @@ class _Bench:
     ) -> None:
         self.instance, self.port = instance, port
         self.names = [run.name for run in runs]
-        data = {run.name: run for run in search.declared.runs}
         probed = base.problem.with_effects({instance: f"+{PROBE}@{port}"})
         self.prefix = f"{instance}.{port}.{PROBE}."
         variables = probed.system().members[instance].description.variables
@@ -216,9 +210,10 @@ class _Bench:
             for name in free
         ]  # fmt: skip
         spy = Channel("driver", "", 1.0, self.prefix + "s")
+        known = {run.name: run for run in base.problem.runs}  # with the start values of the model
         runs = [
-            replace(data[n], data=np.column_stack([data[n].data, np.full(data[n].times.size, 0.0)]))
-            for n in self.names
+            replace(run, data=np.column_stack([run.data, np.zeros(run.times.size)]))
+            for run in (known[n] for n in self.names)
         ]
         problem = probed.changed(
             parameters=[*kept, *extra], channels=[*probed.channels, spy], runs=runs
@@ -236,12 +231,11 @@ class _Bench:
             zip(search.fitting.names, search.fitting.by_run(search.fit_data - base.fit),
                 strict=True)
         )  # fmt: skip
-        coarse = model_values(base.simulator, base.estimate.theta, search.fitting)
-        model = dict(zip(search.fitting.names, search.fitting.by_run(coarse), strict=True))
+        missed = dict(base.simulator.residuals(base.estimate.theta, self.names))
         for names, stack in self.stacks.items():
             self.absorber[names] = search.absorber(base, stack)
             self.residual[names] = self.absorber[names].rest(stack.vector([rows[n] for n in names]))
-            self.base[names] = stack.vector([model[n] for n in names])
+            self.base[names] = stack.vector([missed[n] for n in names])
 
     def at(self, names: tuple[str, ...], **values: float) -> tuple[Vector, Vector]:
         """Change of the model values, and the driver's values."""
@@ -251,10 +245,10 @@ class _Bench:
         for name, index in self.free.items():
             theta[index] = values.get(name, 0.0)
         theta[self.free["g"]] = 1.0
-        residuals = dict(self.simulator.residuals(theta, names))
-        rows = [problem.run(n).data / problem.sigma - residuals[n] for n in names]
-        change = self.stacks[names].vector([r[:, :-1] for r in rows]) - self.base[names]
-        return change, np.concatenate([r[:, -1] for r in rows])
+        # of the same data, so what the exchange adds to the model falls out
+        rows = [rows for _, rows in self.simulator.residuals(theta, names)]
+        change = self.base[names] - self.stacks[names].vector([r[:, :-1] for r in rows])
+        return change, np.concatenate([-r[:, -1] for r in rows])
 
     def places(self) -> list[Place]:
         """With a curve per driver, and one against time per run."""
@@ -283,7 +277,7 @@ class _Bench:
         """Constant input that changes the model about as much as the residual is large."""
         names = tuple(self.names)
         aim = AIM * max(float(np.max(np.abs(self.residual[names]))), 1.0)
-        size = 1e-3
+        size, largest = 1e-3, np.inf
         for _ in range(6):
             curve = {f"c[{k + 1}]": size for k in range(self.knots)}
             try:

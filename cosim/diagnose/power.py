@@ -22,7 +22,7 @@ def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
     Detected is what the score test tells from nothing and what is `MATERIAL`, in the shape that was
     simulated; the gate on unused runs is not in it.
     """
-    tests = max(len(current.signatures), 1)
+    tests = max(len(current.signatures) + len(current.aside), 1)  # as of the round's p values
     needed = float(-ndtri(LEVEL / tests / 2) - ndtri(1 - POWER))
     table: dict[str, dict[str, Any]] = {}
     for item in current.signatures:

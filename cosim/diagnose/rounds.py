@@ -29,7 +29,7 @@ class Round:
         signatures: candidates scored on all identification runs, best first; neither twins nor
             those put aside are among them.
         corrected: p value by label, corrected for their number.
-        aside: labels of those that one run ruled out.
+        aside: labels of those that few runs ruled out (`Search.telling`).
         fitted: refitted candidates, best first.
         winner: fit that unused runs want, None if there is none.
         open: whether more was so evidently missing that the choice waits for it.

@@ -65,7 +65,7 @@ class Search(LateValueFitter):
     """Attribution on one problem.
 
     Args:
-        simulator: of the declared system, without limits on time.
+        simulator: of the declared system, without limits (`patience`).
         say: told what is done.
         only: candidates to consider, all of the catalogue if not given.
         without: effects that are left out of the catalogue.
@@ -224,8 +224,8 @@ class Search(LateValueFitter):
     def scored(self, base: Fitted, among: Collection[str] | None = None) -> Round:
         """Score candidates against a model's residual.
 
-        Where the model evidently lacks something, one run tells which candidates are worth the
-        simulation of all runs.
+        Where the model evidently lacks something, few runs tell which candidates are worth the
+        simulation of all (`telling`).
 
         Args:
             base: the model.

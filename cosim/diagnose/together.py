@@ -249,8 +249,7 @@ def _fit(
         theta = responses.followed.theta
         points = (theta + shift, theta, declared.problem.nominal)
         starts = [_start(problem, point, values) for point in points]
-        costs = [search.cost(simulator, theta) for theta in starts]
-        begin = starts[int(np.argmin(costs))]
+        (_, begin), *_ = search.ranked(simulator, starts)
         result = search.judged(fit(simulator, begin, effort=ROUGHLY))
     except UnbuiltError:
         raise

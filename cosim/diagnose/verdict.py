@@ -6,7 +6,7 @@
                      it asks for no further law (`stands`), and no other set does better (`beaten`)
     confounded       it does, and the data do not tell another set from it that has no more laws,
                      each of them there; the other set is not asked whether it stands up
-    nothing_missing  no set passes even `doubts`, and the declared model leaves noise
+    nothing_missing  each set has its `doubts`, and the declared model leaves noise
     unexplained      anything else, with the nearest laws as hints; a hint is not a name. A search
                      that was stopped ends so, too: rivals have not been asked
 

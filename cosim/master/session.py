@@ -225,20 +225,17 @@ class Session:
         wanted = {name: value for name, value in later.items() if value}
         if wanted == self._later:
             return
-        outline = self._execution.outline
-        self.drive(
-            {
-                name: Shifted(outline.signals[name], value, outline.step)
-                for name, value in wanted.items()
-            }
-        )
+        self.drive({}, wanted)
         self._later = wanted
 
-    def drive(self, signals: Mapping[str, Signal]) -> None:
+    def drive(
+        self, signals: Mapping[str, Signal], later: Mapping[str, float] | None = None
+    ) -> None:
         """Drive some inputs by other signals from the next run on, the others by their own.
 
         Args:
             signals: driven input, as the run has it -> what drives it.
+            later: inputs that come later than what drives them says, as of `shift`.
 
         Raises:
             GraphError: the session shares its inputs with others.
@@ -249,7 +246,10 @@ class Session:
                 "this session shares its inputs with others and can't be driven; make one without "
                 "like="
             )
-        self._run.external[:] = self.master.tabulate({**outline.signals, **signals}, outline.times)
+        driving = {**outline.signals, **signals}
+        for name, value in (later or {}).items():
+            driving[name] = Shifted(driving[name], value, outline.step)
+        self._run.external[:] = self.master.tabulate(driving, outline.times)
         self._later = {}
 
     def _advance_within(self, limit: float) -> None:

@@ -17,7 +17,10 @@ from typer.testing import CliRunner
 from cosim.calibrate.budget import Budget, StoppedError
 from cosim.calibrate.mapping import read_problem
 from cosim.cli.app import app
-from cosim.diagnose import Diagnosis, diagnose
+from cosim.diagnose import Diagnosis, diagnose, diagnosis
+from cosim.diagnose.models import Fitted
+from cosim.diagnose.search import Search
+from cosim.diagnose.small import Small
 from cosim.errors import CosimError
 from tests.diagnose import disc
 
@@ -70,11 +73,38 @@ def test_a_budget_ends_all_work_but_the_report() -> None:
     with pytest.raises(StoppedError, match="after 2 simulated runs"):  # a larger system is asked
         budget.spend()
     assert budget.spent == 3 and budget.stopped == "after 2 simulated runs"
+    over = Budget(2)
+    with over.lifted():
+        for _ in range(3):
+            over.spend()
+    with pytest.raises(StoppedError, match="after 2 simulated runs"):
+        over.spend()
     endless = Budget()
     endless.spend()
     endless.stop("by hand")
     with pytest.raises(StoppedError, match="by hand"):
         endless.spend()
+
+
+def test_what_is_found_is_told_whole_though_the_budget_ends_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The name stands; what is said beside it is part of the report."""
+    budget, told = Budget(), []
+    small_laws = diagnosis.small_laws
+
+    def small(search: Search, after: Fitted) -> list[Small]:
+        budget.stop("by hand")
+        budget.spend()
+        told.append(small_laws(search, after))
+        return told[-1]
+
+    monkeypatch.setattr(diagnosis, "small_laws", small)
+    disc.write(tmp_path, lambda w, theta, t: 2e-3 * w * abs(w))
+    found = diagnose(read_problem(tmp_path), budget=budget)
+    assert found.verdict == "effect_found" and told == [found.small]
+    assert not found.to_dict()["stopped"]
+    assert not any("stopped" in warning for warning in found.warnings)
 
 
 def test_before_the_declared_parameters_are_fitted_there_is_nothing_to_report(

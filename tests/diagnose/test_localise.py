@@ -54,7 +54,7 @@ def test_the_missing_force_is_found_where_it_acts(tmp_path: Path) -> None:
     wanted = {("motor", "winding"), ("load", "flange")}
     chosen = {(c.instance, c.port): c for c in candidates(problem)}
     search = Search(simulator(problem), only=[chosen[place] for place in sorted(wanted)])
-    places = localise(search, search.calibrated(), search.known, print)
+    places = localise(search, search.calibrated(), search.known)
     assert {(p.instance, p.port) for p in places} == wanted
     best, other = places
     assert (best.instance, best.port) == ("motor", "winding")
@@ -63,9 +63,9 @@ def test_the_missing_force_is_found_where_it_acts(tmp_path: Path) -> None:
     assert best.curves[0].explained > 0.5
     # a catalogue that has nothing there does not hide the place
     search.known = [chosen["load", "flange"]]
-    ranked = localise(search, search.calibrated(), search.known, print)
+    ranked = localise(search, search.calibrated(), search.known)
     assert [(p.instance, p.port) for p in ranked] == [("load", "flange")]
-    found = everywhere(search, search.calibrated(), print)
+    found = everywhere(search, search.calibrated())
     assert len(found) > PLACES
     # an error of the torque constant does nearly the same, to first order
     assert ("motor", "winding") in [(p.instance, p.port) for p in found[:2]]

@@ -26,7 +26,7 @@ def asked(folder: Path, law: disc.Law) -> Begun:
     problem = read_problem(disc.write(folder, law, seconds=2.0, names=RUNS))
     search = Search(simulator(problem), only=[])
     base = search.calibrated()
-    located = everywhere(search, base, print)
+    located = everywhere(search, base)
     assert (located[0].label, len({p.label for p in located})) == ("load.flange", len(located))
     one = single(search, base, located)
     search.close()

@@ -35,7 +35,7 @@ def test_sets_that_do_less_than_half_are_not_fitted(tmp_path: Path, law: disc.La
     try:
         base = search.calibrated()
         search.note(base)
-        found = together(search, base, everywhere(search, base, said.append))
+        found = together(search, base, everywhere(search, base))
         refused = "no 4 laws explain half of that: first orders would mislead" in said
         assert any(text.startswith("along the log by efforts") for text in said)
         assert refused == (law is foreign)

@@ -43,7 +43,7 @@ FACTORS = {
 }
 
 
-def _centred(problem: Problem, models: Mapping[str, Vector], data: int, model: int,
+def _centred(models: Mapping[str, Vector], data: int, model: int,
              run: MeasuredRun) -> tuple[Vector, Vector]:  # fmt: skip
     measured, simulated = run.data[:, data], models[run.name][:, model]
     good = np.isfinite(measured) & np.isfinite(simulated)
@@ -59,7 +59,7 @@ def _follow(
     """Slope and correlation of a column against its signal, for the runs in which it follows."""
     sigma, found = problem.channels[index].sigma, {}
     for run in problem.runs:
-        measured, simulated = _centred(problem, models, index, index, run)
+        measured, simulated = _centred(models, index, index, run)
         power, noise = float(simulated @ simulated), float(measured @ measured)
         if not measured.size or noise == 0.0 or np.std(simulated) < MOVES * sigma:
             continue
@@ -83,7 +83,7 @@ def _foretold(
     """
 
     def off(run: MeasuredRun, column: int, side: float = 1.0) -> float:
-        measured, simulated = _centred(problem, models, column, column, run)
+        measured, simulated = _centred(models, column, column, run)
         power = float(measured @ measured)
         return float(np.sum((measured - side * simulated) ** 2)) / power if power > 0.0 else 0.0
 
@@ -104,7 +104,7 @@ def _spread(problem: Problem, models: Mapping[str, Vector], index: int) -> float
     """By how many times what its signal does a column changes, in the median over the runs."""
     sizes = []
     for run in problem.runs:
-        measured, simulated = _centred(problem, models, index, index, run)
+        measured, simulated = _centred(models, index, index, run)
         if measured.size and np.std(simulated) >= MOVES * problem.channels[index].sigma:
             sizes.append(float(np.std(measured) / np.std(simulated)))
     return float(np.median(sizes)) if sizes else 0.0

@@ -19,8 +19,6 @@ ALONG_X, ALONG_Y = 12, 8
 """As in the effect."""
 STRAIGHT = 1e3
 """Scale over the range from which knots are equally spaced: asinh(1e-3) is 1e-3 to seven digits."""
-FORMS = ("x", "y", "x * y")
-"""Depends on x, on y, on both in any way."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ class Shape:
     """What a law depends on and in which form.
 
     Attributes:
-        form: one of `FORMS`.
+        form: "x", "y" or "x * y": depends on x, on y, on both in any way.
         x, y: signals; one that the form does not have is None.
     """
 

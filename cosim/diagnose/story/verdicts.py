@@ -409,7 +409,7 @@ def _bad_data(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     more = f" There are {len(errors)} faults in all." if len(errors) > 1 else ""
     headline = join("These logs cannot be used. ", first, ".", more)
     meaning = [
-        join("Nothing was calibrated and no effect was looked for: with such data, a search would "
+        join("No effect was looked for: with such data, a search would "
              "find a cause in the machine for what is a fault of the logs.")
     ]  # fmt: skip
     steps = [
