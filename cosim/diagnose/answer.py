@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .facts import Force, Law, Left
+from .whiteness import structured
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Hint:
         if self.rough:
             text += " to first order"
         if self.left is not None:
-            text += f" and leave {self.left.channel} at {self.left.rms:.3g} times its noise"
+            text += f" and leave {self.left.channel} at {_above(self.left)}"
         return text
 
     def to_dict(self) -> dict[str, Any]:
@@ -216,10 +217,17 @@ def parameters(law: Law) -> dict[str, dict[str, Any]]:
 
 def over(left: Sequence[Left]) -> str:
     """Channels above their noise, for people."""
-    worst: dict[str, float] = {}
+    worst: dict[str, str] = {}
     for x in left:
-        worst.setdefault(x.channel, x.rms)
-    return ", ".join(f"{name} ({rms:.3g} times its noise)" for name, rms in worst.items())
+        worst.setdefault(x.channel, _above(x))
+    return ", ".join(f"{name} ({size})" for name, size in worst.items())
+
+
+def _above(left: Left) -> str:
+    """By how much a channel is above its noise."""
+    if structured(left.lasting, left.p_value):
+        return f"{left.rms:.3g} times its noise"
+    return f"slow parts of {left.slow:.3g} times its noise's"
 
 
 def _size(law: Law) -> str:

@@ -142,6 +142,7 @@ class Left:
         rms: residual over noise.
         lasting: the same without the few worst windows (`whiteness.BURST`).
         p_value: that noise alone has such slow parts.
+        slow: these parts over what noise has, likewise (`whiteness.WhitenessTest`).
     """
 
     channel: str
@@ -149,6 +150,7 @@ class Left:
     rms: float
     lasting: float
     p_value: float
+    slow: float = 1.0
 
 
 @dataclass(frozen=True)

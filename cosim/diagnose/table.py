@@ -116,7 +116,7 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
         parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
     for purpose, stack, residual in parts:
         found += [
-            Left(test.channel, purpose, test.rms, test.lasting, test.p_value)
+            Left(test.channel, purpose, test.rms, test.lasting, test.p_value, test.slow)
             for test in whiteness_tests(residual, stack)
         ]
     return tuple(found)

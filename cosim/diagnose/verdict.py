@@ -24,7 +24,7 @@ from .answer import Hint, Verdict, over, percent
 from .facts import Force, Gain, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
-from .whiteness import CALIBRATED, structured
+from .whiteness import CALIBRATED, slowly, structured
 
 FITTED = "identification"
 TENTH = 0.1
@@ -164,10 +164,16 @@ def wanted(gain: Gain | None, candidates: int) -> bool:
 
 
 def above(model: Model) -> tuple[Left, ...]:
-    """Channels that a model leaves above their noise, the worst first."""
-    return tuple(
-        sorted((x for x in model.left if structured(x.lasting, x.p_value)), key=lambda x: -x.rms)
-    )
+    """Channels that a model leaves above their noise, the worst first.
+
+    Of a model with laws also those that are no larger than noise, and slower: wrong laws are.
+    """
+    tests, named = len(model.left), bool(model.laws)
+    found = [
+        x for x in model.left
+        if structured(x.lasting, x.p_value) or (named and slowly(x.slow, x.p_value, tests))
+    ]  # fmt: skip
+    return tuple(sorted(found, key=lambda x: -x.rms))
 
 
 def stands(table: Table, place: int) -> bool:
@@ -234,12 +240,17 @@ def _better(table: Table, first: int, second: int) -> bool:
 def carries_over(model: Model) -> bool:
     """Whether no channel is farther above its noise in unused runs than in those that were fitted.
 
+    Nor its slow parts above those of noise.
+
     Parameters make the best of a wrong law, but in the runs that they are fitted to alone.
     """
-    fitted = {x.channel: x.lasting for x in model.left if x.purpose == FITTED}
+    fitted = {x.channel: x for x in model.left if x.purpose == FITTED}
+    white = Left("", FITTED, 1.0, 1.0, 1.0)
     return all(
-        x.lasting <= CALIBRATED * max(fitted.get(x.channel, 1.0), 1.0)
+        x.lasting <= CALIBRATED * max(before.lasting, 1.0)
+        and x.slow <= CALIBRATED * max(before.slow, 1.0)
         for x in above(model) if x.purpose != FITTED
+        for before in [fitted.get(x.channel, white)]
     )  # fmt: skip
 
 

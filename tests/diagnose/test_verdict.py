@@ -525,3 +525,28 @@ def test_a_time_within_a_tick_of_the_rig_is_no_cause(value: float, kind: str) ->
     late = law("delay", "log.speed", value=value, half=1e-4, gain=40.0, z=5.0, tick=5e-4)
     found = decide(table(model(), model(late)))
     assert found.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("slow", "p_value", "named"), [(1.5, 1e-9, False), (1.15, 1e-9, True), (1.5, 4e-3, True)]
+)
+def test_a_set_that_leaves_slow_parts_has_no_name(slow: float, p_value: float, named: bool) -> None:
+    """Though it is no larger than noise; 1.15 is what laws leave that are too small for a name."""
+    one = model(law("coulomb", "motor.shaft"), rms=1.05)
+    rest = (
+        replace(left(1.05), p_value=p_value, slow=slow), left(1.0, "current"),
+        left(1.0, purpose="identification"),
+    )  # fmt: skip
+    verdict = decide(table(FAR, replace(one, left=rest)))
+    assert (verdict.kind == "effect_found") == named
+    if not named:
+        assert verdict.kind == "unexplained"
+        why = "it leaves more than noise in speed (slow parts of 1.5 times its noise's)"
+        assert why in verdict.hints[0].why
+        assert "leave speed at slow parts of 1.5 times its noise's" in verdict.reason
+
+
+def test_slow_parts_of_a_model_without_laws_are_no_ground_for_one() -> None:
+    """Noise may be slow itself: silence asks for less than a name."""
+    rest = tuple(replace(x, p_value=1e-9, slow=1.5) for x in CLEAN.left)
+    assert decide(table(replace(CLEAN, left=rest))).kind == "nothing_missing"

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from ...display.html import Cell, Html, number, quantity, tag, text, unit
-from ..whiteness import CALIBRATED
+from ..whiteness import CALIBRATED, slowly
 
 
 def place_in_words(place: str) -> str:
@@ -160,13 +160,17 @@ class Facts:
     @cached_property
     def left(self) -> list[str]:
         """Channels whose residual holds more than noise in the end."""
-        found = [
-            test["channel"]
+        left = [
+            test
             for key, tests in self.table["structure"].items()
             if key.startswith("after")
             for test in tests
-            if test["structured"]
         ]
+        found = [
+            test["channel"] for test in left
+            if test["structured"]
+            or (self.effects and slowly(test["slow_over_noise"], test["p_value"], len(left)))
+        ]  # fmt: skip
         return [name for name in self.table["channels"] if name in found]
 
     @property
