@@ -146,10 +146,11 @@ class _Measure:
 
     def moves(self, errors: Errors) -> Vector:
         """By how much errors of the model move the parameters, over their deviations."""
-        rows = [
-            (name, np.where(np.isfinite(residual), errors[name], np.nan))
+        rows = [  # white, as the derivatives are
+            (name, self.problem.run(name).white(
+                np.where(np.isfinite(residual), errors[name], np.nan)))
             for name, residual in self.estimate.residuals
-        ]
+        ]  # fmt: skip
         steep = gradient(self.problem, self.problem.nominal, self.estimate.jacobian, rows)
         deviation = np.maximum(self.estimate.deviation, 1e-300)
         return np.asarray(np.abs(self.inverse @ steep) * self.problem.scale / deviation)

@@ -156,9 +156,10 @@ class Descent:
 
     def lowered(self) -> bool:
         """Go to the lowest point that was met, if it is lower than here."""
-        if self._met is None:
+        met, self._met = self._met, None
+        if met is None or not met[2] < self.cost:  # the fit may have gone lower since
             return False
-        (self.theta, self.residuals, self.cost), self._met = self._met, None
+        self.theta, self.residuals, self.cost = met
         return True
 
     def restored(self, normal: Normal, theta: Vector, damping: float) -> bool:

@@ -115,6 +115,8 @@ def _sides(
     parameter, value = problem.parameters[index], float(theta[index])
     change = max(relative * parameter.scale, parameter.hints.lattice)
     above, below = parameter.maximum - value, value - parameter.minimum
+    if (room := max(above, below)) > 0.0:
+        change = min(change, room)
     if central and above >= change and below >= change:
         return -change, change
     return (0.0, change) if above >= change or above >= below else (-change, 0.0)

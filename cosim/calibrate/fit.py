@@ -134,11 +134,19 @@ def _confirmed(run: Descent, *, stays: bool = False) -> Estimate:
 
 def _uneven(run: Descent) -> bool:
     """Whether some runs are much farther off than others."""
-    sizes = [float(np.nanmean(np.minimum(np.abs(r), 1e6))) for _, r in run.residuals]
-    return max(sizes) > APART * max(min(sizes), 1.0)
+    sizes = [size for size, _ in _sizes(run)]
+    return bool(sizes) and max(sizes) > APART * max(min(sizes), 1.0)
 
 
 def _calmest(run: Descent) -> list[str]:
     """The half of the runs that fit best so far: those without limits and runaway errors."""
-    worth = [(float(np.nanmean(np.minimum(np.abs(r), 1e6))), name) for name, r in run.residuals]
-    return [name for _, name in sorted(worth)[: max((len(worth) + 1) // 2, 1)]]
+    worth = sorted(_sizes(run))
+    return [name for _, name in worth[: max((len(worth) + 1) // 2, 1)]]
+
+
+def _sizes(run: Descent) -> list[tuple[float, str]]:
+    """Mean residual and name of the runs in which something is measured."""
+    return [
+        (float(np.nanmean(np.minimum(np.abs(r), 1e6))), name)
+        for name, r in run.residuals if np.isfinite(r).any()
+    ]  # fmt: skip

@@ -201,7 +201,8 @@ def _beginnings(problem: Problem, share: float) -> Problem:
     """The problem with only the first share of each run."""
     runs = []
     for run in problem.runs:
-        size = math.ceil(share * run.times.size)
+        # poses are told from the anchor on, and a run has an interval
+        size = min(max(math.ceil(share * run.times.size), run.anchor + 1, 2), run.times.size)
         runs.append(replace(run, times=run.times[:size], data=run.data[:size]))
     return problem.changed(runs=runs)
 

@@ -169,6 +169,20 @@ class Channel:
             reading = reading + size * np.sin(turns * reading + phase)
         return np.asarray(reading, dtype=np.float64)
 
+    def meant(self, data: Vector, errors: Mapping[str, float] = NO_ERRORS) -> Vector:
+        """Values of the signal for which the channel reads this; of `sample` channels.
+
+        Args:
+            data: as logged.
+            errors: of the log, see `Problem.log_errors`; a wave is taken where the reading is, so
+                what it misses is of second order in its size.
+        """
+        if size := errors.get(WAVE + self.name, 0.0):
+            turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
+            data = data - size * np.sin(turns * data + phase)
+        gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
+        return (data - self.offset - errors.get(BIAS + self.name, 0.0)) / gain
+
 
 class Sampler:
     """Reads recorded signals at the sample times of a run.

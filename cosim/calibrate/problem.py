@@ -391,7 +391,7 @@ class Problem:
                     other, ratio = self.shafts.get(shaft(f"{name}.{element}"), ("", 0.0))
                     if other in run.starts:
                         starts[f"{name}.{element}"] = ratio * run.starts[other]
-        return run if len(starts) == len(run.starts) else replace(run, starts=starts)
+        return run if starts == run.starts else replace(run, starts=starts)
 
 
 def shaft(name: str) -> str:

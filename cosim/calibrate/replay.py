@@ -6,16 +6,18 @@ from dataclasses import replace
 
 from ..data.comparison import Reference
 from ..data.recording import Recording
+from ..data.signals import Shifted
 from ..master.master import Master
 from ..view.scene import needs, scenes
-from .parts import COINCIDENT, MeasuredRun, Vector
+from .parts import COINCIDENT, DRIFT, MeasuredRun, Sampler, Vector
 from .problem import Problem
 
 
 def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording, list[Reference]]:
     """Simulate a run and keep what scenes need; its measured channels, as their signals.
 
-    Channels over a window (means, differences) are left out of the measured ones.
+    Channels over a window (means, differences) are left out of the measured ones; clocks and
+    columns are read as the parameters say.
 
     Args:
         problem: with the run.
@@ -26,6 +28,7 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
         CosimError: see `errors`.
     """
     system = problem.model.system(problem.values(theta, run))
+    errors = problem.log_errors(theta, run)
     looks = scenes(system)
     interval = problem.period or run.interval
     every = max(round(interval / problem.step), 1)
@@ -37,7 +40,10 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
     )  # fmt: skip
     recording = master.run(
         count * every * problem.step,
-        inputs=run.inputs,
+        inputs={
+            name: Shifted(signal, -errors[name], problem.step) if errors.get(name) else signal
+            for name, signal in run.inputs.items()
+        },
         record=list(dict.fromkeys([*(c.signal for c in problem.channels), *needs(looks)])),
         every=every,
         start=first if abs(first) > COINCIDENT * interval else 0.0,
@@ -45,8 +51,11 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
     measured = [
         Reference(
             (channel.signal,),
-            run.times + channel.shift,
-            (run.data[:, [column]] - channel.offset) / channel.gain,
+            Sampler(run.times, run.times).drifted(
+                channel.shift - errors.get(channel.name, 0.0),
+                errors.get(DRIFT + channel.name, 0.0),
+            ),
+            channel.meant(run.data[:, [column]], errors),
             "",
             f"{run.name}: {channel.name}",
         )

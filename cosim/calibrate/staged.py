@@ -128,7 +128,8 @@ def _cut(simulator: Simulator, theta: Vector, purpose: str, most: float = 1.0) -
         gone = np.flatnonzero(np.any(mean_squares(residual) > LEFT, axis=1))
         count = len(residual)
         first = int(gone[0]) if gone.size else count
-        sizes[name] = max(min(first, math.ceil(most * count)), math.ceil(LEAST * count))
+        least = max(math.ceil(LEAST * count), simulator.problem.run(name).anchor + 1)
+        sizes[name] = max(min(first, math.ceil(most * count)), least)
     problem = simulator.problem
     cut = [
         replace(run, times=run.times[: sizes[run.name]], data=run.data[: sizes[run.name]])

@@ -196,6 +196,7 @@ class Verdict:
                     self.others, self.replaced, self.rivals, strict=True
                 )
             ],
+            "left": list(dict.fromkeys(x.channel for x in self.left)),
             "hints": [hint.to_dict() for hint in self.hints],
             "stopped": self.stopped,
         }

@@ -43,6 +43,8 @@ class Judge:
     def __init__(self, problem: Problem, check: str) -> None:
         self.purpose = check
         self.memo = Memo()
+        self.foretold: dict[frozenset[str], tuple[Vector, Vector]] = {}
+        """Parameters of sets, and what these leave of unused runs (`foretelling.foretold`)."""
         self._measured(problem)
 
     def _measured(self, problem: Problem) -> None:

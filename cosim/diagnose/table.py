@@ -9,14 +9,16 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import CosimError
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
+from .foretelling import foretold
 from .judge import Judge
 from .linear import BAND
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
-from .verdict import doubts, threshold
-from .whiteness import whiteness_tests
+from .verdict import above, doubts, threshold
+from .whiteness import structured, whiteness_tests
 
 Vector = NDArray[np.float64]
 NEAR, MOST = 0.9, 12
@@ -84,6 +86,8 @@ def table_of(
         ended=tuple(ended.items()),
         stopped=stopped,
     )
+    told = [_foretold(judge, table, *pair) for pair in zip(models, fits, strict=True)]
+    table = replace(table, models=(*told, *rough))
     compared = [
         Comparison(i, k, judge.better(fits[i], fits[k]))
         for i, k in combinations(comparable(table), 2)
@@ -120,6 +124,35 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
             for test in whiteness_tests(residual, stack)
         ]
     return tuple(found)
+
+
+def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model:
+    """A model with slow parts of unused runs beside what its parameters' deviations make of them.
+
+    Asked only where it matters: of sets that may be named but for these. No slow parts are told
+    where runs may turn unstable: derivatives say little there.
+    """
+    if judge.raw.unstable:
+        return replace(model, left=tuple(replace(x, slow=1.0) for x in model.left))
+    late = [x for x in above(model) if x.purpose == judge.purpose]
+    if not judge.unused or not model.laws or not late or doubts(table, model):
+        return model
+    if any(structured(x.lasting, x.p_value) for x in late):
+        return model
+    known = judge.foretold.get(model.labels)
+    if known is None or known[0] is not fitted.estimate.theta:
+        try:
+            rest = foretold(fitted, judge.check_data - fitted.check, judge.checking)
+        except CosimError:  # with what its deviations make of them, then
+            return model
+        known = judge.foretold[model.labels] = fitted.estimate.theta, rest
+    tests = {t.channel: t for t in whiteness_tests(known[1], judge.checking)}
+    left = tuple(
+        replace(x, slow=tests[x.channel].slow, p_value=tests[x.channel].p_value)
+        if x.purpose == judge.purpose else x
+        for x in model.left
+    )  # fmt: skip
+    return replace(model, left=left)
 
 
 def _force(place: Place) -> Force:

@@ -94,7 +94,7 @@ def table(verdict: str) -> dict[str, Any]:
         "law_from_data": None,
         "withheld": [],
         "stopped": "",
-        "hints": [],
+        "hints": [], "left": ["speed"] if after > 1.1 else [],
         "parameters": {
             "R_a": {"unit": "ohm", "before": value, "after": value},
             "eta": {"unit": "-", "before": unknown, "after": unknown},

@@ -77,7 +77,7 @@ def test_more_that_is_missing_is_said_only_where_it_is() -> None:
     content = table("effect_found")
     said = "More is missing"
     assert said not in "".join(told(Facts(content)).meaning)
-    content["structure"]["after validation"][0]["structured"] = True
+    content["left"] = ["speed"]
     assert said in "".join(told(Facts(content)).meaning)
 
 
@@ -96,9 +96,7 @@ def test_a_search_that_was_stopped_claims_nothing() -> None:
     assert "stopped after 300 simulated runs: so far, the calibrated model misses" in story.headline
     assert "nothing is named, and nothing is ruled out" in "".join(story.meaning)
     assert "were tried" not in "".join(story.meaning) and "Let it go on" in story.steps[0]
-    for tests in content["structure"].values():
-        for test in tests:
-            test["structured"] = False
+    content["left"] = []
     assert "leaves noise" in told(Facts(content)).headline
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from ...display.html import Cell, Html, number, quantity, tag, text, unit
-from ..whiteness import CALIBRATED, slowly
+from ..whiteness import CALIBRATED
 
 
 def place_in_words(place: str) -> str:
@@ -157,20 +157,10 @@ class Facts:
         }
         return max(sizes, key=lambda name: sizes[name], default="")
 
-    @cached_property
+    @property
     def left(self) -> list[str]:
-        """Channels whose residual holds more than noise in the end."""
-        left = [
-            test
-            for key, tests in self.table["structure"].items()
-            if key.startswith("after")
-            for test in tests
-        ]
-        found = [
-            test["channel"] for test in left
-            if test["structured"]
-            or (self.effects and slowly(test["slow_over_noise"], test["p_value"], len(left)))
-        ]  # fmt: skip
+        """Channels that hold more than noise in the end."""
+        found = self.table["left"]
         return [name for name in self.table["channels"] if name in found]
 
     @property

@@ -1,0 +1,45 @@
+"""Slow parts of unused runs count beside what the parameters' deviations make of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.diagnose.foretelling import foretold
+from cosim.diagnose.whiteness import UNNAMED, whiteness_tests
+from tests.diagnose import built
+
+
+def nothing(w: float, theta: float, t: float) -> float:
+    return 0.0
+
+
+@pytest.mark.parametrize("error", ["none", "parameters", "law"])
+def test_errors_of_the_parameters_are_taken_off_and_others_stay(tmp_path: Path, error: str) -> None:
+    """A disc that lacks nothing; three deviations of its parameters along their worst direction."""
+    with built.rig(tmp_path, nothing) as rig:
+        search, base = rig.search, rig.base
+        theta, covariance = base.estimate.theta, 25.0 * base.estimate.covariance
+        known = replace(base, estimate=replace(base.estimate, covariance=covariance))
+        residual = search.check_data - base.check
+        if error == "parameters":
+            values, vectors = np.linalg.eigh(covariance)
+            moved = theta + 3.0 * vectors[:, -1] * np.sqrt(values[-1])
+            (_, off), (_, right) = (
+                base.simulator.residuals(at, ["check"])[0] for at in (moved, theta)
+            )
+            residual = residual + search.checking.vector([off - right])
+        if error == "law":
+            (run,) = search.checking.runs
+            wave = np.tile(np.sin(7.0 * run.times)[:, None], (1, 2))
+            residual = residual + search.checking.vector([wave])
+        rest = foretold(known, residual, search.checking)
+        slow = max(t.slow for t in whiteness_tests(residual, search.checking))
+        left = max(t.slow for t in whiteness_tests(rest, search.checking))
+        assert (slow > UNNAMED) == (error != "none")
+        assert (left > UNNAMED) == (error == "law")
+        # nothing is taken off that is not there, but its share of noise: half a nat each
+        assert abs(rest @ rest - residual @ residual) < 2.0 * theta.size or error != "none"
