@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ScenarioError
 from .descent import EVEN, STEPS, Descent
 from .estimate import Estimate, estimated
 from .known import Known
@@ -81,8 +82,17 @@ def fit(
         known: derivatives of a fit with nearly the same parameters, which stand for those at
             `theta`; a quick fit, whose intervals are as good as they are.
         goal: see `Descent.correct`; of fits that begin `there`.
+
+    Raises:
+        ScenarioError: the problem has no parameter.
+        FmuCallError: it cannot be simulated where the fit begins.
     """
     begun, problem = simulator.evaluations, simulator.problem
+    if not problem.parameters:
+        raise ScenarioError(
+            f"{problem.name}: no parameter is open, so there is nothing to fit; give one with "
+            "[[parameter]] in the mapping (of what is known well, with narrow bounds)"
+        )
     run = Descent(
         simulator, purpose, problem.nominal if theta is None else theta.astype(np.float64)
     )

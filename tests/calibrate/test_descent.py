@@ -160,3 +160,19 @@ def test_what_jumps_promises_too_little_to_be_left(
     monkeypatch.setattr(Descent, "normal", uneven)
     run.correct(goal=0.0)
     assert run.cost < before
+
+
+def test_a_point_that_was_met_is_forgotten_once_the_fit_is_lower(
+    short: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = begun(
+        short, monkeypatch, lambda m, p, shapes: m * shapes[0] + p * shapes[1], (4.0, 4.0), 0.1
+    )
+    higher, best = run.theta.copy(), run.problem.nominal
+    higher[run.problem.index(MASS)] = 2.0
+    seen = run.simulator.residuals(higher, run.purpose)
+    run.meet(higher, seen, run.total(higher, seen))
+    assert run.attempt(best)  # all are 1 there, as in the data
+    cost = run.cost
+    assert not run.lowered() and run.cost == cost
+    assert run.theta.tolist() == best.tolist()
