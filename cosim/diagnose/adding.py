@@ -33,6 +33,10 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
         if parameter.role != "nuisance" and not parameter.run:
             own = parameter.set(value).items()
             table["values"].update((n, v) for n, v in own if not n.startswith(LOGGED))
+    given = {n: v for n, v in estimate.problem.constants.items() if n not in problem.constants}
+    mine = tuple(f"{item.place}." for item in fitted.effects)
+    held = {n: v for n, v in given.items() if n.startswith(mine) and not n.startswith(LOGGED)}
+    table["values"] = held | table["values"]
     return table
 
 

@@ -117,7 +117,7 @@ class Verdict:
         if self.kind == "nothing_missing":
             return (
                 "The calibrated model leaves noise in all channels, and no effect of the catalogue "
-                "does better on runs that were not used for fitting."
+                "does so much better that it could be named."
                 if self.unused
                 else "The calibrated model leaves noise in all channels; no run was kept to judge "
                 "effects by."

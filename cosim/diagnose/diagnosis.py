@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -43,7 +43,7 @@ from .rounds import Round
 from .search import ROUNDS, Search
 from .second_look import leaves_more
 from .small import small_laws, widen
-from .table import candidates_of, table_of
+from .table import candidates_of, force_of, table_of
 from .verdict import above, decide, proposal, unasked
 
 TURNS = 4
@@ -233,6 +233,9 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
             if asked is None and not search.raw.late:
                 asked_everywhere(result)
                 asked_single(result)
+                if result.located:  # the places are others now
+                    force = force_of(result.located[0])
+                    result.answer = replace(result.answer, force=force)
             lacking = search.cut(result.after) if result.ended else result.after
             result.law = unnamed(search, lacking, result.located, asked, result.single)
     except StoppedError as stopped:

@@ -39,7 +39,7 @@ def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
             return None
         inputs[name] = Table(
             signal.times, np.asarray(signal.values) * factor, unit=signal.unit,
-            interpolation=signal.interpolation, text=signal.text,
+            interpolation=signal.interpolation, text=signal.text, extend=signal.extend,
         )  # fmt: skip
     return replace(run, inputs=inputs)
 

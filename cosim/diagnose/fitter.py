@@ -95,7 +95,7 @@ class Fitter(Judge):
             effort: of the fit, from there.
             goal: cost [nats] from which it is of use.
         """
-        found = quick
+        found = best = quick
         for _ in range(CORRECTIONS):
             theta = found.estimate.theta
             try:
@@ -103,11 +103,15 @@ class Fitter(Judge):
                 estimate = fit(simulator, theta, effort=effort, goal=goal)
                 found = self.again(self.judged(estimate), quick, base)
             except CosimError as error:  # a step finer than that of the quick fit may be unstable
-                self.say(f"{quick.effects[-1].label} could not be fitted thoroughly: {error}")
+                name = quick.effects[-1].label if quick.effects else "the declared model"
+                self.say(f"{name} could not be fitted thoroughly: {error}")
                 break
             if self.raw.unstable or self.stale(found) <= STALE:
+                return found
+            if self._own_cost(found) >= self._own_cost(best):  # corrections lead away
                 break
-        return found
+            best = found
+        return best
 
     def stale(self, fitted: Fitted) -> float:
         """By how much the exchange was corrected for another place than where a fit ended [nats].
@@ -117,7 +121,11 @@ class Fitter(Judge):
         """
         residuals = dict(fitted.estimate.residuals)
         taken = self.fitting.vector([residuals[run.name] for run in self.fitting.runs])
-        return abs(self.fitting.cost(taken) - self.fitting.cost(self.fit_data - fitted.fit))
+        return abs(self.fitting.cost(taken) - self._own_cost(fitted))
+
+    def _own_cost(self, fitted: Fitted) -> float:
+        """Cost of a model's own values, without what the search's step adds to them."""
+        return self.fitting.cost(self.fit_data - fitted.fit)
 
     def again(self, result: Fitted, first: Fitted, base: Fitted) -> Fitted:
         """Mark a fit as another one of the same model, judged against the same base."""
@@ -448,10 +456,14 @@ class Fitter(Judge):
         except CosimError as error:
             self.say(f"{item.candidate.label} with its other parameters: {error}")
             return fitted
+        known = self.memo.get(fitted.labels)
         result = self.again(result, fitted, base)
         if result.estimate.unkept > GATE and not self.freer(fitted, result):  # it has stalled
             fitted, result = (self.sharpened(f, base, DRAFT) for f in (fitted, result))
         if not self.freer(fitted, result):
+            if known is not None:
+                self.memo.keep(known)  # runs do not want these parameters
+            self.note(fitted)
             return fitted
         self.say(f"{item.candidate.label}: its other parameters are wanted, too")
         result = self.again(without_redundant(self, result, others), fitted, base)

@@ -175,7 +175,9 @@ class Judge:
         problem = estimate.problem.changed(far=self.raw.far)
         simulator = estimate.simulator.limited({}).of(problem)
         loss = loss_for(problem.unstable)
-        robust = cost_of(problem, estimate.theta, estimate.residuals, loss)
+        # the memo keeps none
+        residuals = estimate.residuals or simulator.residuals(estimate.theta, self.fitting.names)
+        robust = cost_of(problem, estimate.theta, residuals, loss)
         found = replace(fitted, estimate=replace(estimate, simulator=simulator, robust=robust))
         if base is not None:
             found.gate = compare(self.check_data, base.check, found.check, self.checking)

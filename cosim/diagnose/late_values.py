@@ -18,6 +18,7 @@ from .fitter import Fitter
 from .models import Fitted
 from .secant import patience
 from .unstable import ended
+from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
 RELEASES, PAYS = 4, 0.01
@@ -72,8 +73,34 @@ class LateValueFitter(Fitter):
             if gain < PAYS * beyond:
                 break
             least = PAYS
+        winner = self._unused_late(winner, base)
         self._settled = winner.estimate
         return winner
+
+    def _unused_late(self, winner: Fitted, base: Fitted) -> Fitted:
+        """The model with late values of unused runs as its own parameters want them.
+
+        Turns end when fitted runs are at the noise, or want no other values; those of unused runs
+        are then as the model before wanted them.
+        """
+        left = whiteness_tests(self.check_data - winner.check, self.checking)
+        if not self.unused or self.lacking(winner) or not any(t.structured for t in left):
+            return winner
+        theta = winner.estimate.theta
+        try:
+            simulator = corrected(winner.simulator, theta, self.raw)
+            moved = released(simulator, theta)[0].problem
+            problem = simulator.problem
+            runs = [r if r.purpose == "identification" else moved.run(r.name) for r in problem.runs]
+            simulator = simulator.of(problem.changed(runs=runs))
+            found = self.judged(fit(simulator, theta, effort=CORRECTION))
+        except CosimError as error:
+            self.say(f"start values of unused runs could not be estimated: {error}")
+            return winner
+        if self.gains(winner, found)[1] <= 0.0:
+            return winner
+        self.say("start values of unused runs estimated")
+        return self.again(found, winner, base)
 
     def _with_late(self, simulator: Simulator, theta: Vector) -> Fitted:
         """A model fitted together with late values; beside them, if that cannot be simulated."""

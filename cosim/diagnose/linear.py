@@ -209,6 +209,7 @@ class ScoreTest:
     p_value: float
     size: float
     spread: float
+    degrees: int = 1
 
 
 def score(direction: Vector, residual: Vector, stack: SampleStack, freedom: int) -> ScoreTest:
@@ -234,9 +235,10 @@ def score(direction: Vector, residual: Vector, stack: SampleStack, freedom: int)
     robust = float(sums @ sums) * stack.blocks / degrees
     spread = float(np.sqrt(max(robust / square, 1.0)))
     z = amplitude * np.sqrt(square) / spread
-    p_value = float(2.0 * stdtr(max(min(degrees, active * 4), 1), -abs(z)))
+    free = max(min(degrees, active * 4), 1)
+    p_value = float(2.0 * stdtr(free, -abs(z)))
     gain, size = 0.5 * amplitude**2 * square, float(np.sqrt(square))
-    return ScoreTest(amplitude, gain, z, p_value, size, spread)
+    return ScoreTest(amplitude, gain, z, p_value, size, spread, free)
 
 
 def holm(p_values: Sequence[float], tests: int = 0) -> Vector:

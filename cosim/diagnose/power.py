@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtri, stdtrit
 
 from .linear import MATERIAL, SampleStack
 from .models import LEVEL
@@ -23,7 +23,7 @@ def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
     simulated; the gate on unused runs is not in it.
     """
     tests = max(len(current.signatures) + len(current.aside), 1)  # as of the round's p values
-    needed = float(-ndtri(LEVEL / tests / 2) - ndtri(1 - POWER))
+    level = LEVEL / tests
     table: dict[str, dict[str, Any]] = {}
     for item in current.signatures:
         p = item.strength
@@ -36,6 +36,12 @@ def power(current: Round, stack: SampleStack) -> dict[str, dict[str, Any]]:
                 else "calibration of the declared parameters absorbs it"
             )
         else:
+            told = (
+                math.sqrt(-2.0 * math.log(level))
+                if item.probe.mix
+                else -float(stdtrit(item.score.degrees, level / 2))
+            )  # as of the round's p values
+            needed = told - float(ndtri(1 - POWER))
             # the norm of what calibration leaves grows with the strength around the secant's value
             size = item.score.size / max(item.score.spread, 1.0)
             smallest = abs(item.value) * needed / size if size > 0 else math.inf

@@ -231,7 +231,7 @@ class Search(LateValueFitter):
             base: the model.
             among: their labels, all if not given.
         """
-        if base.effects and self.whole:  # what was added may have balances of its own
+        if self.whole:  # what was added may have balances of its own
             self.known = self.offered(candidates(base.problem))
         present = {item.label for item in base.effects}
         chosen = [

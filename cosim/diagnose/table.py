@@ -70,7 +70,7 @@ def table_of(
                 -judge.checking.cost(judge.check_data - f.check) if unused else 0.0,
                 _left(judge, f),
                 judge.better(declared, f) if f.effects else None,
-                tuple(map(_force, forces[f.labels])) if f.labels in forces else None,
+                tuple(map(force_of, forces[f.labels])) if f.labels in forces else None,
                 _excess(judge, f, run),
                 _beyond(judge.fit_data - f.fit)
                 + (_beyond(judge.check_data - f.check) if unused else 0.0),
@@ -155,7 +155,8 @@ def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model
     return replace(model, left=left)
 
 
-def _force(place: Place) -> Force:
+def force_of(place: Place) -> Force:
+    """The free force of a place that explains most."""
     best = max(place.curves, key=lambda curve: curve.explained)
     return Force(place.instance, place.port, place.element, best.explained)
 
@@ -172,7 +173,12 @@ def comparable(table: Table) -> list[int]:
     least = models[0].score + NEAR * (most - models[0].score)
     least = min(least, named - 2.0 * threshold(table.candidates))  # of fitted and of unused runs
     near = [i for i, m in enumerate(models) if i and m.score >= least]
-    return sorted(near, key=lambda i: -models[i].score)[:MOST]
+    able = {i for i in near if all(law.there for law in models[i].laws)
+            and models[i].score <= named + 2.0 * threshold(table.candidates)}  # fmt: skip
+    few = min((len(models[i].laws) for i in able if not doubts(table, models[i])), default=0)
+    first = {i for i in able if len(models[i].laws) <= few}
+    near.sort(key=lambda i: (i not in first, -models[i].score))
+    return sorted(near[:MOST], key=lambda i: -models[i].score)
 
 
 def _first_orders(models: list[Model], rounds: Sequence[Round]) -> list[Model]:

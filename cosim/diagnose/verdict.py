@@ -334,20 +334,21 @@ def _special(table: Table, place: int, able: Sequence[int]) -> int | None:
 
     A bristle that gives way by nothing is dry friction.
     """
-    model, declared = table.models[place], table.models[0]
-    least = (1.0 - HAIR) * (model.fitted + model.unused - declared.fitted - declared.unused)
-    found = []
+    model, declared, found = table.models[place], table.models[0], []
+    whole = model.fitted + model.unused - declared.fitted - declared.unused
     for i in able:
         mine, other = _differ(model, table.models[i])
         if len(mine) != 1 or len(other) != 1:
             continue
         general, simple = mine[0], other[0]
         further = [v for v in general.values if v.name != general.strength]
+        gain = general.missed if model.laws[1:] else None
+        hair = HAIR * (whole if gain is None else gain.fitted + gain.unused)
+        rival = table.models[i]
         if (
             further and not any(v.determined for v in further)
             and simple.place == general.place and simple.effect in general.contains
-            and table.models[i].fitted + table.models[i].unused
-            - declared.fitted - declared.unused >= least
+            and rival.fitted + rival.unused >= model.fitted + model.unused - hair
         ):  # fmt: skip
             found.append(i)
     return max(found, key=lambda i: table.models[i].score, default=None)
@@ -377,9 +378,13 @@ def _named(table: Table, best: int) -> Verdict:
         if len(mine) == len(other) == 1 and mine[0].effect == other[0].effect:
             places[mine[0].label].append(other[0].place)
         elif not _one_answer(model, rival):
-            rivals.append((i, rival.score - model.score))
-            others.append(tuple(law.label for law in other))
-            replaced.append(tuple(law.label for law in mine))
+            labels = tuple(law.label for law in other)
+            same = [t for law in other[:1] if not other[1:] for t in law.twins
+                    if t not in _fitted(table)]  # fmt: skip
+            for one in (labels, *((t,) for t in same)):  # what is one with it, and was not fitted
+                rivals.append((i, rival.score - model.score))
+                others.append(one)
+                replaced.append(tuple(law.label for law in mine))
     order = sorted(range(len(rivals)), key=lambda k: (-rivals[k][1], others[k]))
     shares = {}
     for law in model.laws:

@@ -13,6 +13,7 @@ import pytest
 from cosim.calibrate.mapping import read_problem
 from cosim.diagnose import fitter
 from cosim.diagnose.candidates import delays
+from cosim.diagnose.diagnosis import diagnose
 from cosim.diagnose.doubling import doubled
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import _sharpest
@@ -219,3 +220,19 @@ def test_a_law_whose_freed_parameters_stall_is_fitted_with_derivatives_of_its_ow
         name = "load.flange.unbalance.psi"
         assert name not in plain.problem.names
         assert found.estimate.values[name] == pytest.approx(ANCHOR, abs=0.02)
+
+
+@pytest.mark.slow
+def test_unused_runs_begin_where_the_last_model_wants_them(tmp_path: Path) -> None:
+    """Not where the one before did, which lacked the second law: their start angles are 0.1 rad."""
+
+    def law(w: float, theta: float, t: float) -> float:
+        return 0.03 * math.tanh(w / 2e-3) + 0.05 * math.sin(theta)
+
+    problem = built.problem(tmp_path, law, 2.0, names=tuple(disc.RUNS), unstable=True, angle=0.1)
+    found = diagnose(problem, law=False)
+    assert found.verdict == "effect_found"
+    assert {item.effect for item in found.answer.laws} == {"coulomb", "unbalance"}
+    for run in problem.chosen("validation"):
+        # a few deviations of an angle that a run of 2 s tells to half a thousandth
+        assert found.start_values()[run.name]["angle"] == pytest.approx(0.1, abs=2e-3)

@@ -1,0 +1,95 @@
+"""Rivals in tables of models: many of them, special cases in sets, and laws that are one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.diagnose.facts import Comparison, Gain, Law, Model, Table, Value
+from cosim.diagnose.linear import score
+from cosim.diagnose.models import LEVEL
+from cosim.diagnose.power import POWER, power
+from cosim.diagnose.rounds import Round
+from cosim.diagnose.table import comparable
+from cosim.diagnose.verdict import decide
+from tests.diagnose import built
+from tests.diagnose.test_verdict import COUNT, FAR, law, model, table
+
+NOTHING = Gain(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("count", [0, 10, 12, 20])
+def test_sets_without_a_name_do_not_keep_rivals_from_being_compared(count: int) -> None:
+    """Three laws each, better by a little, of which none was left out to see what it is without."""
+    named = [FAR, model(law("coulomb")), model(law("delay", "gearbox.flange_a"))]
+    sets = []
+    for number in range(count):
+        three = [law("coulomb", "load.flange"), law("cogging"), law(f"viscous_{number}")]
+        one = model(*(replace(item, missed=None) for item in three), gain=30.0)
+        sets.append(replace(one, gain=Gain(1000.0, 500.0, 20.0, 20.0, 3.0)))
+    whole = table(*named, *sets)
+    assert {1, 2} <= set(comparable(whole))
+    found = decide(replace(whole, comparisons=(Comparison(1, 2, NOTHING),)))
+    assert found.kind == "confounded"
+
+
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_special_case_counts_by_its_own_law_also_beside_a_large_one(beside: bool) -> None:
+    """Symmetric friction is 1000 nats worse in fitted and in unused runs, of a million."""
+    noise = -0.5 * COUNT
+    bound = Value("a", "1", 1.0, 0.9, 1.0, -1.0, 1.0, True)
+    general = law("asymmetric_coulomb", fitted=1500.0, gain=1500.0, own=2, extra=(bound,),
+                  contains=("coulomb",))  # fmt: skip
+    special = law("coulomb", fitted=500.0, gain=500.0)
+    large = (law("cogging", fitted=5e5, gain=5e5),) if beside else ()
+
+    def one(laws: tuple[Law, ...], likelihood: float, free: int) -> Model:
+        gain = Gain(likelihood + 6e5, likelihood + 6e5, 50.0, 50.0, 9.0) if laws else None
+        return replace(model(*laws, rms=1.0 if laws else 16.0), fitted=likelihood,
+                       unused=likelihood, free=free, gain=gain)  # fmt: skip
+
+    models = (
+        one((), noise - 1500.0 - 5e5 * beside, 9), one((*large, general), noise, 12),
+        one((*large, special), noise - 1000.0, 11),
+    )  # fmt: skip
+    worse = Comparison(1, 2, Gain(-1000.0, -1000.0, -30.0, -30.0, 1.0))
+    found = decide(replace(table(*models), comparisons=(worse,)))
+    assert found.kind == "effect_found"
+    assert {item.effect for item in found.laws} == {general.effect, *(x.effect for x in large)}
+
+
+def test_what_is_one_with_a_rival_is_told_with_it() -> None:
+    """Also if it was not fitted: it may be what is there."""
+    rival = law("bias", "log.m", twins=("coulomb at gearbox.flange_a",))
+    rivals: Table = table(FAR, model(law("gain", "log.m")), model(rival), alike=((1, 2),))
+    found = decide(rivals)
+    assert found.kind == "confounded"
+    assert found.others == (("bias at log.m",), ("coulomb at gearbox.flange_a",))
+    assert "coulomb at gearbox.flange_a" in found.reason
+    assert [item["effects"] for item in found.to_dict()["alternatives"]] == [
+        ["bias at log.m"], ["coulomb at gearbox.flange_a"],
+    ]  # fmt: skip
+
+
+def test_what_is_told_to_be_detectable_is_detected_as_often_as_told(tmp_path: Path) -> None:
+    """Scores of few blocks have the tails of Student's t, and of laws with a phase another law."""
+    with built.rig(tmp_path, lambda w, theta, t: 0.0, seconds=4.0) as rig:
+        rig.search.known = [rig.candidate(e) for e in ("quadratic_drag", "unbalance")]
+        found, stack = rig.search.scored(rig.base), rig.search.fitting
+    random = np.random.default_rng(1)
+    freedom, tests, seen = 10, 100, []
+    for item in found.signatures:
+        change = item.rest.astype(np.float64)
+        for _ in range(50):  # each promise is made from one noise, and kept in others
+            drawn = score(change, random.standard_normal(stack.size), stack, freedom)
+            one = Round(found.base, [replace(item, score=drawn)], {}, ("another",) * (tests - 1))
+            told = power(one, stack)[item.candidate.label]["smallest_detectable"]
+            for _ in range(10):
+                residual = random.standard_normal(stack.size) + change * told / abs(item.value)
+                got = score(change, residual, stack, freedom)
+                chance = np.exp(-0.5 * got.z**2) if item.probe.mix else got.p_value
+                seen.append(chance * tests < LEVEL)
+    assert np.mean(seen) == pytest.approx(POWER, abs=0.1)
