@@ -16,15 +16,11 @@ from ..errors import ScenarioError, UnitError
 from ..spec.units import Unit, parse
 from .parts import COINCIDENT
 from .scales import known, per_second, scaled, zeroed
+from .stamps import Clocks, apart, check_rising, check_span, with_times
 
 Vector = NDArray[np.float64]
 GAP = 3.0
 """Intervals of a clock longer than this many usual ones are gaps."""
-EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
-"""Times since 1970 from the first on are in the unit of the second [s]: what counts seconds reaches
-1e11 in the year 5138, and what counts milliseconds was there in 1973."""
-LONG = 20.0
-"""A clock that spans more than so many times its samples at its usual interval has jumped."""
 UNIT_LENGTH, SAME_LENGTH = 0.05, 0.01
 """Quaternions may miss the length 1 by the first, and lengths may differ from each other by the
 second (a fixed-point format, rounded), and still turn by what they say once normalised."""
@@ -57,32 +53,33 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     """
     entries = table.get("columns", {})
     main = str(table.get("time", "time"))
-    clocks = _Clocks(log, main)
-    log, clock = _with_times(log, main, clocks(main))
+    clocks = Clocks(log, main)
+    told = entries.get("time", {})
+    told = told if str(told.get("source", "time")) == main and not OTHER & told.keys() else {}
+    if told:
+        _tell(log, {**told, "source": main}, clocks, f"{path}: column time")
+    log, clock = with_times(log, main, clocks(main))
     time = clock
     if "resample" in table:
         interval = float(table["resample"])
-        _check_span(log, main, clock)
+        check_span(log, main, clock)
         time = clock[0] + interval * np.arange(
             int((clock[-1] - clock[0]) / interval + COINCIDENT) + 1
         )
-    columns: dict[str, Vector] = dict(log.columns)
+    columns: dict[str, Vector] = {} if "resample" in table else dict(log.columns)
+    columns["time"] = time
     own: dict[str, tuple[Vector, Vector]] = {}
-    if "resample" in table:
-        columns = {"time": time}
-    elif main == "time" or "time" not in columns:
-        columns["time"] = time
     units = dict(log.units)
+    if told:
+        units["time"] = "s"
     for pattern, entry in entries.items():
         for i, name in enumerate(expand(pattern), 1):
+            if told and name == "time":
+                continue
             where = f"{path}: column {name}"
             item = {**entry, "source": str(entry.get("source", name)).replace("{}", str(i))}
             source, target = _units(log, item, units.get(name, ""), where)
-            gain, offset = scaled(
-                source, target, item.get("scale"), where, "scale",
-                f"say from = {source.symbol if source else ''!r} if it does not, or "
-                f"from = {target.symbol if target else ''!r} if it does",
-            )  # fmt: skip
+            gain, offset = _scaled(source, target, item, where)
             turn = _turn(item, target, gain, where)
             values = _ends(log, item, time, turn, where) if "ends" in entry else _column(
                 log, item, clocks, time, clock, turn, where
@@ -90,10 +87,10 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
             values = _filtered(time, values, entry, where)
             offset = zeroed(offset, float(entry.get("offset", 0.0)))
             columns[name] = values * gain + offset
-            if (held := _held(log, item, clocks)) is not None and "resample" not in table:
+            if (held := _held(item, clocks)) is not None and "resample" not in table:
                 own[name] = held[0], held[1] * gain + offset
             units[name] = target.symbol if target else ""
-    clock = columns.get("time", time)
+    clock = columns["time"]
     first, last = log.values.get("samples", (1, clock.size))
     part = slice(int(first) - 1, int(last))
     # those of another length are told apart from such as do not exist
@@ -114,106 +111,59 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     return replace(log, columns=columns, units=units, own=own)
 
 
-def _held(log: Log, entry: Mapping[str, Any], clocks: _Clocks) -> tuple[Vector, Vector] | None:
+def _tell(log: Log, entry: Mapping[str, Any], clocks: Clocks, where: str) -> None:
+    """Make the main clock as its entry does, in seconds.
+
+    Raises:
+        ScenarioError, UnitError: the entry does not fit, or makes no time.
+    """
+    source, target = _units(log, entry, "", where)
+    if target is not None and target.exponents != parse("s").exponents:
+        raise UnitError(f"{where}: is the main clock, and its unit {target.symbol!r} is no time")
+    gain, _ = _scaled(source, target, entry, where)
+    factor: float | None = gain * (target.factor if target else 1.0)
+    if source is None and "scale" not in entry and (clocks.factor is not None or target is None):
+        factor = clocks.factor  # the entry names a unit at most, and the clock's own is known
+    turn = _turn(entry, target, gain, where)
+    raw = log[clocks.main]
+    clocks.tell(_column(log, entry, clocks, raw, raw, turn, where), factor)
+
+
+OTHER = {"time", "late", "ends", "quaternion", "lowpass", "derivative"}
+"""Keys of a column that is no main clock: it is made of another one, or filtered."""
+
+
+def _scaled(
+    source: Unit | None, target: Unit | None, entry: Mapping[str, Any], where: str
+) -> tuple[float, float]:
+    """Gain and offset that make a column of its source."""
+    return scaled(
+        source, target, entry.get("scale"), where, "scale",
+        f"say from = {source.symbol if source else ''!r} if it does not, or "
+        f"from = {target.symbol if target else ''!r} if it does",
+    )  # fmt: skip
+
+
+def _held(entry: Mapping[str, Any], clocks: Clocks) -> tuple[Vector, Vector] | None:
     """Times and values of a column that is held on a clock of its own; None of any other."""
-    if not entry.get("hold") or {"unwrap", "limit", "despike", "fresh", "gap", "ends"} & set(entry):
+    if not entry.get("hold") or MAKING & entry.keys():
         return None
     source = str(entry["source"])
     name = str(entry.get("time", clocks.own(source)))
     if name == clocks.main:
         return None
-    values, times = log[source], clocks(name) - float(entry.get("late", 0.0))
+    values, times = clocks.log[source], clocks(name) - float(entry.get("late", 0.0))
     good = np.isfinite(values) & np.isfinite(times)
     return times[good], values[good]
 
 
-class _Clocks:
-    """Clocks of a log: in seconds where the main one's unit is known, else in its own.
-
-    A unit is known from the column's head, or as that of times since 1970.
-
-    Args:
-        log: with the clocks.
-        main: name of the main one.
-    """
-
-    def __init__(self, log: Log, main: str) -> None:
-        self.log, self.main = log, main
-        self.factor = self._factor(main)
-
-    def _factor(self, name: str) -> float | None:
-        """[s] of one of a clock's units, None if that is not known."""
-        unit = self.log.units.get(name, "")
-        if unit:
-            found = known(unit, f"{self.log.name}: clock {name}")
-            if found.exponents != parse("s").exponents:
-                raise UnitError(
-                    f"{self.log.name}: clock {name!r} is in {unit!r} (SI {found.dimension()}), "
-                    "which is no time; name another column with time"
-                )
-            return found.factor
-        values = self.log[name]
-        size = abs(float(np.nanmedian(values))) if np.isfinite(values).any() else 0.0
-        size += self.log.origins.get(name, 0)
-        return next((factor for least, factor in EPOCHS if size >= least), None)
-
-    def __call__(self, name: str) -> Vector:
-        """A clock."""
-        values = self.log[name]
-        if self.factor is None:
-            return values
-        factor = self._factor(name)
-        return values * (self.factor if factor is None else factor)
-
-    def own(self, source: str) -> str:
-        """The clock of a column: of several files, that of its own with the main clock's name."""
-        file, dot, _ = source.rpartition(".")
-        mine = f"{file}{dot}{self.main.rpartition('.')[2]}"
-        return mine if dot and mine in self.log.columns else self.main
-
-
+MAKING = {
+    "unwrap", "limit", "despike", "fresh", "gap", "ends", "quaternion", "lowpass", "derivative",
+}  # fmt: skip
+"""Keys with which something else is made of a column than its values at other times."""
 LATEST = 1e6
 """[s] A log that begins later than this, or before 0, counts from its own beginning: a master that
 counts steps from there would lose digits, and rows before 0 would be lost."""
-
-
-def _with_times(log: Log, main: str, clock: Vector) -> tuple[Log, Vector]:
-    """The log without the rows that have no time."""
-    good = np.isfinite(clock)
-    if good.all() and clock.size:
-        return log, clock
-    if not good.any():
-        raise ScenarioError(f"{log.name}: its clock {main!r} has no values; {_rows(clock.size)}")
-    columns = {
-        name: values[good] if values.shape == good.shape else values
-        for name, values in log.columns.items()
-    }
-    lost = int(np.count_nonzero(~good))
-    note = f"{lost} rows without a time in {main!r} are left out"
-    return replace(log, columns=columns, notes=(*log.notes, note)), clock[good]
-
-
-def _rows(count: int) -> str:
-    return "the log has no rows" if not count else f"none of its {count} cells is a number"
-
-
-def _check_span(log: Log, main: str, clock: Vector) -> None:
-    """Refuse to fill a clock that has jumped with samples.
-
-    Raises:
-        ScenarioError: with where it jumped.
-    """
-    steps = np.diff(clock)
-    if not steps.size:
-        return
-    usual = float(np.median(steps))
-    if not usual > 0.0 or clock[-1] - clock[0] > LONG * usual * clock.size:
-        at = int(np.argmax(np.abs(steps)))
-        raise ScenarioError(
-            f"{log.name}: clock {main!r} jumps by {steps[at]:.6g} after row {at + 1} (usual "
-            f"interval {usual:.4g}), so it cannot be resampled; take the rows on one side with "
-            "samples"
-        )
 
 
 def _units(
@@ -277,7 +227,7 @@ def _element(log: Log, item: str, where: str) -> float:
 def _column(
     log: Log,
     entry: Mapping[str, Any],
-    clocks: _Clocks,
+    clocks: Clocks,
     time: Vector,
     clock: Vector,
     turn: float,
@@ -285,9 +235,10 @@ def _column(
 ) -> Vector:
     """A column on the main clock."""
     source = str(entry["quaternion"][0] if "quaternion" in entry else entry["source"])
-    values = _yaw(log, entry["quaternion"], where) if "quaternion" in entry else log[source]
     name = str(entry.get("time", clocks.own(source)))
     own = clock if name == clocks.main else clocks(name)
+    log = log if name == clocks.main else clocks.log  # its rows need no time of the main clock
+    values = _yaw(log, entry["quaternion"], where) if "quaternion" in entry else log[source]
     if own.shape != values.shape:
         raise ScenarioError(f"{where}: " + apart(log, source, name, own.size))
     if name != clocks.main:
@@ -314,33 +265,6 @@ def _column(
         return values
     longest = float(entry["gap"]) if "gap" in entry else None
     return _resampled(time, own, values, longest=longest, hold=bool(entry.get("hold", False)))
-
-
-def apart(log: Log, column: str, clock: str, count: int) -> str:
-    """The sentence for a column whose clock has another length."""
-    return (
-        f"{log.name} has {log[column].size} values of {column!r}, but {count} times of its clock "
-        f"{clock!r}; name its own clock with time in [columns], or mend the file"
-    )
-
-
-def check_rising(log: Log, name: str, clock: Vector, twice: bool = False) -> None:
-    """Refuse a clock that goes back or, unless a time may be there twice, stands still.
-
-    Raises:
-        ScenarioError: with the row, and how often.
-    """
-    steps = np.diff(clock[np.isfinite(clock)])
-    bad = np.flatnonzero(steps < 0.0 if twice else steps <= 0.0)
-    if bad.size:
-        at = int(bad[0])
-        what = "stands still" if steps[at] == 0.0 else f"goes back by {-steps[at]:.6g}"
-        raise ScenarioError(
-            f"{log.name}: clock {name!r} {what} after row {at + 1}"
-            + (f", and so in {bad.size} places" if bad.size > 1 else "")
-            + "; leave out rows that are there twice and sort the others, or take the rows on one "
-            "side with samples"
-        )
 
 
 def _wraps(values: Vector, turn: float) -> bool:
@@ -410,7 +334,7 @@ def _yaw(log: Log, names: list[str], where: str) -> Vector:
 def _resampled(
     times: Vector, own: Vector, values: Vector, *, longest: float | None, hold: bool
 ) -> Vector:
-    """Values of another clock; NaN outside it and where it has gaps.
+    """Values of another clock; NaN outside it and within its gaps.
 
     Args:
         times: wanted.
@@ -433,10 +357,12 @@ def _resampled(
         return np.where(times - own[np.maximum(place, 0)] > longest, np.nan, held)
     result = np.interp(times, own, values, left=np.nan, right=np.nan)
     place = np.clip(np.searchsorted(own, times), 1, own.size - 1)
-    if longest is None:
-        longest = GAP * float(np.median(np.diff(own)))
-    gap = own[place] - own[place - 1] > longest
-    return np.where(gap, np.nan, result)
+    usual = float(np.median(np.diff(own)))
+    gap = own[place] - own[place - 1] > (GAP * usual if longest is None else longest)
+    lost = gap | np.isnan(result)
+    nearest = place - (times - own[place - 1] < own[place] - times)
+    measured = np.abs(own[nearest] - times) <= COINCIDENT * usual
+    return np.where(lost, np.where(measured, values[nearest], np.nan), result)
 
 
 def _filtered(times: Vector, values: Vector, entry: Mapping[str, Any], where: str) -> Vector:

@@ -23,7 +23,7 @@ from .between import Parts, between
 from .checks.finding import Finding, Source, check_allowed
 from .checks.undriven import check_undriven, mappings
 from .clocks import bounds, check_clock, clock_unit, masked
-from .columns import ITEM, apart, expand
+from .columns import ITEM, expand
 from .counts import steady, whole_counts
 from .mapped_logs import MappedLogs
 from .model import Model
@@ -32,6 +32,7 @@ from .parts import CLOCK, COINCIDENT, COLUMN, Channel, MeasuredRun, Parameter, c
 from .problem import Problem
 from .recorder import check_column, column_unit
 from .scales import known, per_second, scaled, zeroed
+from .stamps import apart
 from .steps import steps
 
 Vector = NDArray[np.float64]

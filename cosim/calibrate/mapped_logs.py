@@ -15,9 +15,10 @@ from ..data.segments import pieces, windows
 from ..errors import ScenarioError, listing
 from .checks.finding import Finding
 from .checks.smooth import LOUD, noise
-from .columns import apart, check_rising, expand, prepared
+from .columns import expand, prepared
 from .parts import COINCIDENT
 from .schema import RUN, strict
+from .stamps import apart, check_rising
 
 WHOLE = 0.25
 """Share of a count up to which noise is rounded off: half a count is two deviations and more."""

@@ -203,7 +203,7 @@ def _column(
         if drives:
             keys["hold"] = True
         if behind := plan.behind(column.part):
-            keys["late"] = _nice(behind / _unit_of_main(runs[0].parts[plan.main], plan))
+            keys["late"] = _nice(behind)
             remarks.append(f"Its clock is {abs(behind):g} s {'late' if behind > 0.0 else 'early'} "
                            f"against that of {plan.main}, as given.")  # fmt: skip
     stated = part.report.topic.log.units.get(column.name) == unit.unit or (
@@ -227,13 +227,6 @@ def _column(
             if finding.column == column.name and finding.kind in ("spikes", "saturated"):
                 remarks.append(f"Run {run.name}: {finding.text}.")
     return ColumnEntry(name, keys, " ".join(remarks))
-
-
-def _unit_of_main(part: Part, plan: Layout) -> float:
-    """[s] of a unit of the main clock, as the mapping reads it: seconds where it knows them."""
-    if not plan.whole or known_clock(part):
-        return 1.0
-    return parse(part.report.clock.unit.unit or "s").factor
 
 
 def _channel(variable: str, match: Match, runs: Sequence[Run]) -> Entry:

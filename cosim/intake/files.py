@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.columns import EPOCHS
+from ..calibrate.stamps import EPOCHS
 from ..files import atomic, make_folder, writing
 from ..spec.distribution import has
 from ..spec.units import parse

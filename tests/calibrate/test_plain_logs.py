@@ -26,7 +26,7 @@ time = "t_ms"
 time = { source = "t_ms", scale = 1e-3 }
 speed_set = { source = "cmd_rpm", scale = 0.10471975511965977, unit = "rad/s" }
 current = { source = "i_mA", scale = -1e-3, unit = "A" }
-angle = { source = "deg", time = "t_deg", late = 5.0, scale = 0.017453292519943295 }
+angle = { source = "deg", time = "t_deg", late = 5e-3, scale = 0.017453292519943295 }
 
 [[parameter]]
 name = "K_t"
