@@ -69,7 +69,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     columns: dict[str, Vector] = {} if "resample" in table else dict(log.columns)
     columns["time"] = time
     own: dict[str, tuple[Vector, Vector]] = {}
-    units = dict(log.units)
+    units, noise = dict(log.units), dict(log.noise)
     if told:
         units["time"] = "s"
     for pattern, entry in entries.items():
@@ -90,6 +90,8 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
             if (held := _held(item, clocks)) is not None and "resample" not in table:
                 own[name] = held[0], held[1] * gain + offset
             units[name] = target.symbol if target else ""
+            noise.pop(name, None)
+            noise.update(_noise(log, item, name, gain))
     clock = columns["time"]
     first, last = log.values.get("samples", (1, clock.size))
     part = slice(int(first) - 1, int(last))
@@ -108,7 +110,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
         raw = time[part]
         rate = (clock[-1] - clock[0]) / (raw[-1] - raw[0])
         own = {one: (clock[0] + rate * (t - raw[0]), v) for one, (t, v) in own.items()}
-    return replace(log, columns=columns, units=units, own=own)
+    return replace(log, columns=columns, units=units, noise=noise, own=own)
 
 
 def _tell(log: Log, entry: Mapping[str, Any], clocks: Clocks, where: str) -> None:
@@ -142,6 +144,20 @@ def _scaled(
         f"say from = {source.symbol if source else ''!r} if it does not, or "
         f"from = {target.symbol if target else ''!r} if it does",
     )  # fmt: skip
+
+
+def _noise(log: Log, entry: Mapping[str, Any], name: str, gain: float) -> dict[str, float]:
+    """What the sheet says about the noise of a column that is made, in its unit; or nothing."""
+    if name in log.noise and name not in log.columns:  # the sheet tells of what is made
+        return {name: log.noise[name]}
+    stated = log.noise.get(str(entry["source"]))
+    if stated is None or MADE & {key for key, value in entry.items() if value}:
+        return {}
+    return {name: abs(gain) * stated}
+
+
+MADE = {"ends", "quaternion", "derivative"}
+"""Keys of a column whose noise is not its source's in another unit."""
 
 
 def _held(entry: Mapping[str, Any], clocks: Clocks) -> tuple[Vector, Vector] | None:

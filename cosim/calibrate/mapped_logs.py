@@ -12,11 +12,13 @@ import numpy as np
 
 from ..data.logs import DataSet, Log, LoggedRun
 from ..data.segments import pieces, windows
-from ..errors import ScenarioError, listing
+from ..errors import ScenarioError, UnitError, listing
+from ..spec.units import Unit
 from .checks.finding import Finding
 from .checks.smooth import LOUD, noise
 from .columns import expand, prepared
 from .parts import COINCIDENT
+from .scales import known
 from .schema import RUN, strict
 from .stamps import apart, check_rising
 
@@ -56,10 +58,13 @@ class MappedLogs:
     ) -> None:
         self.path, self.data, self.table = path, data, table
         self.findings: list[Finding] = []
-        self.noise = {
-            column: sigma for name, sigma in data.noise.items() for column in expand(name)
-        }
-        self.units = {column: unit for name, unit in data.units.items() for column in expand(name)}
+        sheet = {one: unit for name, unit in data.units.items() if unit for one in expand(name)}
+        noise = {one: sigma for name, sigma in data.noise.items() for one in expand(name)}
+        made = {one for name in table.get("columns", {}) for one in expand(name)}
+        # what is made has the unit and noise that the conversion leaves it, none if it has none
+        self.units = {one: unit for one, unit in sheet.items() if one not in made}
+        self.noise = {one: sigma for one, sigma in noise.items() if one not in made}
+        said: dict[str, tuple[str, str]] = {}
         self._carried: dict[str, float] = {}
         self.logs: dict[str, Log] = {}
         self.purposes: dict[str, str] = {}
@@ -71,12 +76,18 @@ class MappedLogs:
                 f"{path}: run {run.name}",
                 (),
             )
-            for name, part in pieces(data.log(run.name)):
+            whole = data.log(run.name)
+            whole = replace(whole, units={**whole.units, **sheet}, noise=noise)
+            for name, part in pieces(whole):
+                heads = {one: unit for one, unit in part.units.items() if unit}
+                part = replace(part, units={**sheet, **heads}, noise={**noise, **part.noise})
                 log = prepared(part, self.table, self.path)
                 check_rising(log, "time", log.time)
                 self._count_gaps(name, log)
                 self.findings += [Finding("note", "reading", name, "", note) for note in log.notes]
+                self._check_units(name, log, said)
                 self.units.update({column: unit for column, unit in log.units.items() if unit})
+                self.noise.update(log.noise)
                 for one, window in windows(name, log, lead):
                     self.logs[one], self.purposes[one] = self._unbroken(one, window), run.purpose
 
@@ -87,14 +98,43 @@ class MappedLogs:
             for pattern, entry in self.table.get("columns", {}).items()
             for i, one in enumerate(expand(pattern), 1)
         }
-        channels = self.table["channels"].items()
-        used = [str(e.get("column", one)) for key, e in channels for one in expand(key)]
-        for column in dict.fromkeys([*used, *self.sources()]):
+        for column in self._used():
             gaps = log.gaps.get(made.get(column, column))
             if gaps is not None:
                 severity = "warning" if gaps.row else "note"
                 text = f"{gaps}: they are gaps"
                 self.findings.append(Finding(severity, "gaps", name, column, text))
+
+    def _used(self) -> list[str]:
+        """Columns that channels read and that drive inputs."""
+        channels = self.table["channels"].items()
+        used = [str(e.get("column", one)) for key, e in channels for one in expand(key)]
+        return list(dict.fromkeys([*used, *self.sources()]))
+
+    def _check_units(self, name: str, log: Log, said: dict[str, tuple[str, str]]) -> None:
+        """Refuse a column that is in another unit than in a run before.
+
+        Args:
+            name, log: of the run.
+            said: columns of the runs before -> the first of them that says a unit, and that.
+
+        Raises:
+            ScenarioError: with both runs and units.
+            UnitError: a unit is not known.
+        """
+        for column in self._used():
+            unit = log.units.get(column, "")
+            if not unit:
+                continue
+            first, other = said.setdefault(column, (name, unit))
+            where = f"{self.path}: run {name}: column {column}"
+            if unit == other or _same(known(unit, where), known(other, where)):
+                continue
+            raise UnitError(
+                f"{self.path}: column {column!r} is in {other!r} in run {first}, but in {unit!r} "
+                f"in run {name}; give its unit in [columns] ({column} = {{ unit = {other!r} }}), "
+                "which converts each run from its own"
+            )
 
     def _chosen(self, wanted: Mapping[str, Any]) -> list[LoggedRun]:
         """The runs with these entries."""
@@ -205,3 +245,8 @@ class MappedLogs:
             for one, values in log.columns.items()
         }
         return replace(log, columns=columns)
+
+
+def _same(one: Unit, other: Unit) -> bool:
+    """Whether two units are one, whatever they are called."""
+    return replace(one, symbol="") == replace(other, symbol="")

@@ -52,14 +52,25 @@ def pieces(log: Log) -> Iterator[tuple[str, Log]]:
 
 
 def _with_prefix(log: Log, prefix: str) -> Log:
-    columns = {
-        name.removeprefix(prefix): values
-        for name, values in log.columns.items()
-        if name.startswith(prefix)
-    }
-    if not columns:
+    """The columns whose names begin so, and what is said about them, without it.
+
+    Raises:
+        ScenarioError: there is none such.
+    """
+
+    def own(items: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name.removeprefix(prefix): item
+            for name, item in items.items() if name.startswith(prefix)
+        }  # fmt: skip
+
+    columns, texts = own(log.columns), own(log.texts)
+    if not columns and not texts:
         raise ScenarioError(f"{log.name}: no column begins with {prefix!r}")
-    return replace(log, columns=columns)
+    return replace(
+        log, columns=columns, texts=texts, units=own(log.units), noise=own(log.noise),
+        gaps=own(log.gaps), origins=own(log.origins), exact=own(log.exact),
+    )  # fmt: skip
 
 
 def _wanted(value: float, wish: Any) -> bool:
@@ -98,6 +109,14 @@ def _rows(log: Log) -> Iterator[tuple[int, Log]]:
     single = {name: values for name, values in log.columns.items()
               if values.shape == (count,) and _ROW.fullmatch(name) is None}  # fmt: skip
     time = np.arange(length) * float(log.values["interval"])
+    units = {stem: _unit(log, stem, [i for i, _ in parts]) for stem, parts in tables.items()}
+    noise = {
+        stem: log.noise[f"{stem}_{parts[0][0]}"]
+        for stem, parts in tables.items()
+        if f"{stem}_{parts[0][0]}" in log.noise
+    }
+    units["time"] = "s"
+    log = replace(log, units={**log.units, **units}, noise={**log.noise, **noise})
     for row in range(count):
         own = {name: float(column[row]) for name, column in single.items()}
         if _accepted(log, own):
@@ -105,6 +124,21 @@ def _rows(log: Log) -> Iterator[tuple[int, Log]]:
             columns["time"] = time
             yield row, replace(log, name=f"{log.name} {row}", columns=columns,
                                values={**log.values, **own})  # fmt: skip
+
+
+def _unit(log: Log, stem: str, numbers: list[int]) -> str:
+    """The unit of a table.
+
+    Raises:
+        ScenarioError: its columns have several.
+    """
+    said = {unit for i in numbers if (unit := log.units.get(f"{stem}_{i}", ""))}
+    if len(said) > 1:
+        raise ScenarioError(
+            f"{log.name}: the columns of table {stem!r} are in {' and '.join(sorted(said))}; give "
+            "them one unit"
+        )
+    return next(iter(said), log.units.get(stem, ""))
 
 
 def _each(log: Log, key: str) -> Iterator[tuple[float, Log]]:
