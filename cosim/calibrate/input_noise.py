@@ -7,12 +7,13 @@ input's sample k over their noise, the residuals of a right model have the covar
     C = 1 + A A',    A = sigma (g_1, g_2, ...)
 
 and `whitening` makes them white. A is taken once, at the declared system's nominal values, and is
-the same for all models that are compared: the determinant of C cancels.
+the same for all models that are compared: the determinant of C cancels. Inputs that one column
+drives share its noise: they are moved at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -49,45 +50,42 @@ def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
         CosimError: it cannot be simulated.
     """
     problem = simulator.problem
-    if not any(sigma > 0.0 for run in problem.runs for sigma in run.noisy.values()):
+    if not any(sigma for run in problem.runs for sigma in run.noisy.values()):
         return simulator, []
     found = simulator.spread(lambda run: _noise(simulator, run), problem.runs)
-    largest: dict[str, tuple[float, float, str]] = {}
+    largest: dict[tuple[str, ...], tuple[float, float, str]] = {}
     runs = []
     for run, (noise, sizes) in zip(problem.runs, found, strict=True):
         runs.append(replace(run, noise=noise))
-        for target, (size, channel) in sizes.items():
-            if size > largest.get(target, (0.0, 0.0, ""))[0]:
-                largest[target] = size, run.noisy[target], channel
+        for targets, (size, channel) in sizes.items():
+            if size > largest.get(targets, (0.0, 0.0, ""))[0]:
+                largest[targets] = size, abs(run.noisy[targets[0]]), channel
     findings = [
         Finding(
-            "note", "input", "", target,
+            "note", "input", "", ", ".join(targets),
             f"its noise of {sigma:.3g} moves {channel} by up to {size:.3g} times that channel's "
             "own; intervals and tests count it",
         )
-        for target, (size, sigma, channel) in largest.items() if size**2 > LEAST
+        for targets, (size, sigma, channel) in largest.items() if size**2 > LEAST
     ]  # fmt: skip
     return simulator.of(problem.changed(runs=runs)), findings
 
 
 def _noise(
     simulator: Simulator, run: MeasuredRun
-) -> tuple[InputNoise | None, dict[str, tuple[float, str]]]:
-    """Directions of a run; input -> the largest deviation that it gives a channel, and which."""
+) -> tuple[InputNoise | None, dict[tuple[str, ...], tuple[float, str]]]:
+    """Directions of a run; inputs -> the largest deviation that they give a channel, and which."""
     if not run.noisy:
         return None, {}
     channels = [c.name for c in simulator.problem.channels]
     parts, sizes = [], {}
     beyond = np.zeros(run.data.shape)
-    for target, sigma in run.noisy.items():
-        table = run.inputs[target]
-        if not isinstance(table, Table) or not sigma > 0.0:
-            continue
-        part, bridges = _columns(simulator, run, target, table, sigma)
+    for tables in _shared(run):
+        part, bridges = _columns(simulator, run, tables)
         beyond += bridges
         spread = np.sqrt(np.sum(part**2, axis=2))
         place = np.unravel_index(int(np.argmax(spread)), spread.shape)
-        sizes[target] = float(spread[place]), channels[int(place[1])]
+        sizes[tuple(tables)] = float(spread[place]), channels[int(place[1])]
         parts.append(part)
     if not parts:
         return None, sizes
@@ -95,35 +93,62 @@ def _noise(
     return InputNoise.of(np.concatenate(parts, axis=2) * weights[:, :, None], weights), sizes
 
 
+def _shared(run: MeasuredRun) -> list[dict[str, Table]]:
+    """The noisy inputs of a run, by the column that drives them.
+
+    Those that take one column in different ways (`hold` and `window`) have its noise in different
+    ways, and count one by one.
+    """
+    found: dict[tuple[str, int, bytes], dict[str, Table]] = {}
+    for target, sigma in run.noisy.items():
+        table = run.inputs[target]
+        if isinstance(table, Table) and sigma:
+            key = table.text, _parts(table), table.times.tobytes()
+            found.setdefault(key, {})[target] = table
+    return list(found.values())
+
+
+def _parts(table: Table) -> int:
+    """Values of a table that share one noise."""
+    return table.parts if isinstance(table, Parts) else 1
+
+
 def _columns(
-    simulator: Simulator, run: MeasuredRun, target: str, table: Table, sigma: float
+    simulator: Simulator, run: MeasuredRun, tables: Mapping[str, Table]
 ) -> tuple[Vector, Vector]:
-    """What noise of one input adds to residuals: (samples, channels, blocks of its samples).
+    """What noise of one column adds to residuals: (samples, channels, blocks of its samples).
 
     And the variance over the noise's of what these blocks leave of each sample.
+
+    Args:
+        simulator, run: of the problem.
+        tables: of all inputs that the column drives.
     """
     problem = simulator.problem
-    count = int(np.searchsorted(table.times, run.times[-1], "right"))
-    each = table.parts if isinstance(table, Parts) else 1  # values that share one noise
+    first = next(iter(tables.values()))
+    count = int(np.searchsorted(first.times, run.times[-1], "right"))
+    each = _parts(first)
     samples = max(1, -(-count // (each * BLOCKS)))
     width = each * samples
     blocks = np.arange(0, count, width)
     nodes = np.unique(np.linspace(0, blocks.size - 1, NODES).round().astype(int))
-    change = LARGE * sigma
 
     def moved(block: int) -> dict[str, Table]:
-        values = table.values.copy()
-        values[blocks[block] : blocks[block] + width] += change
-        other = Table(
-            table.times, values, unit=table.unit, interpolation=table.interpolation,
-            text=table.text, extend=table.extend,
-        )  # fmt: skip
-        return {target: other}
+        found = {}
+        for target, table in tables.items():
+            values = table.values.copy()
+            values[blocks[block] : blocks[block] + width] += LARGE * run.noisy[target]
+            found[target] = Table(
+                table.times, values, unit=table.unit, interpolation=table.interpolation,
+                text=table.text, extend=table.extend,
+            )  # fmt: skip
+        return found
 
     base, *rest = simulator.driven(problem.nominal, run, [{}, *(moved(int(k)) for k in nodes)])
-    one = sigma / np.sqrt(samples) / change / problem.sigma
-    responses = [np.where(np.isfinite(run.data), (r - base) * one, 0.0) for r in rest]
-    begins = np.searchsorted(run.times, table.times[blocks])
+    one = 1.0 / np.sqrt(samples) / LARGE / problem.sigma
+    known = np.isfinite(run.data) & np.isfinite(base)  # not what a clock moves out of the run
+    responses = [np.where(known, (r - base) * one, 0.0) for r in rest]
+    begins = np.searchsorted(run.times, first.times[blocks])
     between = _better(responses, begins[nodes])
     found = np.empty((*run.data.shape, blocks.size))
     for block in range(blocks.size):

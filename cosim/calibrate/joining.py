@@ -15,7 +15,6 @@ from ..data.signals import Table
 from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
 from ..master.master import Master
-from ..reading.schema import shown
 from ..spec.units import Unit
 from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
@@ -23,8 +22,9 @@ from .between import Parts, between
 from .checks.finding import Finding, Source, check_allowed
 from .checks.undriven import check_undriven, mappings
 from .clocks import bounds, check_clock, clock_unit, masked
-from .columns import ITEM, expand
+from .columns import expand
 from .counts import steady, whole_counts
+from .entries import lookup
 from .mapped_logs import MappedLogs
 from .model import Model
 from .named import named, readings
@@ -36,25 +36,6 @@ from .stamps import apart
 from .steps import steps
 
 Vector = NDArray[np.float64]
-
-
-def lookup(values: Mapping[str, Any], key: str, where: str) -> float:
-    """A number among entries; `key` may be an element, `initial_pose[0]`.
-
-    Raises:
-        ScenarioError: there is none.
-    """
-    match = ITEM.fullmatch(key)
-    if match is None or match["key"] not in values:
-        raise ScenarioError(f"{where}: there is no entry {key!r}; {listing(values, key)}")
-    value = values[match["key"]]
-    try:
-        return float(value[int(match["index"])] if match["index"] else value)
-    except (TypeError, ValueError, IndexError, OverflowError):
-        raise ScenarioError(
-            f"{where}: entry {key!r} is no number, it reads {shown(value)}; name an element as "
-            f"{match['key']}[0]"
-        ) from None
 
 
 def snapped(times: Vector, step: float) -> Vector:
@@ -84,7 +65,8 @@ class Joined(MappedLogs):
         for options in (self.options, {**self.options, **search.options}):
             with within(str(self.path)):  # what the master refuses is said before data are read
                 Master(self.system, self.algorithm, search.step, options=options).compile([], [])
-        constants: dict[str, float] = {}
+        self.constants: dict[str, float] = {}
+        constants = self.constants
         for name, value in flatten(table.get("parameters", {})).items():
             if isinstance(value, list):
                 constants.update({f"{name}[{i}]": float(v) for i, v in enumerate(value, 1)})
@@ -106,6 +88,7 @@ class Joined(MappedLogs):
         ]
         if not present:
             raise ScenarioError(f"{self.path}: no channel's column is in the logs")
+        self.channel_units = {channel.name: channel.unit for channel in present}
         stated = [*self.declared(), *self.others()]
         check_parameters(stated)
         self.late = {name: bounds(stated, name) for name in self.logs}
@@ -322,7 +305,7 @@ class Joined(MappedLogs):
         if name.startswith(CLOCK):
             return clock_unit(name)
         if name.startswith(COLUMN):
-            return column_unit(name, {c: self.units.get(of, "") for c, of in self.columns.items()})
+            return column_unit(name, self.channel_units)
         try:
             return self.system.variables(name)[1][0].unit
         except UnknownNameError:
@@ -372,7 +355,11 @@ class Joined(MappedLogs):
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
-        data = masked(log.time[during], data, channels, self.late[name], -lead)
+        set_here = {**self.constants, **starts}.items()
+        late = {n.removeprefix(CLOCK): (v, v) for n, v in set_here if n.startswith(CLOCK)}
+        late |= self.late[name]
+        times = log.time[during]
+        data = masked(times, data, channels, late, float(times[0]) - lead)
         anchor = 0
         for triple in self.table.get("relative", []):
             place = [[c.name for c in channels].index(one) for one in triple]
@@ -384,7 +371,7 @@ class Joined(MappedLogs):
         return MeasuredRun(
             name,
             self.purposes[name],
-            log.time[during] + lead,
+            times + lead,
             data,
             {
                 target: self._input(log, target, column, entry, lead)
@@ -394,7 +381,7 @@ class Joined(MappedLogs):
             log.values,
             lead,
             anchor,
-            {t: abs(self.conversion(t, c, e)[0]) * self.input_noise(c, e)
+            {t: self.conversion(t, c, e)[0] * self.input_noise(c, e)
              for t, c, e in self.drivers()},
         )  # fmt: skip
 

@@ -14,6 +14,7 @@ from ..data.signals import Signal
 from ..errors import ValueRangeError
 from ..fmu.description import Variable
 from ..spec.hints import NO_HINTS, SearchHints
+from ..spec.units import parse
 from .whitening import InputNoise
 
 Vector = NDArray[np.float64]
@@ -166,7 +167,8 @@ class Channel:
         reading = gain * result + offset
         if size := errors.get(WAVE + self.name, 0.0):
             turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
-            reading = reading + size * np.sin(turns * reading + phase)
+            turned = reading * (parse(self.unit).factor if self.unit else 1.0)  # in rad
+            reading = reading + size * np.sin(turns * turned + phase)
         return np.asarray(reading, dtype=np.float64)
 
     def meant(self, data: Vector, errors: Mapping[str, float] = NO_ERRORS) -> Vector:
@@ -249,7 +251,7 @@ class MeasuredRun:
         lead: the simulation begins this much before the first sample [s].
         anchor: sample in whose frame relative poses are given.
         noisy: driven input -> standard deviation of the noise with which it was logged, in the
-            input's unit.
+            input's unit; negative where the input is its column turned round.
         noise: what that adds to residuals, None if nothing (`input_noise.propagated`).
     """
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.columns import expand
-from ..calibrate.joining import Joined, lookup, snapped
+from ..calibrate.entries import lookup
+from ..calibrate.joining import Joined, snapped
 from ..calibrate.mapping import read_joined
 from ..calibrate.parts import MeasuredRun
 from ..calibrate.problem import Problem

@@ -132,6 +132,37 @@ def test_values_that_one_sample_became_share_its_noise(tmp_path: Path) -> None:
     assert spread[1] == pytest.approx(spread[0], rel=0.1)
 
 
+@pytest.mark.parametrize(("gain", "channel", "other"), [(1.0, 0, 2), (-1.0, 2, 0)])
+def test_inputs_that_one_column_drives_share_its_noise(
+    tmp_path: Path, gain: float, channel: int, other: int
+) -> None:
+    """Wheels that err alike move a base ahead and do not turn it; turned round, they turn it."""
+    logged(tmp_path, 3, SIGMA, f"sigma = {SIGMA}")
+    mapping = tmp_path / "dataset.toml"
+    shared = f'column = "left", gain = {gain}'
+    mapping.write_text(mapping.read_text().replace('column = "right"', shared))
+    white, (note,) = propagated(simulator(read_problem(tmp_path), 1))
+    assert note.column == "base.w_l, base.w_r"
+    run = white.problem.runs[0]
+    assert run.noise is not None
+    spread = np.einsum("sck,k->sc", run.noise.basis.astype(np.float64) ** 2, run.noise.variances)
+    # float32 beside the other channel
+    assert spread[-1, channel] > 0.2 and spread[-1, other] < 1e-6 * spread[-1, channel]
+
+
+def test_noise_is_counted_where_a_clock_moves_samples_out_of_a_run(tmp_path: Path) -> None:
+    logged(tmp_path, 3, SIGMA, f"sigma = {SIGMA}")
+    mapping = tmp_path / "dataset.toml"
+    plain = mapping.read_text()
+    mapping.write_text(plain.replace("[parameters]", '[parameters]\n"clock:x" = 0.1', 1))
+    problem = read_problem(tmp_path)
+    (run,) = problem.runs
+    # samples that nobody has masked
+    data = np.where(np.isfinite(run.data), run.data, 0.0)
+    _, notes = propagated(simulator(problem.with_data({"one": data}), 1))
+    assert [note.column for note in notes] == ["base.w_l", "base.w_r"]
+
+
 def test_one_direction_is_taken_off_by_its_variance() -> None:
     factors = np.zeros((4, 1, 1))
     factors[:2, 0, 0] = 3.0
