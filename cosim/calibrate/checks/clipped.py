@@ -66,8 +66,22 @@ def check_clipped(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fi
             text = (
                 f"stands at its {word} value of {quantity(edge, channel.unit, '.6g')} for {count} "
                 f"samples, without the noise that it has elsewhere, where the model goes beyond "
-                f"it (runs {', '.join(runs)}): the sensor or its number ends there; make "
-                "gaps of them with "
-                f"limit = {(1.0 - 1e-6) * abs(edge):.7g} in [columns]"
+                f"it (runs {', '.join(runs)}): the sensor or its number ends there; "
+                + _way(edge, side, channel.unit, columns)
             )
             yield Finding("error", "clipped", "", channel.name, text)
+
+
+def _way(edge: float, side: float, unit: str, columns: Mapping[str, Vector]) -> str:
+    """How to make gaps of the values at a limit: `limit` takes both sides, of what was logged."""
+    beyond = max(float(np.nanmax(-side * v, initial=-np.inf)) for v in columns.values())
+    if beyond > abs(edge):
+        return (
+            "empty their cells in the log, which are gaps then (limit in [columns] takes both "
+            "signs, and the column goes further on the other side)"
+        )
+    own = f", if that is not in {unit}" if unit else ""
+    return (
+        f"make gaps of them with limit = {(1.0 - 1e-6) * abs(edge):.7g} in [columns], converted to "
+        f"the unit that the column has in the log{own}"
+    )
