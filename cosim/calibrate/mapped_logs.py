@@ -30,6 +30,8 @@ COUNTED = (48620 / 12870 / 12) ** 0.5
 """Noise that differences of whole counts show over a count (`smooth.roughness`): each rounding is
 taken back by the next sample, so its differences are of one order more, sqrt(C(18, 9) / C(16, 8))
 times as large."""
+FEWEST = 2
+"""Samples of a window that make an interval; of fewer nothing can be compared."""
 LONGEST = 5.0
 """Intervals between samples longer than this many usual ones are gaps in the inputs."""
 
@@ -89,7 +91,14 @@ class MappedLogs:
                 self.units.update({column: unit for column, unit in log.units.items() if unit})
                 self.noise.update(log.noise)
                 for one, window in windows(name, log, lead):
-                    self.logs[one], self.purposes[one] = self._unbroken(one, window), run.purpose
+                    kept = self._unbroken(one, window, window is not log)
+                    if kept is not None:
+                        self.logs[one], self.purposes[one] = kept, run.purpose
+        if data.runs and not self.logs:
+            raise ScenarioError(
+                f"{path}: no run is left: windows are longer than their logs, or the inputs are "
+                "not known where they begin"
+            )
 
     def _count_gaps(self, name: str, log: Log) -> None:
         """Say how many cells hold no number, of the columns that are used."""
@@ -143,10 +152,18 @@ class MappedLogs:
             if not any(key in run.values for run in runs):
                 has = sorted({name for run in runs for name in run.values})
                 raise ScenarioError(f"{self.path}: only: no run has {key!r}; {listing(has, key)}")
-        return [
+        found = [
             run for run in runs
             if all(run.values.get(key, value) == value for key, value in wanted.items())
         ]  # fmt: skip
+        if runs and not found:
+            told = " and ".join(f"{key} = {value!r}" for key, value in wanted.items())
+            there = sorted({", ".join(f"{key} = {run.values[key]!r}" for key in wanted
+                                      if key in run.values) for run in runs})  # fmt: skip
+            raise ScenarioError(
+                f"{self.path}: only: no run has {told}; there is {'; '.join(there)}"
+            )
+        return found
 
     def sources(self) -> list[str]:
         """Columns that drive inputs."""
@@ -198,22 +215,36 @@ class MappedLogs:
             self.findings.append(Finding("note", "input", "", column, text))
         return sigma
 
-    def _unbroken(self, name: str, log: Log) -> Log:
+    def _unbroken(self, name: str, log: Log, window: bool) -> Log | None:
         """The log up to the first gap in what drives the system.
 
         What the inputs were in a gap is not known, and with it where the system was after it.
+
+        Args:
+            name, log: of the run.
+            window: whether it is one of several of a log; None if nothing of it can be used.
+
+        Raises:
+            UnknownNameError: there is no such column.
+            ScenarioError: what drives an input has no values, or none when the log begins.
         """
         time = log.time
+        if window and np.count_nonzero(time >= 0.0) < FEWEST:
+            self._left_out(name, "the log has no samples there")
+            return None
         usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
         longest = float(self.table.get("gap", LONGEST * usual))
         until, reason = time.size, ""
         for column in self.sources():
-            if column in log.own and log.own[column][0][0] <= time[0]:
+            if column in log.own and np.any(log.own[column][0] <= time[0]):
                 continue  # held for any time, on a clock of its own
             values = log[column]
             if values.shape != time.shape:
                 raise ScenarioError(f"{self.path}: " + apart(log, column, "time", time.size))
             good = np.flatnonzero(np.isfinite(values))
+            if window and (not good.size or time[good[0]] - time[0] > longest):
+                self._left_out(name, f"{column} is not known when it begins")
+                return None
             if not good.size:
                 raise ScenarioError(
                     f"{log.name}: column {column!r} has no values, but drives an input; "
@@ -234,6 +265,9 @@ class MappedLogs:
                 reason = f"{column} is not known for {gap:.4g} s after {time[end - 1]:.6g} s"
         if until == time.size:
             return log
+        if window and np.count_nonzero(time[:until] >= 0.0) < FEWEST:
+            self._left_out(name, reason)
+            return None
         lost = 1.0 - until / time.size
         text = (
             f"{reason}, so the run ends there ({lost:.0%} of it is not used); give the rest a run "
@@ -245,6 +279,11 @@ class MappedLogs:
             for one, values in log.columns.items()
         }
         return replace(log, columns=columns)
+
+    def _left_out(self, name: str, reason: str) -> None:
+        """Say that a window is not used."""
+        text = f"{reason}, so this window is left out"
+        self.findings.append(Finding("warning", "gap", name, "time", text))
 
 
 def _same(one: Unit, other: Unit) -> bool:

@@ -137,8 +137,8 @@ def check_span(log: Log, main: str, clock: Vector) -> None:
         at = int(np.argmax(np.abs(steps)))
         raise ScenarioError(
             f"{log.name}: clock {main!r} jumps by {steps[at]:.6g} after row {at + 1} (usual "
-            f"interval {usual:.4g}), so it cannot be resampled; take the rows on one side with "
-            "samples"
+            f"interval {usual:.4g}), so it cannot be resampled; leave out the rows on one side, or "
+            "give each side a file and a run of its own (samples are those of the grid)"
         )
 
 
@@ -153,6 +153,11 @@ def apart(log: Log, column: str, clock: str, count: int) -> str:
 def check_rising(log: Log, name: str, clock: Vector, twice: bool = False) -> None:
     """Refuse a clock that goes back or, unless a time may be there twice, stands still.
 
+    Args:
+        log, name: of the clock.
+        clock: its times.
+        twice: whether a time may be there twice, as on a column's own clock, which is read whole.
+
     Raises:
         ScenarioError: with the row, and how often.
     """
@@ -164,6 +169,6 @@ def check_rising(log: Log, name: str, clock: Vector, twice: bool = False) -> Non
         raise ScenarioError(
             f"{log.name}: clock {name!r} {what} after row {at + 1}"
             + (f", and so in {bad.size} places" if bad.size > 1 else "")
-            + "; leave out rows that are there twice and sort the others, or take the rows on one "
-            "side with samples"
+            + "; leave out rows that are there twice and sort the others"
+            + ("" if twice else ", or take the rows on one side with samples")
         )

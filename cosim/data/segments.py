@@ -7,7 +7,7 @@ An entry `[[run]]` of a mapping may say how its file is to be taken apart:
 - `each`: each value of a column is a run;
 - `where`: of these rows or values only those for which a column has this value, is one of these, or
   is `even` or `odd`;
-- `window`: pieces of this length, one after the other.
+- `window`: pieces of this length, one after the other from the first sample on.
 
 Pieces are named `NAME 0`, `NAME 1`, and so on.
 """
@@ -163,12 +163,13 @@ def windows(name: str, log: Log, lead: float) -> Iterator[tuple[str, Log]]:
     length = float(log.values["window"])
     time = log.time
     edge = ROUNDING * length
-    for k in range(int((time[-1] + edge) / length)):
-        mine = (time >= k * length - lead - edge) & (time <= (k + 1) * length + edge)
+    for k in range(int((time[-1] - time[0] + edge) / length)):
+        begin = time[0] + k * length
+        mine = (time >= begin - lead - edge) & (time <= begin + length + edge)
         columns = {one: values[mine] for one, values in log.columns.items()
                    if values.shape == time.shape}  # fmt: skip
-        columns["time"] = time[mine] - k * length
-        own = {one: (times - k * length, values) for one, (times, values) in log.own.items()}
+        columns["time"] = time[mine] - begin
+        own = {one: (times - begin, values) for one, (times, values) in log.own.items()}
         yield f"{name} {k}", replace(log, name=f"{log.name} {k}", columns=columns, own=own)
 
 
