@@ -91,7 +91,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
                 own[name] = held[0], held[1] * gain + offset
             units[name] = target.symbol if target else ""
             noise.pop(name, None)
-            noise.update(_noise(log, item, name, gain))
+            noise.update(_noise(log, item, name, gain, target, where))
     clock = columns["time"]
     first, last = log.values.get("samples", (1, clock.size))
     part = slice(int(first) - 1, int(last))
@@ -146,10 +146,18 @@ def _scaled(
     )  # fmt: skip
 
 
-def _noise(log: Log, entry: Mapping[str, Any], name: str, gain: float) -> dict[str, float]:
-    """What the sheet says about the noise of a column that is made, in its unit; or nothing."""
-    if name in log.noise and name not in log.columns:  # the sheet tells of what is made
-        return {name: log.noise[name]}
+def _noise(
+    log: Log, entry: Mapping[str, Any], name: str, gain: float, target: Unit | None, where: str
+) -> dict[str, float]:
+    """What the sheet says about the noise of a column that is made, in its unit; or nothing.
+
+    Raises:
+        UnitError: the sheet tells of what is made, in a unit that does not fit.
+    """
+    if name in log.noise and name not in log.columns:
+        own = known(unit, where) if (unit := log.units.get(name, "")) else None
+        gain, _ = scaled(own, target, None, f"{where}: as the sheet has it", "scale", "")
+        return {name: abs(gain) * log.noise[name]}
     stated = log.noise.get(str(entry["source"]))
     if stated is None or MADE & {key for key, value in entry.items() if value}:
         return {}

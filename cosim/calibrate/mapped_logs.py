@@ -128,8 +128,7 @@ class MappedLogs:
             said: columns of the runs before -> the first of them that says a unit, and that.
 
         Raises:
-            ScenarioError: with both runs and units.
-            UnitError: a unit is not known.
+            UnitError: with both runs and units; or a unit is not known.
         """
         for column in self._used():
             unit = log.units.get(column, "")
@@ -146,7 +145,11 @@ class MappedLogs:
             )
 
     def _chosen(self, wanted: Mapping[str, Any]) -> list[LoggedRun]:
-        """The runs with these entries."""
+        """The runs with these entries.
+
+        Raises:
+            ScenarioError: no run has such an entry, or none has these values.
+        """
         runs = list(self.data.runs.values())
         for key in wanted:
             if not any(key in run.values for run in runs):

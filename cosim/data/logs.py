@@ -108,8 +108,9 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
     if reader is None:
         raise ScenarioError(f"{path}: logs are {', '.join(READERS)} files")
     table = reader(path)
+    stated = {column: unit for column, unit in (units or {}).items() if unit}
     return Log(
-        path.name, table.columns, {**table.units, **(units or {})}, gaps=table.gaps,
+        path.name, table.columns, {**table.units, **stated}, gaps=table.gaps,
         texts=table.texts, origins=table.origins, notes=tuple(table.notes), exact=table.exact,
     )  # fmt: skip
 

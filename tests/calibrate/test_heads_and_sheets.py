@@ -84,6 +84,14 @@ def test_a_sheet_s_noise_of_what_is_made_is_in_its_unit(tmp_path: Path) -> None:
     log = written("time,tau,turned", ",", TIMES, TORQUE, TURNED)
     column = 'w = { source = "turned", from = "deg/s", unit = "rad/s" }'
     right(stated(tmp_path, signal("w", "rad/s", 0.02), log, COLUMNS=column), 0.02)
+    right(stated(tmp_path, signal("w", "mrad/s", 20.0), log, COLUMNS=column), 0.02)
+
+
+def test_a_sheet_that_states_no_unit_leaves_that_of_the_head(tmp_path: Path) -> None:
+    log = written("time,tau,w [deg/s]", ",", TIMES, TORQUE, TURNED)
+    sheet = '[[signal]]\nname = "w"\nnoise_sigma = 0.1\n'
+    problem = stated(tmp_path, sheet, log, COLUMNS='w = { unit = "rad/s" }')
+    right(problem, np.radians(0.1))
 
 
 def test_a_sheet_tells_of_columns_of_several_files(tmp_path: Path) -> None:
