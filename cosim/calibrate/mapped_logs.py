@@ -71,7 +71,8 @@ class MappedLogs:
         self.logs: dict[str, Log] = {}
         self.purposes: dict[str, str] = {}
         lead = float(self.table.get("lead", 0.0))
-        for run in self._chosen({**self.table.get("only", {}), **only}):
+        chosen = self._chosen({**self.table.get("only", {}), **only})
+        for run in chosen:
             strict(
                 {k: v for k, v in run.values.items() if k in RUN},
                 RUN,
@@ -94,7 +95,7 @@ class MappedLogs:
                     kept = self._unbroken(one, window, window is not log)
                     if kept is not None:
                         self.logs[one], self.purposes[one] = kept, run.purpose
-        if data.runs and not self.logs:
+        if chosen and not self.logs:
             raise ScenarioError(
                 f"{path}: no run is left: windows are longer than their logs, or the inputs are "
                 "not known where they begin"
@@ -148,7 +149,8 @@ class MappedLogs:
         """The runs with these entries.
 
         Raises:
-            ScenarioError: no run has such an entry, or none has these values.
+            ScenarioError: no run has such an entry; or none has these values, and there is no
+                `further` mapping for the others.
         """
         runs = list(self.data.runs.values())
         for key in wanted:
@@ -159,7 +161,7 @@ class MappedLogs:
             run for run in runs
             if all(run.values.get(key, value) == value for key, value in wanted.items())
         ]  # fmt: skip
-        if runs and not found:
+        if runs and not found and "further" not in self.table:  # which has a system for the others
             told = " and ".join(f"{key} = {value!r}" for key, value in wanted.items())
             there = sorted({", ".join(f"{key} = {run.values[key]!r}" for key in wanted
                                       if key in run.values) for run in runs})  # fmt: skip
