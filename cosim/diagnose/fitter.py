@@ -38,8 +38,6 @@ USUAL = 2.1
 order asks for are no places to begin."""
 EXACT = 0.1
 """Share of a trial's strength by which the residual may ask for another one, and it is the same."""
-SHARP = 0.01
-"""Share of a law's usual smoothing with which it is fitted, too, where runs may turn unstable."""
 CORRECTIONS, STALE = 4, 10.0
 """Times at most that errors of the exchange are taken from the data where a fit has ended, and what
 they may be off by there [nats]: twice what decides between two models, about what jumps leave."""
@@ -109,9 +107,17 @@ class Fitter(Judge):
             if self.raw.unstable or self.stale(found) <= STALE:
                 return found
             if self._own_cost(found) >= self._own_cost(best):  # corrections lead away
-                break
+                return best if best is not quick else self._told(quick, base, effort)
             best = found
         return best
+
+    def _told(self, fitted: Fitted, base: Fitted, effort: Effort) -> Fitted:
+        """A model where it is, with intervals if these are wanted."""
+        if effort.end in ("draft", "minimum"):
+            return fitted
+        theta = fitted.estimate.theta
+        simulator = corrected(fitted.simulator, theta, self.raw)
+        return self.again(self.judged(fit(simulator, theta, effort=INTERVALS)), fitted, base)
 
     def stale(self, fitted: Fitted) -> float:
         """By how much the exchange was corrected for another place than where a fit ended [nats].
@@ -337,43 +343,6 @@ class Fitter(Judge):
             return winner
         self.say(f"{winner.effects[-1].label}: a better minimum from nominal values")
         return self.again(found, winner, base)
-
-    def sharper(self, winner: Fitted, base: Fitted) -> Fitted:
-        """The model with its last effect's law sticking more nearly, if it fits better from here.
-
-        A law that smooths a sign creeps at rest. Where it holds casters, all parameters make up for
-        that, and derivatives do not lead to where it hardly creeps.
-        """
-        item = winner.signature
-        if item is None or not self.raw.unstable or not is_open(winner.estimate):
-            return winner
-        whole = item.candidate.added_to(base.problem)
-        held = {
-            p.name: (p.minimum, item.fixed.get(p.name, p.nominal))
-            for p in new_parameters(base.problem, whole)[1]
-            if p.name not in winner.estimate.values
-        }
-        sharp = {n: max(SHARP * value, least) for n, (least, value) in held.items() if least > 0.0}
-        if not sharp:
-            return winner
-        fixed = {n: value for n, (_, value) in held.items()} | sharp
-        spans = {p.name: p.span for p in winner.problem.parameters}
-        problem = whole.with_parameters(
-            [replace(p, span=spans.get(p.name, p.span)) for p in whole.parameters]
-        ).changed(runs=winner.problem.runs)
-        problem = problem.hold(fixed)
-        theta = np.array([winner.estimate.values[name] for name in problem.names])
-        try:
-            found = self.fitted(self.simulator.of(problem), theta, winner.estimate)
-        except CosimError as error:
-            self.say(f"{winner.effects[-1].label} with {sharp}: {error}")
-            return winner
-        if not found.estimate.robust < winner.estimate.robust - GATE:
-            return winner
-        self.say(f"{winner.effects[-1].label}: sticks more nearly than usual")
-        found = self.again(found, winner, base)
-        found.signature = item.at(fixed)
-        return found
 
     def snapped(self, winner: Fitted, base: Fitted) -> Fitted:
         """The model with its last effect's parameters at values where it is exact, if that does.

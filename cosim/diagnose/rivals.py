@@ -32,6 +32,7 @@ from .probes import single
 from .rounds import Round
 from .shortlist import kin
 from .signature import HIDDEN, Signature, unscored
+from .sticking import sharper
 
 Vector = NDArray[np.float64]
 NEARLY = 0.8
@@ -426,8 +427,7 @@ def exchanged(
     if fitted.effects[-1].place == item.candidate.place:
         fixed = _sharpest(search, whole, known_values, fixed)
     problem, start = _begun(whole, known_values, fixed)
-    simulator = search.simulator.of(problem)
-    result = search.fitted(simulator, start, fitted.estimate, share=share)
+    result = search.fitted(search.simulator.of(problem), start, fitted.estimate, share=share)
     result.effects = (*fitted.effects[:-1], item.candidate)
     result.signature = item.at(fixed)
     search.note(result)
@@ -447,7 +447,7 @@ def restarted(
     """
     near = min(simpler, key=lambda f: f.estimate.robust, default=fitted)
     if fitted.signature is None or not near.estimate.robust < fitted.estimate.robust - GATE:
-        return search.sharper(search.retried(fitted, base), base)
+        return sharper(search, search.retried(fitted, base), base)
     name = fitted.effects[-1].label
     try:
         less = base.problem.changed(runs=near.problem.runs)

@@ -18,6 +18,7 @@ from cosim.diagnose.doubling import doubled
 from cosim.diagnose.models import Fitted
 from cosim.diagnose.rivals import _sharpest
 from cosim.diagnose.search import Search
+from cosim.diagnose.sticking import sharper
 from tests.diagnose import built, disc
 from tests.diagnose.built import ANCHOR, SEARCH_STEP, WEIGHT, Rig
 from tests.problems import simulator
@@ -145,7 +146,7 @@ def near(rig: Rig, smoothing: float) -> tuple[Fitted, Fitted]:
 
 def test_a_law_that_smooths_a_sign_is_fitted_sharp_where_runs_turn_unstable(rig: Rig) -> None:
     base, model = near(rig, 0.2)
-    found = rig.search.sharper(model, base)
+    found = sharper(rig.search, model, base)
     assert found.estimate.robust < 0.5 * model.estimate.robust
     assert found.problem.constants[SMOOTHING] == pytest.approx(USUAL)
     assert found.signature is not None and found.labels == model.labels
@@ -157,7 +158,7 @@ def test_it_is_kept_so_only_if_that_is_better(tmp_path: Path) -> None:
     with built.rig(tmp_path, creeping, unstable=True) as rig:
         base, model = near(rig, USUAL)
         before = rig.search.evaluations
-        assert rig.search.sharper(model, base) is model
+        assert sharper(rig.search, model, base) is model
         assert rig.search.evaluations > before
 
 
@@ -166,7 +167,7 @@ def test_one_that_cannot_be_simulated_so_stays(rig: Rig) -> None:
     usual = rig.search.simulator
     rig.search.simulator = usual.limited({run.name: 1.0 for run in rig.search.raw.runs})
     try:
-        assert rig.search.sharper(model, base) is model
+        assert sharper(rig.search, model, base) is model
     finally:
         rig.search.simulator = usual
     assert rig.said[-1].startswith("coulomb at load.flange with {")
@@ -176,7 +177,7 @@ def test_calm_systems_are_not_asked(rig: Rig) -> None:
     base, model = near(rig, 0.2)
     rig.search.count_in_full()
     before = rig.search.evaluations
-    assert rig.search.sharper(model, base) is model and rig.search.evaluations == before
+    assert sharper(rig.search, model, base) is model and rig.search.evaluations == before
 
 
 # -- fits that have not ended ----------------------------------------------------------------------

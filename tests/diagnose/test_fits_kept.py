@@ -8,7 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from cosim.calibrate.estimate import Estimate
+from cosim.calibrate.fit import CORRECTION, INTERVALS, Effort
+from cosim.calibrate.simulator import Simulator
 from cosim.data.signals import Table
 from cosim.diagnose import fitter
 from cosim.diagnose.adding import made_of
@@ -22,30 +26,40 @@ from cosim.errors import CosimError
 from tests.diagnose import built
 from tests.problems import simulator
 
+Vector = NDArray[np.float64]
+
 
 def rubbing(w: float, theta: float, t: float) -> float:
     return 0.05 * math.tanh(w / 2e-3)
 
 
+@pytest.mark.parametrize("good", [1, 0])
 def test_corrections_of_the_exchange_that_lead_away_are_not_followed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: int
 ) -> None:
-    """Each fit begins where the last one ended; the best one by its own values counts."""
+    """Each fit begins where the last one ended; the best one by its own values counts.
+
+    If that is the first, it gets intervals where it is.
+    """
     with built.hanging(tmp_path) as rig:
         quick = rig.added(rig.base, "unbalance", {"m_u": 0.5, "psi": 0.4})
         kept, begun = fitter.fit, []
 
-        def away(*args: object, **options: object) -> object:
-            """The right fit first, and then farther off each time."""
-            found = kept(*args, **options)  # type: ignore[arg-type]
-            theta = found.theta * 1.1 ** len(begun)
-            begun.append(theta)
-            return replace(found, theta=theta)
+        def away(simulator: Simulator, theta: Vector, **options: Effort) -> Estimate:
+            """So many good fits, and then farther off each time."""
+            found = kept(simulator, theta, **options)  # type: ignore[arg-type]
+            begun.append(options["effort"])
+            off = 1.0 if options["effort"] is INTERVALS else 1.1 ** max(len(begun) - good, 0)
+            return replace(found, theta=found.theta * off)
 
         monkeypatch.setattr(fitter, "fit", away)
         monkeypatch.setattr(LateValueFitter, "stale", lambda self, fitted: math.inf)
         found = rig.search.sharpened(quick, rig.base)
-        assert len(begun) == 2 and np.array_equal(found.estimate.theta, begun[0])
+        assert begun == ([CORRECTION, CORRECTION] if good else [CORRECTION, INTERVALS])
+        if not good:
+            assert np.array_equal(found.estimate.theta, quick.estimate.theta)
+        left = np.mean((rig.search.fit_data - found.fit) ** 2)
+        assert left <= np.mean((rig.search.fit_data - quick.fit) ** 2)
 
 
 def test_a_refused_fit_leaves_the_memo_as_it_was(tmp_path: Path) -> None:
