@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import filecmp
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -49,34 +51,58 @@ def clock_column(part: Part, whole: bool) -> str:
     return part.report.clock.column if whole else "time"
 
 
-def place(run: Run, folder: Path, whole: bool) -> dict[str, str]:
-    """Put the logs of a run into a folder.
+def place(runs: Sequence[Run], folder: Path, whole: bool) -> dict[str, dict[str, str]]:
+    """Put the logs of runs into a folder, each under a name of its own.
 
     Args:
-        run: with its parts.
+        runs: with their parts.
         folder: of the data set.
         whole: copy files as they are; else each part becomes a Parquet file, or CSV where pyarrow
             is not installed.
 
     Returns:
-        Path of each part's file, relative to the folder.
+        Path of each part's file, relative to the folder, by run.
     """
     make_folder(folder / LOGS)
-    found = {}
-    for key, part in run.parts.items():
-        if whole:
-            target = folder / LOGS / part.path.name
-            if target.exists() and target.resolve() != part.path.resolve():  # of another folder
-                target = folder / LOGS / f"{plain(run.name)}_{part.path.name}"
-            if part.path.resolve() != target.resolve():
-                with writing(target):
-                    shutil.copyfile(part.path, target)
-        else:
-            name = plain(f"{run.name}_{key}" if key else run.name)
-            target = folder / LOGS / f"{name}{'.parquet' if has('pyarrow') else '.csv'}"
-            write_part(part, target)
-        found[key] = target.relative_to(folder).as_posix()
+    found: dict[str, dict[str, str]] = {run.name: {} for run in runs}
+    taken = {_known_as(part.path) for run in runs for part in run.parts.values()}
+    end = ".parquet" if has("pyarrow") else ".csv"
+    for run in runs:
+        for key, part in run.parts.items():
+            if whole:
+                target = _copied(part.path, folder / LOGS, plain(run.name))
+            else:
+                name = plain(f"{run.name}_{key}" if key else run.name)
+                paths = (folder / LOGS / f"{one}{end}" for one in _numbered(name))
+                target = next(path for path in paths if _known_as(path) not in taken)
+                write_part(part, target)
+                taken.add(_known_as(target))
+            found[run.name][key] = target.relative_to(folder).as_posix()
     return found
+
+
+def _known_as(path: Path) -> str:
+    """A path as file systems see it that do not tell small letters from capitals."""
+    return str(path.resolve()).casefold()
+
+
+def _numbered(name: str) -> Iterator[str]:
+    """A name, and others like it."""
+    yield name
+    yield from (f"{name}_{number}" for number in count(2))
+
+
+def _copied(path: Path, folder: Path, run: str) -> Path:
+    """A file in a folder, under a name that no other content has there."""
+    names = chain([path.name], (f"{one}_{path.name}" for one in _numbered(run)))
+    target = next(
+        t for t in (folder / name for name in names)
+        if not t.exists() or filecmp.cmp(path, t, shallow=False)
+    )  # fmt: skip
+    if not target.exists():
+        with writing(target):
+            shutil.copyfile(path, target)
+    return target
 
 
 def write_part(part: Part, path: Path) -> None:

@@ -172,7 +172,7 @@ def import_logs(
     runs = _used(runs, matches)
     plan = layout(runs, matches, wishes.window, wishes.late)
     make_folder(folder)
-    stored = {run.name: place(run, folder, plan.whole) for run in runs}
+    stored = place(runs, folder, plan.whole)
     said = _system_entry(file, folder, wishes.system)
     # templates call every system file `system.toml`
     known = file.path.resolve().parent.name if file.name == "system" else file.name
