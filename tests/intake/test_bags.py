@@ -72,6 +72,30 @@ YAW = np.linspace(2.0, 5.0, 60)
 """Passes half a turn."""
 
 
+def test_a_field_called_time_is_a_column_beside_the_clock(tmp_path: Path) -> None:
+    """Seconds since the controller began, in messages with headers and without, and as a time."""
+    from rosbags.typesys import get_types_from_msg
+
+    text = "float64 time\nfloat64 speed\n"
+    STORE.register(get_types_from_msg(text, "own/msg/Plain"))
+    text = f"std_msgs/Header header\nbuiltin_interfaces/Time {text.partition(' ')[2]}"
+    STORE.register(get_types_from_msg(text, "own/msg/Stamped"))
+    sent: list[Message] = []
+    for i, time in enumerate(TIMES):
+        moment = T["builtin_interfaces/msg/Time"](12 + i, 0)
+        sent.append((time, "/plain", T["own/msg/Plain"](12.0 + i, 1.0)))
+        sent.append((time + 1, "/stamped", T["own/msg/Stamped"](header(time), moment, 2.0)))
+    found = inspect(write(tmp_path / "bag", sent)).topics
+    for report in found:
+        assert report.clock.interval == pytest.approx(0.02, rel=1e-9)  # whole nanoseconds
+        assert report.clock.began().startswith("2025-11-25")
+        # nanoseconds times 1e-9: rounding
+        assert report.topic.log["time_field"] == pytest.approx(12.0 + np.arange(60.0), abs=1e-12)
+        assert any("the field time" in note for note in report.topic.notes)
+    units = {report.topic.name: report.topic.log.units for report in found}
+    assert units["/stamped"]["time_field"] == "s" and "time_field" not in units["/plain"]
+
+
 def test_standard_messages_are_columns_with_units(tmp_path: Path) -> None:
     sent: list[Message] = []
     for i, (time, yaw) in enumerate(zip(TIMES, YAW.tolist(), strict=True)):

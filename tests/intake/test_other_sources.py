@@ -22,13 +22,13 @@ def ulog(path: Path) -> Path:
 
     out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
     out += block("F", b"vehicle_attitude:uint64_t timestamp;float[4] q;")
-    out += block("F", b"wheel_encoders:uint64_t timestamp;float[2] wheel_speed;")
+    out += block("F", b"wheel_encoders:uint64_t timestamp;float[2] wheel_speed;float time;")
     out += block("A", struct.pack("<BH", 0, 0) + b"vehicle_attitude")
     out += block("A", struct.pack("<BH", 0, 1) + b"wheel_encoders")
     for i in range(200):
         half = 0.02 * i
         out += block("D", struct.pack("<HQ4f", 0, 10_000 * i, np.cos(half), 0, 0, np.sin(half)))
-        out += block("D", struct.pack("<HQ2f", 1, 10_000 * i + 300, i, -i))
+        out += block("D", struct.pack("<HQ3f", 1, 10_000 * i + 300, i, -i, 3 * i))
     path.write_bytes(out)
     return path
 
@@ -42,6 +42,8 @@ def test_px4(tmp_path: Path) -> None:
     assert attitude.clock.interval == pytest.approx(0.01, rel=1e-9)
     assert wheels.topic.log["wheel_speed_2"] == pytest.approx(-np.arange(200.0), abs=0.0)
     assert wheels.topic.log.units["wheel_speed_1"] == "rad/s"
+    assert wheels.clock.interval == pytest.approx(0.01, rel=1e-9)  # not the field of that name
+    assert wheels.topic.log["time_field"] == pytest.approx(3.0 * np.arange(200), abs=0.0)
     with pytest.raises(ScenarioError, match="--topic wheels: "):
         inspect(tmp_path / "x.ulg", ["wheels"])
     (tmp_path / "y.ulg").write_bytes(b"ULog")

@@ -176,10 +176,11 @@ def _topic(
         what = "has no header" if np.all(stamps < 0) else "has headers without a time"
         notes.append(f"{what}: times are those at which messages were recorded")
     times, columns = _ordered(times, columns, notes)
+    columns, said = messages.beside_clock(columns, own.units)
     clock, origin = integers(times)
     log = Log(
         name, {"time": clock, **columns},
         units={"time": "ns", **{n: u for n, u in own.units.items() if n in columns}},
         origins={"time": origin} if origin else {},
     )  # fmt: skip
-    return Topic(name, own.kind, log, clock="time", frames=own.frames, notes=tuple(notes))
+    return Topic(name, own.kind, log, clock="time", frames=own.frames, notes=(*notes, *said))

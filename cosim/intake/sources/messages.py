@@ -39,6 +39,8 @@ _UNITS = {
 }  # fmt: skip
 """Unit of a vector by the field that holds it."""
 _LISTS = {"position": "rad", "velocity": "rad/s", "effort": "N.m"}
+CLOCK, FIELD = "time", "time_field"
+"""Name of the clock of a topic, and of a field of its messages that is called so."""
 PARTS = ("qx", "qy", "qz", "qw")
 TURNS = ("roll", "pitch", "yaw")
 Row = dict[str, float]
@@ -125,6 +127,22 @@ def _unit(path: tuple[str, ...]) -> str:
         # a pose in the plane, or a point alone
         return "m" if path in (("x",), ("y",), ("z",)) else "rad" if path == ("theta",) else ""
     return _UNITS.get(path[-2], "")
+
+
+def beside_clock(
+    columns: dict[str, Vector], units: dict[str, str]
+) -> tuple[dict[str, Vector], list[str]]:
+    """Columns none of which is called as the clock is; where a unit is known, it goes along.
+
+    Returns:
+        The columns, and what is to be said.
+    """
+    if CLOCK not in columns:
+        return columns, []
+    if CLOCK in units:
+        units[FIELD] = units.pop(CLOCK)
+    note = f"the field {CLOCK} of the messages is called {FIELD}: {CLOCK} is the clock"
+    return {FIELD if name == CLOCK else name: own for name, own in columns.items()}, [note]
 
 
 def turned(

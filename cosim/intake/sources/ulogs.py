@@ -17,7 +17,7 @@ from ...data.logs import Log
 from ...errors import InputError, ScenarioError, listing
 from ...reading.limits import DATA
 from ..topic import Source, Topic
-from .messages import LONGEST, PARTS, turned
+from .messages import LONGEST, PARTS, beside_clock, turned
 
 Vector = NDArray[np.float64]
 ENDS = (".ulg", ".ulog")
@@ -85,11 +85,12 @@ def _topic(name: str, item: Any) -> Topic:
         for part, i in zip(PARTS, (2, 3, 4, 1), strict=True):
             columns[part] = columns.pop(f"q_{i}")
     columns, notes = turned(columns, units)
+    columns, said = beside_clock(columns, units)
     log = Log(
         name, {"time": clock, **columns},
         units={"time": "us", **{n: u for n, u in units.items() if n in columns}},
         origins={"time": origin} if origin else {},
     )  # fmt: skip
     return Topic(
-        name, "PX4 message", log, clock="time", notes=("times count from the start", *notes)
+        name, "PX4 message", log, clock="time", notes=("times count from the start", *notes, *said)
     )
