@@ -105,7 +105,27 @@ def npz_table(path: Path) -> Table:
             _add(table, path, name, values)
         elif values.dtype.kind in "US" and values.ndim == 1:
             table.add(name, *numbers([_text(cell) for cell in values.tolist()]))
+        elif values.dtype.kind in "mM" and values.ndim == 1:
+            _add_times(table, name, values)
+        elif values.ndim:
+            what = f"of type {values.dtype} in {values.ndim} dimensions"
+            table.notes.append(f"array {name!r} {what} holds no columns and is left out")
     return table
+
+
+def _add_times(table: Table, name: str, values: NDArray[Any]) -> None:
+    """A column of dates or durations, as whole numbers of its unit."""
+    unit, _ = np.datetime_data(values.dtype)
+    unit = unit if unit in ("s", "ms", "us", "ns") else "ns"  # days and months are exact so, too
+    good = ~np.isnat(values)
+    whole = values.astype(f"{values.dtype.kind}8[{unit}]").astype(np.int64)
+    known, origin = integers(whole[good].tolist())
+    found = np.full(values.shape, np.nan)
+    found[good] = known
+    lost = int(values.size - known.size)
+    exact = whole.tolist() if not lost else None
+    table.add(name, found, Gaps(empty=lost, count=values.size), origin, exact)
+    table.units[name] = unit
 
 
 def matlab_table(path: Path) -> Table:

@@ -2,8 +2,9 @@
 
 Read are UTF-8 and UTF-16 (with a byte order mark), and else Latin-1, whose bytes all mean
 something; columns separated by semicolons, tabs, commas, bars or blanks; a decimal comma where the
-comma does not separate; heads such as `speed [rad/s]` and `speed (rad/s)`, heads in a comment, and
-a second row of units. Anything else is refused in one sentence.
+comma does not separate; heads such as `speed [rad/s]` and `speed (rad/s)`, heads in the last
+comment before the numbers, a second row of units, and the first line `sep=;` of spreadsheets.
+Anything else is refused in one sentence.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +34,16 @@ _CELL = 9
 """Bytes of memory per byte of a file: seven digits are a text of 56 and two pointers."""
 _DIGITS = 16
 """Of integers from 2^53 on, at least."""
-_SQUARE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]\d][^\]]*)\]")
+_SQUARE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>(?:1/)?[^\]\d][^\]]*)\]")
+_EXCEL = re.compile(r'\s*"?sep=(?P<separator>[;\t,| ])"?\s*', re.IGNORECASE)
+"""A first line by which spreadsheets are told what separates the columns."""
 _ROUND = re.compile(r".*?\((?P<unit>[^()]+)\)")
 _SIGNS = {
     "°C": "degC", "°": "deg", "º": "deg", "\u03a9": "ohm", "\u2126": "ohm", "Ohm": "ohm",
     "µ": "u", "μ": "u", "·": ".", "²": "2", "³": "3", "⁻¹": "-1", "⁻²": "-2",
-    "degree": "deg", "degrees": "deg", "deg/sec": "deg/s", "rad/sec": "rad/s", "sec": "s",
+    "degree": "deg", "degrees": "deg", "deg/sec": "deg/s", "rad/sec": "rad/s",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "msecs": "ms",
+    "milliseconds": "ms", "usec": "us", "microseconds": "us", "nsec": "ns", "nanoseconds": "ns",
     "RPM": "rpm", "1/min": "rpm", "Nm": "N.m", "N m": "N.m",
 }  # fmt: skip
 """Other spellings of units: signs that are replaced wherever they stand, words as a whole."""
@@ -126,15 +132,18 @@ def text_table(path: Path) -> Table:
         lines = _decoded(path, table).splitlines()
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
-    comments = [line[1:] for line in lines if line.startswith(COMMENTS)]
-    lines = [line for line in lines if line.strip() and not line.startswith(COMMENTS)]
+    lines = [line for line in lines if line.strip()]
+    told = _EXCEL.fullmatch(lines[0]) if lines else None
+    lines = lines[1:] if told else lines
+    begin = list(takewhile(lambda line: line.startswith(COMMENTS), lines))
+    lines = [line for line in lines if not line.startswith(COMMENTS)]
     if not lines:
         raise ScenarioError(f"{path}: is empty")
-    separator = _separator(lines)
+    separator = told["separator"] if told else _separator(lines)
     rows = list(_split(lines, separator, path))
     heads = rows.pop(0)
     if _numeric(heads):
-        last = next(_split(comments[-1:], separator, path), [])
+        last = next(_split([line[1:] for line in begin[-1:]], separator, path), [])
         if len(last) != len(heads) or _numeric(last):
             raise ScenarioError(
                 f"{path}: its first row {lines[0][:60]!r} is numbers; the first row must name the "

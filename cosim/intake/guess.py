@@ -110,6 +110,10 @@ def known_unit(text: str) -> bool:
     return bool(text)
 
 
+def _is_time(unit: str) -> bool:
+    return known_unit(unit) and parse(unit).exponents == parse("s").exponents
+
+
 def is_angle(unit: str) -> bool:
     """Whether a unit is one of angles; an unknown one may be."""
     try:
@@ -176,6 +180,8 @@ def guess_time(name: str, values: Vector, said: str = "", origin: int = 0) -> Gu
         said: the unit that the log states.
         origin: what was taken off all values to keep them exact.
     """
+    if said and not _is_time(said):
+        return Guess("", f"{said!r}, as the log says, is no unit of time")
     if said:
         return Guess(said, "stated in the log", sure=True)
     good = values[np.isfinite(values)]

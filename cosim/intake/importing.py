@@ -326,6 +326,12 @@ def _used(runs: Sequence[Run], matches: Matches) -> list[Run]:
                     f"{part.path}: {key or 'it'} has no clock: no column rises evenly; name one "
                     "with --clock COLUMN"
                 )
+            clock = part.report.clock
+            if part.report.topic.log.units.get(clock.column) and not clock.unit.unit:
+                raise InputError(
+                    f"{part.path}: the unit of its clock {clock.column!r} is not known: "
+                    f"{clock.unit.reason}; correct it in the log, or name another with --clock"
+                )
         clocks = {key: part.report.clock for key, part in run.parts.items()}
         if len({clock.epoch for clock in clocks.values()}) > 1:
             since = [key for key, clock in clocks.items() if clock.epoch]

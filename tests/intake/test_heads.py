@@ -1,0 +1,89 @@
+"""Heads of columns: which line is the head, and what units it states."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.data.logs import read_log
+from cosim.data.text import head
+from cosim.errors import InputError, ScenarioError
+from cosim.installation.builder import default_provider
+from cosim.intake.example import SYSTEM
+from cosim.intake.importing import Wishes, import_logs
+from cosim.intake.inspect import inspect
+
+ROWS = "".join(f"{0.1 * i:.1f};{i}\n" for i in range(20))
+
+
+def log(folder: Path, text: str) -> Path:
+    path = folder / "a.csv"
+    path.write_text(text)
+    return path
+
+
+def test_a_comment_after_the_numbers_is_no_head(tmp_path: Path) -> None:
+    """It has as many cells as the table has columns."""
+    text = f"# made by a logger\n# time;speed\n{ROWS}# stopped; by hand\n"
+    assert list(read_log(log(tmp_path, text)).columns) == ["time", "speed"]
+    with pytest.raises(ScenarioError, match="the first row must name the columns"):
+        read_log(log(tmp_path, f"{ROWS}# stopped; by hand\n"))
+
+
+@pytest.mark.parametrize("mark", [";", ",", "\t", "|"])
+def test_the_first_line_of_spreadsheets_says_what_separates(tmp_path: Path, mark: str) -> None:
+    text = f"sep={mark}\n" + f"time;speed, measured\n{ROWS}".replace(";", mark)
+    heads = f"time{mark}speed, measured".split(mark)
+    if mark == ",":  # its head names a column that the rows do not have
+        text = text.replace(", measured", "")
+        heads = ["time", "speed"]
+    found = read_log(log(tmp_path, text))
+    assert list(found.columns) == heads
+    assert found[heads[1]] == pytest.approx(np.arange(20.0), abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "unit"),
+    [
+        ("rate [1/s]", "rate", "1/s"), ("bend [1/m]", "bend", "1/m"),
+        ("speed [1/min]", "speed", "rpm"), ("time [msec]", "time", "ms"),
+        ("time [µsec]", "time", "us"), ("time (seconds)", "time (seconds)", "s"),
+        ("q[0]", "q[0]", ""), ("q[1/2]", "q[1/2]", ""),
+    ],
+)  # fmt: skip
+def test_units_in_brackets(text: str, name: str, unit: str) -> None:
+    assert head(text) == (name, unit)
+
+
+def test_a_clock_in_a_unit_of_no_time_is_said_and_not_taken_as_seconds(tmp_path: Path) -> None:
+    rows = "".join(f"{i},{i % 7},0,{0.01 * i:.2f},0,0\n" for i in range(50))
+    heads = "time [{}],left_rpm,right_rpm,x_m,y_m,yaw_rad\n"
+    path = log(tmp_path, heads.format("msec") + rows)
+    assert inspect(path).topics[0].clock.interval == pytest.approx(1e-3, rel=1e-9)
+    path = log(tmp_path, heads.format("ticks") + rows)
+    (report,) = inspect(path).topics
+    said = "'ticks', as the log says, is no unit of time"
+    assert any(f.kind == "unit" and said in f.text for f in report.findings)
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    with pytest.raises(InputError, match=said):
+        import_logs(
+            {"a": [path]}, {"a": "identification"}, Wishes(str(tmp_path / "robot.toml")),
+            tmp_path / "set", default_provider(),
+        )  # fmt: skip
+    assert not (tmp_path / "set").exists()
+
+
+def test_dates_of_an_npz_file_are_a_column(tmp_path: Path) -> None:
+    begin = np.datetime64("2025-11-25T03:06:40.250", "ns")
+    times = begin + np.arange(50) * np.timedelta64(20, "ms")
+    days = np.array([np.datetime64("2025-11-25", "D")] * 49 + [np.datetime64("NaT")])
+    odd = np.zeros(50, dtype=complex)
+    np.savez(tmp_path / "a.npz", stamp=times, day=days, w=np.arange(50.0), odd=odd)
+    (report,) = inspect(tmp_path / "a.npz").topics
+    assert report.clock.column == "stamp" and report.clock.unit.unit == "ns"
+    assert report.clock.interval == pytest.approx(0.02, rel=1e-9)
+    assert report.clock.began() == "2025-11-25 03:06:40.250 UTC"
+    assert np.count_nonzero(np.isnan(report.topic.log["day"])) == 1
+    assert any("'odd' of type complex128" in f.text for f in report.findings)
