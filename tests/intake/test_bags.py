@@ -50,6 +50,10 @@ def twist(v: float, w: float) -> Any:
     return T["geometry_msgs/msg/Twist"](Vector3(v, 0.0, 0.0), Vector3(0.0, 0.0, w))
 
 
+def accel(a: float, b: float) -> Any:
+    return T["geometry_msgs/msg/Accel"](Vector3(a, 0.0, 0.0), Vector3(0.0, 0.0, b))
+
+
 def write(path: Path, sent: list[Message], plugin: str = "MCAP") -> Path:
     with rosbag2.Writer(
         path, version=9, storage_plugin=rosbag2.StoragePlugin[plugin]
@@ -110,6 +114,8 @@ def test_standard_messages_are_columns_with_units(tmp_path: Path) -> None:
                 header(time, "imu"), turned(yaw), np.zeros(9), Vector3(0.0, 0.0, 0.3),
                 np.zeros(9), Vector3(0.0, 0.0, 9.81), np.zeros(9),
             )),
+            (time, "/accel", T["geometry_msgs/msg/AccelStamped"](header(time), accel(0.5, i))),
+            (time, "/plain_accel", accel(0.5, i)),
             (time, "/joints", T["sensor_msgs/msg/JointState"](
                 header(time), ["left", "arm"], np.array([0.1 * i, 2.0]), np.array([5.0, 0.0]),
                 np.zeros(0),
@@ -139,6 +145,9 @@ def test_standard_messages_are_columns_with_units(tmp_path: Path) -> None:
     assert units["/imu"] == {
         **angles, **{f"angular_velocity_{a}": "rad/s" for a in "xyz"},
         **{f"linear_acceleration_{a}": "m/s2" for a in "xyz"},
+    }  # fmt: skip
+    assert units["/accel"] == units["/plain_accel"] == {
+        **{f"linear_{a}": "m/s2" for a in "xyz"}, **{f"angular_{a}": "rad/s2" for a in "xyz"},
     }  # fmt: skip
     assert units["/joints"] == {
         "position.left": "rad", "position.arm": "rad", "velocity.left": "rad/s",

@@ -8,7 +8,7 @@ lists of more than `LONGEST` numbers (images, scans, clouds).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,9 @@ _UNITS = {
     "force": "N", "torque": "N.m", "angular_velocity": "rad/s", "linear_acceleration": "m/s2",
 }  # fmt: skip
 """Unit of a vector by the field that holds it."""
+_OF_RATES = {**_UNITS, "linear": "m/s2", "angular": "rad/s2"}
+"""In an `ACCEL`, whose fields are called as those of a twist."""
+ACCEL = "geometry_msgs/msg/Accel"
 _LISTS = {"position": "rad", "velocity": "rad/s", "effort": "N.m"}
 CLOCK, FIELD = "time", "time_field"
 """Name of the clock of a topic, and of a field of its messages that is called so."""
@@ -87,8 +90,12 @@ def numbers(message: Any, kind: str, units: dict[str, str]) -> Row:
     return row
 
 
-def _take(value: Any, path: tuple[str, ...], row: Row, units: dict[str, str]) -> None:
+def _take(
+    value: Any, path: tuple[str, ...], row: Row, units: dict[str, str],
+    usual: Mapping[str, str] = _UNITS,
+) -> None:  # fmt: skip
     kind = getattr(value, "__msgtype__", "")
+    usual = _OF_RATES if kind == ACCEL else usual
     if kind in TIMES:
         name = _name(path)
         row[name], units[name] = nanoseconds(value) * 1e-9, "s"
@@ -100,15 +107,15 @@ def _take(value: Any, path: tuple[str, ...], row: Row, units: dict[str, str]) ->
         for field in value.__dataclass_fields__:
             if field in _NO_SIGNALS or "covariance" in field:
                 continue
-            _take(getattr(value, field), (*path, field), row, units)
+            _take(getattr(value, field), (*path, field), row, units, usual)
     elif isinstance(value, (bool, int, float, np.generic)) and not isinstance(value, np.str_):
         name = _name(path)
         row[name] = float(value)
-        if unit := _unit(path):
+        if unit := _unit(path, usual):
             units[name] = unit
     elif _is_list(value) and len(value) <= LONGEST:
         for index, item in enumerate(value, 1):
-            _take(item, (*path[:-1], f"{path[-1]}_{index}"), row, units)
+            _take(item, (*path[:-1], f"{path[-1]}_{index}"), row, units, usual)
 
 
 def _is_list(value: Any) -> bool:
@@ -121,12 +128,12 @@ def _name(path: tuple[str, ...]) -> str:
     return "_".join(kept or path)
 
 
-def _unit(path: tuple[str, ...]) -> str:
+def _unit(path: tuple[str, ...], usual: Mapping[str, str]) -> str:
     """Unit of the element of a vector, by the field that holds it."""
     if path[-1] not in ("x", "y", "z") or len(path) < 2:
         # a pose in the plane, or a point alone
         return "m" if path in (("x",), ("y",), ("z",)) else "rad" if path == ("theta",) else ""
-    return _UNITS.get(path[-2], "")
+    return usual.get(path[-2], "")
 
 
 def beside_clock(
