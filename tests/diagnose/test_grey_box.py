@@ -100,6 +100,13 @@ def test_the_nearest_name_of_a_law_that_has_one() -> None:
     # the true law does as well; both were fitted to other runs, which leaves either some nats ahead
     assert abs(first["unused_runs_prefer_the_law_by_nats"]) < 0.01 * law["gate"]["gain_nats"]
     assert first["rms_difference"] < 0.1 * 0.25
+    # a slope may be the law's or the declared one's: four standard deviations, 1.96 in half of it
+    b = law["declared"]["b"]
+    assert abs(b["value"] - FRICTION) < 4.0 * (b["ci95"][1] - b["ci95"][0]) / (2.0 * 1.96)
+    # the curve is made of its coefficients, eight alike, with weights that add up to 1 and a jump
+    half = np.array([0.5 * (c["ci95"][1] - c["ci95"][0]) for c in law["coefficients"]])
+    band = 0.5 * (np.array(law["curve"]["high"]) - np.array(law["curve"]["low"]))
+    assert np.max(band) < np.max(half[:-8]) + half[-1]
     # the others do not, and it is said where
     assert all(named["unused_runs_prefer_the_law_by_nats"] > GATE for named in law["nearest"][1:])
     assert law["nearest"][-1]["differs"]

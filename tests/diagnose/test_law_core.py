@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from cosim.diagnose.grey_box.basis import ALONG_X, ALONG_Y, Axis, Shape
 from cosim.diagnose.grey_box.regression import Gram, Regression, regress
+from cosim.diagnose.grey_box.trial import Law, Trial
+from cosim.diagnose.models import Fitted
 from sources.function import Oracle
 from sources.variant import build_model
 
@@ -106,3 +111,33 @@ def test_noise_is_no_law() -> None:
 
 def test_what_one_run_has_alone_is_not_expected_of_others() -> None:
     assert regressed(grams(TRUTH, 5, only=1)).expected < 0.0
+
+
+class Posterior:
+    """What a fit of some directions of a law says of them and of a declared slope."""
+
+    def __init__(self, covariance: np.ndarray) -> None:
+        self.covariance, self.theta = covariance, np.zeros(covariance.shape[0])
+        self.free, self.estimate = self.theta.size, self
+
+
+@pytest.mark.parametrize("kept", [0, 3, 8, ALONG_X + 1])
+def test_what_was_not_fitted_of_a_law_counts_in_all_intervals(kept: int) -> None:
+    """However many directions were fitted, intervals are those of the whole law."""
+    data = grams(TRUTH, 3)
+    found = regressed(data, 1.0 / (NOISE * 5.0) ** 2)
+    values, vectors = eigh(found.matrix, found.prior.law)
+    fitted, rest = vectors[:, kept:], vectors[:, :kept] / np.sqrt(1.0 + values[:kept])
+    whole = np.sum([g.matrix for g in data], axis=0)[:-1, :-1] + found.prior.whole
+    joint = np.sqrt(np.diag(np.linalg.inv(whole)))
+    turn = np.zeros((whole.shape[0], 1 + fitted.shape[1]))
+    turn[-1, 0], turn[:-1, 1:] = 1.0, fitted  # a model has its declared parameters first
+    own = np.linalg.inv(turn.T @ whole @ turn)
+    trial = Trial(Shape("x", SPEED), tuple(data), found, np.eye(ALONG_X + 1))
+    law = Law(trial, cast("Fitted", Posterior(own)), fitted, rest)
+    slope = np.hypot(np.sqrt(own[0, 0]), law.declared(np.ones(1)))
+    # inverses of matrices of condition 1e7: rounding
+    assert slope == pytest.approx(joint[-1:], rel=1e-6)
+    assert law.spread(np.eye(ALONG_X + 1)) == pytest.approx(joint[:-1], rel=1e-6)
+    if kept > 8:  # the slope was told by nothing that was fitted
+        assert np.sqrt(own[0, 0]) < 0.2 * joint[-1]

@@ -133,7 +133,7 @@ def regress(
     """
     total = np.sum([g.matrix for g in grams], axis=0)
     free = penalties[0].shape[0]
-    matrix, vector, back = _integrated(total, free, declared)
+    matrix, vector, back = integrated(total, free, declared)
     evidence, prior = _evidence(matrix, vector, penalties, declared, jumps)
     factor = cho_factor(matrix + prior.law)
     value = cho_solve(factor, vector)
@@ -150,7 +150,7 @@ def regress(
     )  # fmt: skip
 
 
-def _integrated(total: Vector, free: int, declared: Vector) -> tuple[Vector, Vector, Vector]:
+def integrated(total: Vector, free: int, declared: Vector) -> tuple[Vector, Vector, Vector]:
     """A and b of the law without what declared parameters do, and these of [law, residual]."""
     inner = total[free:-1, free:-1] + np.diag(declared)
     outer = total[free:-1][:, [*range(free), -1]]

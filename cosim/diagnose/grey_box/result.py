@@ -114,13 +114,7 @@ class LawFromData:
                        **{which: row[which]["validation"] for which in ("before", "after")}}
                 for name, row in errors.items()
             },
-            "declared": {
-                p.name: {"value": float(law.fitted.estimate.theta[i]), "unit": p.unit,
-                         "ci95": [float(law.fitted.estimate.low[i]),
-                                  float(law.fitted.estimate.high[i])]}
-                for i, p in enumerate(law.fitted.problem.parameters)
-                if p.role == "declared"
-            },
+            "declared": self._declared(law),
             "nearest": named,
             "fmu": None if self.fmu is None else str(self.fmu),
         }  # fmt: skip
@@ -152,13 +146,23 @@ class LawFromData:
         x, y = np.meshgrid(*lines, indexing="ij")
         return [x.ravel(), y.ravel()], visits, grid
 
+    def _declared(self, law: Law) -> dict[str, Any]:
+        """Declared parameters with what the whole law leaves open of them."""
+        estimate, found = law.fitted.estimate, {}
+        more = BAND * law.declared(self.base.problem.scale)
+        for i, p in enumerate(self.base.problem.parameters):
+            if p.role == "declared":
+                value, low, high = (v[i] for v in (estimate.theta, estimate.low, estimate.high))
+                ends = (max(value - np.hypot(value - low, more[i]), p.minimum),
+                        min(value + np.hypot(high - value, more[i]), p.maximum))  # fmt: skip
+                found[p.name] = {"value": float(value), "unit": p.unit, "ci95": [*map(float, ends)]}
+        return found
+
     @staticmethod
     def _coefficients(law: Law) -> list[dict[str, Any]]:
         """Those of the FMU that are not 0, or those of the named terms."""
-        covariance = law.fitted.estimate.covariance[law.fits, law.fits]
-        turn = law.directions if law.trial.words else law.trial.expansion @ law.directions
-        values = turn @ law.fitted.estimate.theta[law.fits]
-        deviation = np.sqrt(np.einsum("ij,jk,ik->i", turn, covariance, turn))
+        turn = np.eye(law.free.size) if law.trial.words else law.trial.expansion
+        values, deviation = turn @ law.free, law.spread(turn)
         names = law.trial.words or [f"c[{i + 1}]" for i in range((ALONG_X + 1) * ALONG_Y)]
         return [
             {"name": name, "value": float(value), "ci95": [float(value - BAND * one),

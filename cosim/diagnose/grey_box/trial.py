@@ -21,7 +21,7 @@ from ..candidates import Candidate
 from ..models import GATE, Fitted, compare, is_open
 from .basis import Shape
 from .bench import EFFECT, LawBench
-from .regression import Gram, Regression, regress
+from .regression import Gram, Regression, integrated, regress
 
 Vector = NDArray[np.float64]
 DIRECTIONS = 20
@@ -126,11 +126,31 @@ class Law:
             )
             variance = np.einsum("ij,ji->i", design, np.linalg.solve(precision, design.T))
             return design @ self.free, np.sqrt(variance)
+        return design @ self.free, self.spread(design)
+
+    def spread(self, turn: Vector) -> Vector:
+        """Standard deviations of sums of the free coefficients.
+
+        Args:
+            turn: sums (rows) of the coefficients (columns).
+        """
         covariance = self.fitted.estimate.covariance[self.fits, self.fits]
-        known = design @ self.directions
+        known = turn @ self.directions
         variance = np.einsum("ij,jk,ik->i", known, covariance, known)
-        variance += np.sum((design @ self.rest) ** 2, axis=1)
-        return design @ self.free, np.sqrt(variance)
+        return np.asarray(np.sqrt(variance + np.sum((turn @ self.rest) ** 2, axis=1)))
+
+    def declared(self, scale: Vector) -> Vector:
+        """What the directions that were not fitted add to the deviations of declared parameters.
+
+        These go along with the law to where the data agree with both.
+
+        Args:
+            scale: of the parameters.
+        """
+        total = np.sum([gram.matrix for gram in self.trial.grams], axis=0)
+        count = self.free.size
+        *_, back = integrated(total, count, self.trial.regression.prior.declared)
+        return np.asarray(scale * np.sqrt(np.sum((back[:, :count] @ self.rest) ** 2, axis=1)))
 
     def design(self, x: Vector, y: Vector) -> Vector:
         """Functions of the free coefficients (columns) at points."""
