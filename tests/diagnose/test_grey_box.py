@@ -100,6 +100,15 @@ def test_the_nearest_name_of_a_law_that_has_one() -> None:
     # the true law does as well; both were fitted to other runs, which leaves either some nats ahead
     assert abs(first["unused_runs_prefer_the_law_by_nats"]) < 0.01 * law["gate"]["gain_nats"]
     assert first["rms_difference"] < 0.1 * 0.25
+    # where the two curves are, viscous friction of each counted in: to first order, and to what
+    # the runs tell of a hundredth of a law
+    assert result.law is not None
+    x, value, visited = (np.array(law["curve"][name]) for name in ("x", "value", "visited"))
+    more = result.law.named[0].fitted.estimate.values["b"] - law["declared"]["b"]["value"]
+    p = first["parameters"]
+    away = -p["tau_c"] * np.tanh(x / p["w_0"]) - more * x - value
+    apart = np.average(away**2, weights=visited) ** 0.5
+    assert 0.5 * apart < first["rms_difference"] < 2.0 * apart
     # a slope may be the law's or the declared one's: four standard deviations, 1.96 in half of it
     b = law["declared"]["b"]
     assert abs(b["value"] - FRICTION) < 4.0 * (b["ci95"][1] - b["ci95"][0]) / (2.0 * 1.96)

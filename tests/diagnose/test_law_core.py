@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import eigh
 
 from cosim.diagnose.grey_box.basis import ALONG_X, ALONG_Y, Axis, Shape
-from cosim.diagnose.grey_box.regression import Gram, Regression, regress
+from cosim.diagnose.grey_box.regression import Gram, Regression, regress, solved
 from cosim.diagnose.grey_box.trial import Law, Trial
 from cosim.diagnose.models import Fitted
 from sources.function import Oracle
@@ -57,20 +57,23 @@ def test_a_narrow_form_is_a_case_of_the_surface(form: str) -> None:
     assert surface @ shape.expansion @ free == pytest.approx(shape.design(x, y) @ free, abs=1e-12)
 
 
-def grams(truth: np.ndarray, seed: int, only: int | None = None) -> list[Gram]:
+def grams(
+    truth: np.ndarray, seed: int, only: int | None = None, noise: float = NOISE
+) -> list[Gram]:
     """Three runs of a sensor that shows a law of speed as it is, beside a slope that is declared.
 
     Args:
         truth: values of the law where it is seen, by a function of speed.
         seed: of speeds and noise.
         only: run that has the law, all if not given.
+        noise: of the sensor; its size is taken for `NOISE`.
     """
     random = np.random.default_rng(seed)
     found = []
     for run in range(3):
         speed = random.uniform(-6.0, 5.0, SAMPLES)
         law = SPEED.along_x(speed) @ truth * (only is None or only == run)
-        rest = (law + NOISE * random.standard_normal(SAMPLES)) / NOISE
+        rest = (law + noise * random.standard_normal(SAMPLES)) / NOISE
         table = np.column_stack([SPEED.along_x(speed) / NOISE, speed / NOISE, rest])
         found.append(Gram(f"{run}", table.T @ table, np.array([False]), SAMPLES))
     return found
@@ -111,6 +114,17 @@ def test_noise_is_no_law() -> None:
 
 def test_what_one_run_has_alone_is_not_expected_of_others() -> None:
     assert regressed(grams(TRUTH, 5, only=1)).expected < 0.0
+
+
+def test_a_difference_below_the_noise_is_not_none() -> None:
+    """What two models do differently has no noise, so nothing of it is by chance."""
+    known = regressed(grams(TRUTH, 3), slope=1e8).prior.law
+    small = 0.05 * TRUTH
+    data = grams(small, 6, noise=0.0)
+    found = solved(data, known, np.array([1e8]))
+    at = SPEED.along_x(np.linspace(-5.9, 4.9, 200))
+    off, size = (float(np.sqrt(np.mean((at @ c) ** 2))) for c in (found - small, small))
+    assert off < 0.3 * size  # 1800 samples at a tenth of the noise, beside a dozen numbers
 
 
 class Posterior:

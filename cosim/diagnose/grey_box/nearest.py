@@ -19,7 +19,7 @@ from ...calibrate.problem import Problem
 from ...errors import CosimError
 from ..candidates import Candidate, candidates, new_parameters
 from ..models import Fitted
-from .regression import regress
+from .regression import solved
 from .trial import QUICK, Law, Maker
 
 Vector = NDArray[np.float64]
@@ -165,7 +165,6 @@ def _difference(maker: Maker, law: Law, named: Fitted) -> Vector:
     directions = law.directions if narrow else np.eye(law.directions.shape[0])
     asked = law.trial.expansion @ directions
     grams = maker.bench.grams(law.shape, asked, theta, law.coefficients, away, slopes, held)
-    penalties = [np.zeros((directions.shape[1],) * 2)]
-    if not (narrow or law.trial.words):
-        penalties = law.shape.penalties()
-    return np.asarray(directions @ regress(grams, penalties, FREE * maker.declared).value)
+    # it has no noise whose evidence could tell its size: it may be as large as the law
+    known = directions.T @ law.trial.regression.prior.law @ directions
+    return np.asarray(directions @ solved(grams, known, FREE * maker.declared))

@@ -150,6 +150,19 @@ def regress(
     )  # fmt: skip
 
 
+def solved(grams: Sequence[Gram], known: Vector, declared: Vector) -> Vector:
+    """Coefficients of greatest probability under a prior that is given.
+
+    Args:
+        grams: of the runs, columns of the law being its free coefficients.
+        known: precision of these.
+        declared: precision of the declared parameters, scaled.
+    """
+    total = np.sum([g.matrix for g in grams], axis=0)
+    matrix, vector, _ = integrated(total, known.shape[0], declared)
+    return np.asarray(cho_solve(cho_factor(matrix + known), vector))
+
+
 def integrated(total: Vector, free: int, declared: Vector) -> tuple[Vector, Vector, Vector]:
     """A and b of the law without what declared parameters do, and these of [law, residual]."""
     inner = total[free:-1, free:-1] + np.diag(declared)
