@@ -184,16 +184,19 @@ def _print_law(law: dict[str, Any], console: Console) -> None:
         return
     console.print(f"  law at {law['place']}: {law['formula']}", soft_wrap=True)
     for name, row in law["error"].items():
-        sizes = [row[which].get("validation") for which in ("before", "after")]
-        if None not in sizes:
+        unused = row["after"]["validation"] is not None
+        purpose, runs = ("validation",) * 2 if unused else ("identification", "fitted")
+        before, after = (row[which][purpose] for which in ("before", "after"))
+        if None not in (before, after):
             console.print(
-                f"    {name}: {sizes[0]:.4g} -> {sizes[1]:.4g} {row['unit']} on validation runs, "
+                f"    {name}: {before:.4g} -> {after:.4g} {row['unit']} on {runs} runs, "
                 f"noise {row['noise_rms']:.4g}", soft_wrap=True,
             )  # fmt: skip
     for named in law["nearest"]:
+        runs = "fitted" if named["unused_runs_prefer_the_law_by_nats"] is None else "unused"
         console.print(
             f"    near it: {named['effect']}, {named['rms_difference']:.3g} {law['unit']} away "
-            f"(RMS), worse by {named['unused_runs_prefer_the_law_by_nats']:.0f} nats on unused "
+            f"(RMS), worse by {named[f'{runs}_runs_prefer_the_law_by_nats']:.0f} nats on {runs} "
             "runs", soft_wrap=True,
         )  # fmt: skip
 

@@ -140,6 +140,7 @@ class Diagnosis:
             "inside": self.inside,
             "adapters": {a.name: {**asdict(a), "where": a.where} for a in self.adapters},
             "withheld": list(self.withheld),
+            "catalogue_asked": not self.asked,
             "localisation": [place.to_dict() for place in self.located],
             "law_from_data": None if self.law is None else self.law.to_dict(),
             "power": self.power,

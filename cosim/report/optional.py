@@ -36,7 +36,8 @@ def hints(facts: Facts) -> Html:
     return section(
         "hints", "Nearest laws",
         tag("p", "None of these explains the data; what they would take says how far they are "
-            "from it."),
+            "from it." if facts.judged else "No run was kept unused to judge these by; what they "
+            "would take says how far they are from a name."),
         table(["law", "would explain", "with", "leaves (over noise)", "why it is no name"], rows,
               "nearest laws"),
     ) if rows else Html("")  # fmt: skip
@@ -56,27 +57,29 @@ def law(facts: Facts, store: Store) -> Html:
     curve: Mapping[str, Any] = found["curve"]
     of = f" [{unit(found.get('unit', ''))}]" if unit(found.get("unit", "")) else ""
     rows = []
-    for name, row in found.get("channels", {}).items():
-        noise = row["noise_rms"]
-        rows.append([name, *(_error(row.get(which), noise) for which in ("before", "after"))])
+    for name, row in found.get("error", {}).items():
+        sizes = (row[which].get(facts.purpose) for which in ("before", "after"))
+        rows.append([name, *(_error(size, row["noise_rms"]) for size in sizes)])
+    runs = "unused" if facts.judged else "fitted"
     near = [
         [tag("code", f"{item['effect']} at {item['place']}"), item["rms_difference"],
-         item["unused_runs_prefer_the_law_by_nats"]]
+         item[f"{runs}_runs_prefer_the_law_by_nats"]]
         for item in found.get("nearest", [])
     ]  # fmt: skip
     lines = _line(curve, store) if "at" in curve else _slices(found, curve, store)
     return section(
         "law", "A law from the data",
-        tag("p", "A law without a name was fitted with all parameters and judged on unused runs. "
-            "It says what the missing law looks like, not what it is. ", found.get("reason", "")),
+        tag("p", "A law without a name was fitted with all parameters and judged on "
+            f"{runs} runs. It says what the missing law looks like, not what it is. ",
+            found.get("reason", "")),
         tag("p", "Its form: ", found["formula"], ".") if found.get("formula") else Html(""),
         plot(
             f"law from the data at {found.get('place', '')}",
             [Panel(f"added at {found.get('place', '')}{of}", lines, height=240, short="law")],
             axis=str(curve["driver"]).replace("_", " "), group="law",
         ),
-        table(["channel", "before", "after"], rows, "errors with the law"),
-        table(["named law", f"differs by (RMS){of}", "worse on unused runs [nats]"], near,
+        table(["channel", "before", "after"], rows, f"errors with the law on {runs} runs"),
+        table(["named law", f"differs by (RMS){of}", f"worse on {runs} runs [nats]"], near,
               "named laws beside it") if near else Html(""),
     )  # fmt: skip
 

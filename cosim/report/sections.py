@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnose.bursts import written
-from ..diagnose.story.facts import Facts, named_unit
+from ..diagnose.story.facts import Facts, named_unit, place_label
 from ..diagnose.story.verdicts import label
 from ..diagnose.whiteness import CALIBRATED
 from ..display.document import section
@@ -264,11 +264,6 @@ def _against(curve: Mapping[str, Any]) -> str:
     return f"{name} ({curve['run']})" if curve["run"] else name
 
 
-def _label(place: Mapping[str, Any]) -> str:
-    element = f"[{place['element']}]" if place["element"] else ""
-    return f"{place['component']}.{place['port']}{element}"
-
-
 def located(facts: Facts, store: Store) -> Html:
     """Where an unknown input would have to enter, and its curves."""
     places = facts.at("localisation")
@@ -276,12 +271,13 @@ def located(facts: Facts, store: Store) -> Html:
     for n, place in enumerate(places[:PLACES]):
         best = place["curves"][0]
         rows.append(
-            [tag("code", _label(place)), place["evidence_nats"], Cell(_against(best), kind="text"),
+            [tag("code", place_label(place)), place["evidence_nats"],
+             Cell(_against(best), kind="text"),
              Cell(facts.percent("localisation", n, "curves", 0, "explained"), best["explained"])]
         )  # fmt: skip
         if n < CURVES:
             plots += [
-                unknown_curve(store, f"unknown {n} {k}", _label(place), place["unit"], curve)
+                unknown_curve(store, f"unknown {n} {k}", place_label(place), place["unit"], curve)
                 for k, curve in enumerate(place["curves"][:2])
             ]
     if not rows:
@@ -301,6 +297,7 @@ def located(facts: Facts, store: Store) -> Html:
 def candidates(material: Material) -> Html:
     """Rounds of the search."""
     parts: list[object] = []
+    runs = "unused" if Facts(material.table).judged else "fitted"
     for number_, stage in enumerate(material.candidates):
         rows = []
         for name, score, z, p, absorbed, refit, gain, gain_z, same in stage.rows:
@@ -321,7 +318,9 @@ def candidates(material: Material) -> Html:
                 [
                     "effect", ("score [nats]", WORDS["score"]), ("z", WORDS["z"]),
                     ("p (Holm)", WORDS["p (Holm)"]), ("absorbed", WORDS["absorbed"]),
-                    ("refit [nats]", WORDS["refit"]), ("unused runs [nats]", WORDS["unused"]),
+                    ("refit [nats]", WORDS["refit"]),
+                    ("unused runs [nats]", WORDS["unused"]) if runs == "unused"
+                    else "fitted runs [nats]",
                     "same signature",
                 ],
                 rows, f"candidates of round {number_ + 1}",
@@ -332,7 +331,7 @@ def candidates(material: Material) -> Html:
     return section(
         "candidates", "Candidates",
         tag("p", "The best by score are fitted with all declared parameters and judged on the "
-            "unused runs."),
+            f"{runs} runs."),
         *parts,
     )  # fmt: skip
 

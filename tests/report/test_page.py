@@ -17,7 +17,9 @@ from cosim.report import page as pages
 from cosim.report.page import rendered
 from sources.variant import effects
 from tests.report.marked import Marked, expected
-from tests.report.stories import VERDICTS, material, table
+from tests.report.stories import EFFECT, PLACE, VERDICTS, material, table
+
+WHICH = ("before", "after")
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
@@ -152,7 +154,8 @@ def test_optional_parts_are_shown_only_where_they_are() -> None:
         "depends_on": "velocity",
         "curve": {"driver": "velocity", "at": [-1.0, 0.0, 1.0], "value": [0.4, 0.0, -0.4],
                   "deviation": [0.1, 0.1, 0.1]},
-        "channels": {"speed": {"noise_rms": 0.155, "before": 0.5, "after": 0.16}},
+        "error": {"speed": {"noise_rms": 0.155, "before": {"validation": 0.5},
+                            "after": {"validation": 0.16}}},
     }  # fmt: skip
     text = Marked(rendered(replace(shown, table=more))).text
     for part in (
@@ -193,6 +196,54 @@ def test_a_law_over_two_signals_is_shown_in_slices_and_none_with_its_reason() ->
     more["law_from_data"] = {"place": "load.flange", "made": False, "reason": "Nothing varies."}
     text = rendered(replace(shown, table=more))
     assert "No law from the data" in text and "Nothing varies." in text
+
+
+@pytest.mark.parametrize("unused", [True, False], ids=["unused runs", "all fitted"])
+@pytest.mark.parametrize("asked", [True, False], ids=["catalogue", "law from data"])
+def test_what_was_not_asked_or_not_judged_is_not_claimed(unused: bool, asked: bool) -> None:
+    claims = {}
+    for verdict in ("unexplained", "nothing_missing"):
+        shown = material(verdict)
+        more = dict(shown.table, catalogue_asked=asked)
+        error = {"identification": 0.17, "validation": 0.16}
+        nearest = {"effect": "coulomb", "place": "load.flange", "rms_difference": 0.25,
+                   "unused_runs_prefer_the_law_by_nats": 30.0}  # fmt: skip
+        if not unused:
+            for row in [error, *(r[w] for r in more["channels"].values() for w in WHICH)]:
+                row["validation"] = None
+            nearest |= {"unused_runs_prefer_the_law_by_nats": None,
+                        "fitted_runs_prefer_the_law_by_nats": 30.0}  # fmt: skip
+        if verdict == "unexplained":
+            more["hints"] = [{"effects": [dict(EFFECT)], "explained": 0.61, "left": None,
+                              "why": ["no run was kept"]}]  # fmt: skip
+            more["law_from_data"] = {
+                "place": "load.flange", "unit": "N.m", "made": True, "formula": "-0.4 sign(w)",
+                "depends_on": "velocity", "nearest": [nearest],
+                "curve": {"driver": "velocity", "at": [-1.0, 1.0], "value": [0.4, -0.4],
+                          "deviation": [0.1, 0.1]},
+                "error": {"speed": {"noise_rms": 0.155, "before": error, "after": error}},
+            }  # fmt: skip
+        claims[verdict] = Marked(rendered(replace(shown, table=more))).text
+    said, none = claims["unexplained"], claims["nothing_missing"]
+    for text in (said, none):
+        assert ("The catalogue was not asked" in text) is not asked
+    assert ("every effect of the catalogue were tried" in said) is asked
+    assert ("nor the catalogue knows" in said) is asked and ("--law-from-data" in said) is not asked
+    assert ("none explains what is left" in said) is (asked and unused)
+    assert ("No effect of the catalogue makes it better" in none) is (asked and unused)
+    assert ("was kept unused" in said) is not unused
+    for part in ("holds on unused runs", "None of these explains", "worse on unused runs",
+                 "judged on unused runs", "0.16 (1.03×)"):  # fmt: skip
+        assert (part in said) is unused
+    assert unused or ("0.17 (1.10×)" in said and "worse on fitted runs" in said)
+
+
+def test_an_element_of_a_place_is_named_wherever_the_place_is() -> None:
+    shown = material("unexplained")
+    curves = [{**PLACE["curves"][0], "explained": 0.9}]
+    place = {**PLACE, "component": "arm", "port": "joint", "element": "2", "curves": curves}
+    text = Marked(rendered(replace(shown, table={**shown.table, "localisation": [place]}))).text
+    assert "An unknown input at arm.joint[2], free in its course" in " ".join(text.split())
 
 
 def test_clocks_that_were_estimated_are_told() -> None:

@@ -44,12 +44,15 @@ class Named:
     fitted: Fitted
     difference: Vector
 
-    def to_dict(self, law: Law, gain: float, at: list[Vector], visits: Vector) -> dict[str, Any]:
+    def to_dict(
+        self, law: Law, gain: float, unused: bool, at: list[Vector], visits: Vector
+    ) -> dict[str, Any]:
         """As in the JSON.
 
         Args:
             law: the one from data.
-            gain: log likelihood by which that does better on unused runs [nats].
+            gain: log likelihood by which that does better on the runs that judge [nats].
+            unused: whether these were not fitted.
             at: points of its curve, x and y.
             visits: share of the samples near each of them.
         """
@@ -69,7 +72,8 @@ class Named:
             },
             "rms_difference": rms,
             "relative_difference": rms / size if size > 0.0 else None,
-            "unused_runs_prefer_the_law_by_nats": gain,
+            "unused_runs_prefer_the_law_by_nats": gain if unused else None,
+            **({} if unused else {"fitted_runs_prefer_the_law_by_nats": gain}),
             "value": (own + away).tolist(),
             "differs": [
                 {"x": float(at[0][i]), "y": float(at[1][i]), "law": float(own[i]),

@@ -80,7 +80,7 @@ class LawFromData:
         for item in self.named:
             gate = compare(self.search.check_data, item.fitted.check, law.fitted.check,
                            self.search.checking)  # fmt: skip
-            named.append(item.to_dict(self.smooth, gate.gain, points, visits))
+            named.append(item.to_dict(self.smooth, gate.gain, self.search.unused, points, visits))
         return table | {
             "form": law.shape.form,
             "depends_on": law.shape.label,
@@ -171,7 +171,10 @@ class LawFromData:
         ]  # fmt: skip
 
     def errors(self, law: Law) -> dict[str, Any]:
-        """RMS residual of each channel in its unit, by purpose, without the law and with it."""
+        """RMS residual of each channel in its unit, by purpose, without the law and with it.
+
+        None for unused runs where there are none.
+        """
         search = self.search
         table: dict[str, Any] = {
             c.name: {"unit": c.unit, "noise_rms": c.sigma, "before": {}, "after": {}}
@@ -182,8 +185,9 @@ class LawFromData:
                 ("identification", search.fit_data - fitted.fit, search.fitting),
                 ("validation", search.check_data - fitted.check, search.checking),
             ):
+                there = purpose == "identification" or search.unused
                 for name, value in rms(vector, stack).items():
-                    table[name][which][purpose] = value
+                    table[name][which][purpose] = value if there else None
         return table
 
     def leave_fmu(self, out: Path | None) -> list[Path]:

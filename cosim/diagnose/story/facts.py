@@ -21,6 +21,12 @@ def place_in_words(place: str) -> str:
     return " of ".join([f"the {parts[0]}", *parts[1:-1], *(f"the {p}" for p in parts[1:][-1:])])
 
 
+def place_label(place: Mapping[str, Any]) -> str:
+    """A place of the localisation as tables name it."""
+    element = f"[{place['element']}]" if place["element"] else ""
+    return f"{place['component']}.{place['port']}{element}"
+
+
 def sentence(of: str) -> str:
     """A text without its full stop."""
     return of.strip().rstrip(".")
@@ -140,10 +146,20 @@ class Facts:
         return "validation" if unused else "identification"
 
     @property
+    def judged(self) -> bool:
+        """Whether there are unused runs, which judge."""
+        return self.purpose == "validation"
+
+    @property
+    def asked(self) -> bool:
+        """Whether effects of the catalogue were looked for."""
+        return bool(self.table.get("catalogue_asked", True))
+
+    @property
     def runs_in_words(self) -> str:
         """The runs that judge."""
         return (
-            "runs that were not used for fitting" if self.purpose == "validation"
+            "runs that were not used for fitting" if self.judged
             else "the fitted runs"
         )  # fmt: skip
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...calibrate.checks.finding import LASTING
 from ...display.html import Html, command, join, quantity, tag, words
-from .facts import Facts, inside, sentence
+from .facts import Facts, inside, place_label, sentence
 
 ADVICE = Path(__file__).parent / "advice.toml"
 LABELS = {
@@ -251,9 +251,12 @@ def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
              _misses(facts, "after"), " its sensor's noise on ", facts.runs_in_words,
              ". 1× is the best that any model can do.")
         if facts.worst else Html(""),
-        join("No effect of the catalogue makes it better on unused runs. What is smaller than the "
-             "sizes ", tag("a", "listed below", href="#power"), " may still be there unseen",
-             _smallest(facts), "."),
+        join("The catalogue was not asked for effects that make it better." if not facts.asked
+             else "No effect of the catalogue makes it better on unused runs." if facts.judged
+             else "No run was kept unused to judge effects of the catalogue by."),
+        join("What is smaller than the sizes ", tag("a", "listed below", href="#power"),
+             " may still be there unseen", _smallest(facts), ".")
+        if facts.at("power") else Html(""),
     ]  # fmt: skip
     line = run_line(facts)
     steps = []
@@ -322,23 +325,31 @@ def best_curve(place: Mapping[str, Any]) -> tuple[int, Mapping[str, Any]]:
 
 def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     where = likely_place(facts)
-    at = f"{where['component']}.{where['port']}" if where else ""
+    at = place_label(where) if where else ""
     driver, law = "", facts.table.get("law_from_data") or {}
     likely = str(law["place"]) if law.get("made") else at
     headline = join(
-        "The machine does something that neither the model nor the catalogue knows: the model "
-        "misses ", tag("b", facts.worst), " by ", _misses(facts, "after"), " its sensor's noise",
+        "The machine does something that ",
+        "neither the model nor the catalogue knows" if facts.asked else "the model does not know",
+        ": the model misses ", tag("b", facts.worst), " by ", _misses(facts, "after"),
+        " its sensor's noise",
         join("; what is missing enters most likely ", facts.in_words(likely)) if likely else "",
         ".",
     )  # fmt: skip
+    left = words([tag("b", name) for name in facts.left])
     meaning = [
-        join("Calibration and every effect of the catalogue were tried; none explains what is left "
-             "of ", words([tag("b", name) for name in facts.left]), " on unused runs."),
+        join("The catalogue was not asked; calibration alone leaves more than noise in ", left, ".")
+        if not facts.asked else
+        join("Calibration and every effect of the catalogue were tried; ",
+             join("none explains what is left of ", left, " on unused runs.") if facts.judged
+             else join("no run was kept unused to judge by, so none is named for what is left of ",
+                       left, ".")),
     ]  # fmt: skip
     if law.get("made"):
         meaning.append(
             join("A law made from the data says more: ", tag("code", law["formula"]), " at ",
-                 tag("code", law["place"]), " holds on unused runs; ",
+                 tag("code", law["place"]), " holds on unused runs; " if facts.judged
+                 else " explains the fitted runs, and none was kept unused to judge it; ",
                  tag("a", "its curve, and what it leaves", href="#law"), ".")
         )  # fmt: skip
     if where is not None:
@@ -359,6 +370,11 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         )  # fmt: skip
     meaning.append(join(facts.table.get("inside", "")))
     steps = _compare(facts)
+    if not facts.asked:
+        steps.append(
+            join(tag("b", "Ask the catalogue"), ": the same command without ",
+                 tag("code", "--law-from-data"), ".")
+        )  # fmt: skip
     if law.get("made"):
         at, driver = str(law["place"]), str(law["depends_on"])
     if at:
