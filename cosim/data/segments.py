@@ -156,14 +156,24 @@ def _each(log: Log, key: str) -> Iterator[tuple[float, Log]]:
 
 
 def windows(name: str, log: Log, lead: float) -> Iterator[tuple[str, Log]]:
-    """The windows of a log, each with its inputs from `lead` before on, at negative times."""
+    """The windows of a log, each with its inputs from `lead` before on, at negative times.
+
+    Raises:
+        ScenarioError: it is shorter than one.
+    """
     if "window" not in log.values:
         yield name, log
         return
     length = float(log.values["window"])
     time = log.time
     edge = ROUNDING * length
-    for k in range(int((time[-1] - time[0] + edge) / length)):
+    lasts = time[-1] - time[0] + edge
+    if lasts < length:
+        raise ScenarioError(
+            f"{log.name}: run {name!r} lasts {lasts - edge:.6g} s, less than its window of "
+            f"{length:g} s; leave it out, or give it another window"
+        )
+    for k in range(int(lasts / length)):
         begin = time[0] + k * length
         mine = (time >= begin - lead - edge) & (time <= begin + length + edge)
         columns = {one: values[mine] for one, values in log.columns.items()

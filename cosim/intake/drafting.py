@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..data.segments import ROUNDING
 from ..errors import InputError, UnknownNameError, listing
 from ..spec.units import conversion, parse
 from .draft import ColumnEntry, Draft, Entry
@@ -93,6 +94,7 @@ def layout(
 
     Raises:
         UnknownNameError: the lateness of a part that is not used.
+        InputError: a run is shorter than a piece.
     """
     for key in lateness or {}:
         if key not in runs[0].parts:
@@ -104,7 +106,14 @@ def layout(
     for match in matches.channels.values():
         count[match.column.part] = count.get(match.column.part, 0) + 1
     main = max(count, key=lambda key: (count[key], _rate(runs[0].parts[key])))
-    shortest = min(run.parts[main].report.clock.duration for run in runs)
+    lengths = {run.name: run.parts[main].report.clock.duration for run in runs}
+    shortest = min(lengths.values())
+    least = window * (1.0 - ROUNDING)
+    if shortest < least:
+        short = ", ".join(f"{name} {of:.4g} s" for name, of in lengths.items() if of < least)
+        raise InputError(
+            f"--window {window:g}: these runs last less: {short}; leave them out, or take another"
+        )
     shortest = min(shortest, window or shortest)
     used = {m.column.part for m in (*matches.inputs.values(), *matches.channels.values())}
     whole = all(readable([run.parts[key] for key in used]) for run in runs)

@@ -201,3 +201,10 @@ def test_the_yaw_of_a_quaternion_and_a_mapping_on_another(tmp_path: Path) -> Non
     problem = problem_of(tmp_path, text, **log)
     assert problem.step == 0.05
     assert worst(problem) < 1e-5  # as above
+
+
+def test_a_run_that_is_shorter_than_its_window_is_refused(tmp_path: Path) -> None:
+    wheels = {"t": TIMES, "left": LEFT, "right": RIGHT, **circle(TIMES)}
+    assert len(problem_of(tmp_path, HEAD + "window = 20.0\n", **wheels).runs) == 1
+    with pytest.raises(ScenarioError, match=r"'one' lasts 20 s, less than its window of 20\.1 s"):
+        problem_of(tmp_path, HEAD + "window = 20.1\n", **wheels)

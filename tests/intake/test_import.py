@@ -200,6 +200,20 @@ def test_somebody_is_asked_what_is_open_only(logs: Path, tmp_path: Path) -> None
     assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
 
 
+def test_a_run_that_is_shorter_than_the_window_is_named(logs: Path, tmp_path: Path) -> None:
+    for name, rows in (("long_cmd", 601), ("long_pose", 301), ("short_cmd", 300)):
+        lines = (logs / f"one_{name.partition('_')[2]}.csv").read_text().splitlines()
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines[:rows]))
+    lines = (logs / "one_pose.csv").read_text().splitlines()
+    (tmp_path / "short_pose.csv").write_text("\n".join(lines[:151]))
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    with pytest.raises(
+        InputError, match=r"--window 10: these runs last less: short 5\.96 s; leave"
+    ):
+        imported(tmp_path, tmp_path / "set", window=10.0)
+    assert not (tmp_path / "set").exists()
+
+
 def test_runs_are_cut_into_windows_with_starts_of_their_own(logs: Path, tmp_path: Path) -> None:
     done = imported(logs, tmp_path / "set", window=4.0, parameters={"base.r": ()})
     assert len(done.runs) == 3
