@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from ..files import make_folder, write_text
+from ..files import claimed, write_text
 from ..installation.builder import default_provider
 from .progress import Display
 from .streams import print_json
@@ -71,53 +72,59 @@ def calibrate_command(
     from ..report.pictures import first_guess, run_pictures, tornado_by_run
 
     started = time.perf_counter()
-    with Display() as display:
-        provider = default_provider(display.building)
-        problem = read_problem(dataset, provider, mapping=mapping, system=system)
-        simulator = Simulator(problem, workers=workers)
-        stage = "checking the data"
-        with display.watch("calibrating", lambda: f"{stage}: {simulator.evaluations} simulations"):
-            findings = _usable(problem, examine(simulator))
-            simulator, counted = propagated(simulator)
-            findings += counted
-            stage = "fitting"
-            estimate, exchange = calibrated(simulator)
-            findings += _usable(problem, check_fit(estimate))
-            stage = "what the runs tell of each parameter"
-            correlation = (
-                correlation_index(simulator, estimate.theta, samples, everywhere=figures)
-                if samples
-                else None
-            )
-            guess = first_guess(estimate) if figures else {}
-    if not exchange.small:
-        typer.echo(f"warning: {exchange}", err=True)
-    unused = validation_residuals(estimate)
-    content = calibration_table(estimate, unused, correlation, findings)
-    for line in _far(content["channels"]):
-        typer.echo(f"warning: {line}", err=True)
-    content["exchange"] = exchange.to_dict()
-    content["evaluations"] = simulator.evaluations + exchange.evaluations
-    content["wall_s"] = time.perf_counter() - started
-    folder = make_folder(out or Path("out") / problem.name)
-    page = folder / "report.html"
-    content["files"] = [str(folder / "calibration.json"), str(page)]
-    if correlation is not None:
-        content["files"].append(str(tornado(correlation, folder / "tornado.png")))
-    if figures:
-        place = folder / "figures"
-        drawn = run_pictures(estimate, guess, dict(estimate.residuals) | dict(unused), place)
-        if correlation is not None:
-            drawn.append(tornado_by_run(correlation, place / "sensitivity.png"))
-        content["files"] += map(str, drawn)
-        _add_first_guess(content, problem, guess)
-    text = json.dumps(content, indent=2)
-    write_text(folder / "calibration.json", text + "\n")
-    write_calibration_page(content, estimate, unused, page)
-    if as_json:
-        print_json(content)
-    else:
-        _print(content)
+    with ExitStack() as place:
+        with Display() as display:
+            provider = default_provider(display.building)
+            problem = read_problem(dataset, provider, mapping=mapping, system=system)
+            folder = out or Path("out") / problem.name
+            place.enter_context(claimed(folder))
+            simulator = Simulator(problem, workers=workers)
+            stage = "checking the data"
+            with display.watch(
+                "calibrating", lambda: f"{stage}: {simulator.evaluations} simulations"
+            ):
+                findings = _usable(problem, examine(simulator))
+                simulator, counted = propagated(simulator)
+                findings += counted
+                stage = "fitting"
+                estimate, exchange = calibrated(simulator)
+                findings += _usable(problem, check_fit(estimate))
+                stage = "what the runs tell of each parameter"
+                correlation = (
+                    correlation_index(simulator, estimate.theta, samples, everywhere=figures)
+                    if samples
+                    else None
+                )
+                guess = first_guess(estimate) if figures else {}
+        if not exchange.small:
+            typer.echo(f"warning: {exchange}", err=True)
+        unused = validation_residuals(estimate)
+        content = calibration_table(estimate, unused, correlation, findings)
+        for line in _far(content["channels"]):
+            typer.echo(f"warning: {line}", err=True)
+        content["exchange"] = exchange.to_dict()
+        content["evaluations"] = simulator.evaluations + exchange.evaluations
+        content["wall_s"] = time.perf_counter() - started
+        page, table = folder / "report.html", folder / "calibration.json"
+        content["files"] = [str(table), str(page)]
+        try:
+            if correlation is not None:
+                content["files"].append(str(tornado(correlation, folder / "tornado.png")))
+            if figures:
+                pictures = folder / "figures"
+                residuals = dict(estimate.residuals) | dict(unused)
+                drawn = run_pictures(estimate, guess, residuals, pictures)
+                if correlation is not None:
+                    drawn.append(tornado_by_run(correlation, pictures / "sensitivity.png"))
+                content["files"] += map(str, drawn)
+                _add_first_guess(content, problem, guess)
+            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_calibration_page(content, estimate, unused, page)
+        finally:  # what was found is said, whatever becomes of the files
+            if as_json:
+                print_json(content)
+            else:
+                _print(content)
 
 
 def _far(channels: dict[str, Any]) -> list[str]:

@@ -7,13 +7,13 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..files import make_folder, write_text
+from ..files import claimed, write_text
 from ..installation.builder import default_provider
 from .calibrate import clock_lines
 from .guard import heard
@@ -81,35 +81,39 @@ def diagnose_command(
     from ..report.page import write_page
 
     begun, stage = time.monotonic(), "checking the data"
-    with Display() as display:
-        provider = default_provider(display.building)
-        problem = read_problem(dataset, provider, mapping=mapping, system=system)
-        folder = make_folder(out or Path("out") / problem.name)
+    with ExitStack() as place:
+        with Display() as display:
+            provider = default_provider(display.building)
+            problem = read_problem(dataset, provider, mapping=mapping, system=system)
+            folder = out or Path("out") / problem.name
+            place.enter_context(claimed(folder))
 
-        def told(text: str) -> None:
-            nonlocal stage
-            stage = text
-            display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
+            def told(text: str) -> None:
+                nonlocal stage
+                stage = text
+                display.say(f"{time.monotonic() - begun:6.1f} s  {text}")
 
-        budget = Budget(runs)
-        with (
-            display.watch("diagnosing", lambda: stage if display.on_terminal else ""),
-            _ended_by_hand(budget, display.say),
-        ):
-            result = diagnose(
-                problem, folder, told, workers=workers, without=without or (),
-                law_at=law_from_data, budget=budget,
-            )  # fmt: skip
-    page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
-    result.files += [models, page, table]
-    write_page(result, page)
-    content = result.to_dict()
-    write_text(table, json.dumps(content, indent=2) + "\n")
-    write_text(models, json.dumps(result.table.to_dict(), indent=1) + "\n")
-    if as_json:
-        print_json(content)
-    else:
-        _print(result)
+            budget = Budget(runs)
+            with (
+                display.watch("diagnosing", lambda: stage if display.on_terminal else ""),
+                _ended_by_hand(budget, display.say),
+            ):
+                result = diagnose(
+                    problem, folder, told, workers=workers, without=without or (),
+                    law_at=law_from_data, budget=budget,
+                )  # fmt: skip
+        page, table, models = (folder / n for n in ("report.html", "diagnosis.json", "models.json"))
+        result.files += [models, page, table]
+        content = result.to_dict()
+        try:
+            write_page(result, page)
+            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_text(models, json.dumps(result.table.to_dict(), indent=1) + "\n")
+        finally:  # what was found is said, whatever becomes of the files
+            if as_json:
+                print_json(content)
+            else:
+                _print(result)
 
 
 @contextmanager

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..files import make_folder, write_text
+from ..files import claimed, write_text
 from ..installation.builder import default_provider
 from .progress import Display
 from .streams import print_json
@@ -60,30 +61,35 @@ def monitor_command(
     from ..report.monitor import write_monitor_page
 
     begun, stage = time.monotonic(), "reading the logs"
-    with Display() as display:
-        provider = default_provider(display.building)
+    with ExitStack() as place:
+        with Display() as display:
+            provider = default_provider(display.building)
 
-        def told(text: str) -> None:
-            nonlocal stage
-            stage = text
+            def told(text: str) -> None:
+                nonlocal stage
+                stage = text
 
-        def look() -> str:
-            return f"{time.monotonic() - begun:6.1f} s  {stage}"
+            def look() -> str:
+                return f"{time.monotonic() - begun:6.1f} s  {stage}"
 
-        with display.watch("monitoring", look):
-            series = read_series(folder, provider, mapping=mapping, system=system)
-            result = monitor(
-                series, told, baseline=baseline, rate=rate, workers=workers, without=without or ()
-            )
-    place = make_folder(out or Path("out") / series.name)
-    page, table = place / "report.html", place / "monitor.json"
-    content = result.to_dict() | {"files": [str(table), str(page)]}
-    write_text(table, json.dumps(content, indent=2) + "\n")
-    write_monitor_page(result, page)
-    if as_json:
-        print_json(content)
-    else:
-        _print(result, page)
+            with display.watch("monitoring", look):
+                series = read_series(folder, provider, mapping=mapping, system=system)
+                results = out or Path("out") / series.name
+                place.enter_context(claimed(results))
+                result = monitor(
+                    series, told, baseline=baseline, rate=rate, workers=workers,
+                    without=without or (),
+                )  # fmt: skip
+        page, table = results / "report.html", results / "monitor.json"
+        content = result.to_dict() | {"files": [str(table), str(page)]}
+        try:
+            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_monitor_page(result, page)
+        finally:  # what was found is said, whatever becomes of the files
+            if as_json:
+                print_json(content)
+            else:
+                _print(result, page)
 
 
 def _print(result: Monitored, page: Path) -> None:
