@@ -181,8 +181,6 @@ def _folder_name(name: str) -> str:
 
 
 def _print_result(result: Result) -> None:
-    from rich.markup import escape
-
     content, console = result.to_dict(), open_console()
     console.print(
         f"{content['scenario']}: {content['simulated_s']:g} s simulated in "
@@ -192,9 +190,9 @@ def _print_result(result: Result) -> None:
     )
     for quantity in result.overview if len(result.runs) > 1 else ():
         head, rows = quantity.rows()
-        table = new_table(*map(escape, head))
+        table = new_table(*head)
         for row in rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*row)
         console.print(table)
     if 0 < len(content["comparison"]) <= SHOWN:
         table = new_table("compared", "rms", "max", "unit", "with")

@@ -14,6 +14,7 @@ import typer
 from ..errors import InputError
 from ..files import claimed, write_text
 from ..installation.builder import default_provider
+from .output import open_console
 from .progress import Display
 from .streams import print_json
 
@@ -263,10 +264,9 @@ def clock_lines(clocks: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _print(content: dict[str, Any]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = open_console(None)
     console.print(f"{content['dataset']} with {content['system']}, {content['wall_s']:.1f} s")
     table = Table("parameter", "value", "95 %", "unit", "nominal", "")
     for name, item in content["parameters"].items():

@@ -120,13 +120,11 @@ def gathered(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def _row(column: ColumnReport) -> list[str]:
-    from rich.markup import escape
-
     unit = column.unit.unit or "?"
     noise = f"{column.noise:.3g}" if column.noise > SMOOTH * column.resolution else "-"
     return [
-        escape(column.name), unit if column.unit.sure or unit == "?" else f"{unit} (guessed)",
-        escape(column.unit.reason), f"{column.low:.5g}", f"{column.high:.5g}",
+        column.name, unit if column.unit.sure or unit == "?" else f"{unit} (guessed)",
+        column.unit.reason, f"{column.low:.5g}", f"{column.high:.5g}",
         f"{column.resolution:.3g}", noise,
         str(column.missing) if column.missing else "-",
     ]  # fmt: skip
@@ -292,13 +290,14 @@ def _of_runs(names: Sequence[str], said: str, last: bool) -> list[str]:
 def working(quiet: bool = False) -> Iterator[Callable[[str], None]]:
     """Shows at a terminal what is being done, until it is; or, quiet, leaves it to questions."""
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield lambda text: None
         return
     with console.status("") as status:
-        yield lambda text: status.update(text)
+        yield lambda text: status.update(Text(text))
 
 
 def _systems() -> str:
@@ -393,8 +392,6 @@ def _match(match: Match) -> dict[str, str]:
 
 
 def _print_imported(console: Console, done: Imported) -> None:
-    from rich.markup import escape
-
     from ..calibrate.checks.finding import lines
 
     matches = done.matches
@@ -402,10 +399,10 @@ def _print_imported(console: Console, done: Imported) -> None:
     for what, found in (("drives", matches.inputs), ("measures", matches.channels)):
         for name, match in found.items():
             unit = match.column.unit
-            table.add_row(*map(escape, (
+            table.add_row(
                 match.column.source, unit.unit + ("" if unit.sure else " (guessed)"), what, name,
                 match.place.unit, match.reason,
-            )))  # fmt: skip
+            )  # fmt: skip
     console.print(table)
     for name, value in matches.constants.items():
         console.print(f"{name} is held at {value:g}", markup=False)

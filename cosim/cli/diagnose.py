@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -17,6 +16,7 @@ from ..files import claimed, write_text
 from ..installation.builder import default_provider
 from .calibrate import clock_lines
 from .guard import heard
+from .output import open_console
 from .progress import Display
 from .signals import taken
 from .streams import print_json
@@ -139,13 +139,11 @@ def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]
 
 
 def _print(result: Diagnosis) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from ..diagnose.story.verdicts import in_words
 
-    # files are not 80 wide; what is in square brackets is said, and no markup
-    console = Console(width=None if sys.stdout.isatty() else 120, markup=False)
+    console = open_console(120)
     console.print(f"{result.problem.name}: {result.verdict}. {result.reason}", soft_wrap=True)
     for effect in result.answer.effects():
         values = ", ".join(_value(name, v) for name, v in effect["parameters"].items())

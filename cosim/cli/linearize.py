@@ -12,6 +12,7 @@ import typer
 
 from ..files import write_text
 from ..installation.builder import default_provider
+from .output import open_console
 from .pairs import pairs, values
 from .progress import Display
 from .streams import print_json
@@ -150,10 +151,9 @@ def _content(name: str, system: Linear, loops: list[Margins]) -> dict[str, Any]:
 
 
 def _print(content: dict[str, Any], out: Path | None) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = open_console(None)
     console.print(
         f"{content['of']} at t = {content['time_s'] or 0.0:g} s: {len(content['states'])} states",
         soft_wrap=True,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 
 from ..files import claimed, write_text
 from ..installation.builder import default_provider
+from .output import open_console
 from .progress import Display
 from .streams import print_json
 
@@ -93,12 +93,11 @@ def monitor_command(
 
 
 def _print(result: Monitored, page: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from ..monitor.result import VERDICTS
 
-    console = Console(width=None if sys.stdout.isatty() else 120)  # files are not 80 wide
+    console = open_console(120)
     logs = result.series.logs
     console.print(
         f"{result.series.name}: {VERDICTS[result.verdict].lower()}. {len(logs)} logs from "

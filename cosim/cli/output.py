@@ -14,11 +14,17 @@ if TYPE_CHECKING:
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON value to stdout.")]
 
 
-def open_console() -> Console:
-    """Standard output; wide if nobody looks at it, so that names stay whole for other programs."""
+def open_console(width: int | None = 160) -> Console:
+    """Standard output, letter by letter: what is in brackets or between colons is no markup.
+
+    Args:
+        width: where nobody looks at it, so that names stay whole for other programs; rich's own
+            if None.
+    """
     from rich.console import Console
 
-    return Console() if sys.stdout.isatty() else Console(width=160)
+    width = None if sys.stdout.isatty() else width
+    return Console(width=width, markup=False, emoji=False)
 
 
 def new_table(first: str, *others: str) -> Table:

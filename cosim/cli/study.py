@@ -10,6 +10,7 @@ import typer
 from ..errors import InputError, StudyError
 from ..installation.builder import default_provider
 from ..system.provider import FolderProvider, Provider
+from .output import open_console
 from .progress import Display
 from .streams import print_json
 
@@ -110,11 +111,9 @@ def _made_with(row: dict[str, Any], result: StudyResult) -> str:
 
 
 def _print(result: StudyResult) -> None:
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
-    console = Console() if Console().is_terminal else Console(width=200)
+    console = open_console(200)
     table, rows = result.table, result.table.rows
     corrupt = f", {len(result.corrupt)} unusable files set aside" if result.corrupt else ""
     console.print(
@@ -137,16 +136,16 @@ def _print(result: StudyResult) -> None:
     printed = Table()
     for name in names:
         unit = f" [{units[name]}]" if units.get(name) else ""
-        printed.add_column(escape(_head(name) + unit), no_wrap=name in table.varied)
+        printed.add_column(_head(name) + unit, no_wrap=name in table.varied)
     for row in shown:
         if row.get("status", "ok") == "ok":
-            printed.add_row(*(escape(_text(row.get(name))) for name in names))
+            printed.add_row(*(_text(row.get(name)) for name in names))
         else:
-            made = [escape(_text(row.get(name))) for name in table.varied]
+            made = [_text(row.get(name)) for name in table.varied]
             printed.add_row(*made, "FAILED")  # the errors follow on stderr
     console.print(printed)
     for item in result.sensitivities[:SHOWN_INDICES]:
-        console.print(escape(item.sentence()), soft_wrap=True)
+        console.print(item.sentence(), soft_wrap=True)
     if len(result.sensitivities) > SHOWN_INDICES:
         left = len(result.sensitivities) - SHOWN_INDICES
         console.print(f"indices of {left} more results are in sensitivity.csv")

@@ -1,4 +1,4 @@
-"""What `cosim calibrate` found is not lost where it is written."""
+"""What `cosim calibrate` found is said, letter by letter, and is not lost where it is written."""
 
 from __future__ import annotations
 
@@ -18,14 +18,27 @@ from tests.calibrate.test_log_habits import read, written
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    folder = tmp_path / "shaft"
+    """A data set whose only channel has a name that looks like markup."""
+    folder = tmp_path / "shaft [bold]x"
     folder.mkdir()
     read(folder, written())
+    mapping = folder / "dataset.toml"
+    text = mapping.read_text().replace("w = {", '"w[/x] [rad] :on:" = { column = "w",')
+    mapping.write_text(text)
     return folder
 
 
 def invoked(*words: object) -> Result:
     return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_names_and_paths_are_no_markup(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out [red]"
+    done = invoked("calibrate", data, "--samples", "0", "--out", out)
+    assert done.exit_code == 0, done.exception
+    for part in ("shaft [bold]x with", "w[/x] [rad] :on:", str(out / "calibration.json")):
+        assert part in done.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["calibration.json", "report.html"]
 
 
 @pytest.mark.parametrize("command", ["calibrate", "diagnose", "monitor"])
