@@ -102,6 +102,22 @@ def test_a_search_that_was_stopped_claims_nothing() -> None:
     assert "leaves noise" in told(Facts(content)).headline
 
 
+@pytest.mark.parametrize(
+    ("column", "channels"),
+    [
+        ("Winkel phi", ["Winkel phi"]), ("phi and Winkel phi", ["Winkel phi", "phi"]),
+        ("phi, w [rad]", ["phi", "w [rad]"]), ("phi", ["phi"]), ("time", []),
+        ("salt and pepper", ["salt and pepper"]),
+    ],
+)  # fmt: skip
+def test_the_channels_of_a_finding_are_found_whatever_they_are_called(
+    column: str, channels: list[str]
+) -> None:
+    names = ("Winkel phi", "phi", "w [rad]", "salt", "salt and pepper")
+    facts = Facts({}, {name: "encoder.w" for name in names})
+    assert facts.concerned({"column": column}) == channels
+
+
 def test_findings_that_cannot_be_let_pass_are_not_offered_to_be() -> None:
     content = table("bad_data")
     assert "allow = [&quot;spikes&quot;]" in "".join(told(Facts(content)).steps)

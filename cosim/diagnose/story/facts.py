@@ -6,6 +6,7 @@ Sentences and tables of a report print a fact by its path in the JSON and mark i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -185,9 +186,12 @@ class Facts:
         return [f for f in self.table.get("findings", []) if f["severity"] == "error"]
 
     def concerned(self, finding: Mapping[str, str]) -> list[str]:
-        """Channels that a finding on the data names."""
-        named = finding["column"].replace(",", " ").split()
-        return [name for name in self.signals if name in named]
+        """Channels that a finding on the data names: one, whatever its name, or several."""
+        said = finding["column"]
+        if said in self.signals:
+            return [said]
+        ends = r"(?:^|,\s*|\sand\s){}(?:$|,|\sand\s)"
+        return [name for name in self.signals if re.search(ends.format(re.escape(name)), said)]
 
     def faulty_instances(self) -> dict[str, list[str]]:
         """Instance -> channels with a fault that are measured there."""
