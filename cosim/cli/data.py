@@ -47,6 +47,7 @@ Received = Annotated[
     bool,
     typer.Option("--received", help="Of a bag: times of recording instead of header stamps."),
 ]
+Clock = Annotated[str, typer.Option(help="The column of times, if it is not found.")]
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -55,6 +56,7 @@ def inspect_command(
     files: Files,
     topics: Topics = None,
     received: Received = False,
+    clock: Clock = "",
     plot: Annotated[Path | None, typer.Option(help="Draw it: a .png, .svg or .pdf file.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -71,7 +73,7 @@ def inspect_command(
     with working() as told:
         for path in files:
             told(f"reading {path}")
-            reports.append(inspect(path, topics or (), received=received))
+            reports.append(inspect(path, topics or (), clock, received))
     made = []
     if plot is not None:
         path, left = draw(reports, plot)
@@ -221,7 +223,7 @@ def import_command(
     ] = None,
     topics: Topics = None,
     received: Received = False,
-    clock: Annotated[str, typer.Option(help="The column of times, if it is not found.")] = "",
+    clock: Clock = "",
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("dataset"),
     as_json: AsJson = False,
 ) -> None:

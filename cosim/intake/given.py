@@ -51,6 +51,10 @@ def take(given: Sequence[str], columns: Sequence[Column], places: Sequence[Place
                 f"{place.name} in {place.unit!r}; give the right unit after a colon, or choose "
                 "another variable (what needs a factor goes into [columns] by hand)"
             )
+        if place.role != "input" and not column.moves:
+            raise InputError(
+                f"--map {text}: the column never changes, so it measures nothing; leave it out"
+            )
         into = matches.inputs if place.role == "input" else matches.channels
         if place.name in into:
             raise InputError(

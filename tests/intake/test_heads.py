@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from cosim.cli.app import app
 from cosim.data.logs import read_log
 from cosim.data.text import head
 from cosim.errors import InputError, ScenarioError
@@ -73,6 +76,16 @@ def test_a_clock_in_a_unit_of_no_time_is_said_and_not_taken_as_seconds(tmp_path:
             tmp_path / "set", default_provider(),
         )  # fmt: skip
     assert not (tmp_path / "set").exists()
+
+
+def test_inspect_takes_the_clock_that_it_asks_for(tmp_path: Path) -> None:
+    rows = [f"{0.1 * i + 0.04 * (-1) ** i:.2f},{i % 7}" for i in range(50)]
+    path = log(tmp_path, "\n".join(["instant,w", *rows]))
+    (report,) = inspect(path).topics
+    assert any("--clock" in finding.text for finding in report.findings)
+    done = CliRunner().invoke(app, ["data", "inspect", str(path), "--clock", "instant", "--json"])
+    (file,) = json.loads(done.stdout)["files"]
+    assert file["topics"][0]["clock"]["column"] == "instant"
 
 
 def test_dates_of_an_npz_file_are_a_column(tmp_path: Path) -> None:

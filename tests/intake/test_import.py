@@ -200,6 +200,17 @@ def test_somebody_is_asked_what_is_open_only(logs: Path, tmp_path: Path) -> None
     assert done.matches.inputs["base.w_l"].column.unit.unit == "rpm"
 
 
+def test_a_column_that_never_changes_is_no_measurement(logs: Path, tmp_path: Path) -> None:
+    for end in ("cmd", "pose"):
+        lines = (logs / f"one_{end}.csv").read_text().splitlines()
+        lines = [f"{line},{'still' if k == 0 else 1.25}" for k, line in enumerate(lines)]
+        (tmp_path / f"one_{end}.csv").write_text("\n".join(lines))
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    with pytest.raises(InputError, match=r"--map pose\.still=base\.phi:rad: the column never ch"):
+        imported(tmp_path, tmp_path / "set", "pose.still=base.phi:rad")
+    assert not (tmp_path / "set").exists()
+
+
 def test_a_run_that_is_shorter_than_the_window_is_named(logs: Path, tmp_path: Path) -> None:
     for name, rows in (("long_cmd", 601), ("long_pose", 301), ("short_cmd", 300)):
         lines = (logs / f"one_{name.partition('_')[2]}.csv").read_text().splitlines()
