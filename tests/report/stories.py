@@ -92,7 +92,7 @@ def table(verdict: str) -> dict[str, Any]:
         },
         "further_runs": [],
         "law_from_data": None,
-        "withheld": [],
+        "withheld": [], "catalogue_asked": True,
         "stopped": "",
         "hints": [], "left": ["speed"] if after > 1.1 else [],
         "parameters": {
