@@ -165,11 +165,19 @@ class Channel:
         gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
         offset = self.offset + errors.get(BIAS + self.name, 0.0)
         reading = gain * result + offset
-        if size := errors.get(WAVE + self.name, 0.0):
-            turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
-            turned = reading * (parse(self.unit).factor if self.unit else 1.0)  # in rad
-            reading = reading + size * np.sin(turns * turned + phase)
-        return np.asarray(reading, dtype=np.float64)
+        return np.asarray(reading + self._wave(reading, errors), dtype=np.float64)
+
+    @property
+    def angle(self) -> float:
+        """One of its unit, where that is one of angles [rad]; 1 where nobody says it."""
+        return parse(self.unit).factor if self.unit else 1.0
+
+    def _wave(self, reading: Vector, errors: Mapping[str, float]) -> Vector | float:
+        """What repeats with the reading of an angle."""
+        if not (size := errors.get(WAVE + self.name, 0.0)):
+            return 0.0
+        turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
+        return np.asarray(size * np.sin(turns * self.angle * reading + phase), dtype=np.float64)
 
     def meant(self, data: Vector, errors: Mapping[str, float] = NO_ERRORS) -> Vector:
         """Values of the signal for which the channel reads this; of `sample` channels.
@@ -179,11 +187,9 @@ class Channel:
             errors: of the log, see `Problem.log_errors`; a wave is taken where the reading is, so
                 what it misses is of second order in its size.
         """
-        if size := errors.get(WAVE + self.name, 0.0):
-            turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
-            data = data - size * np.sin(turns * data + phase)
         gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
-        return (data - self.offset - errors.get(BIAS + self.name, 0.0)) / gain
+        offset = self.offset + errors.get(BIAS + self.name, 0.0)
+        return np.asarray((data - self._wave(data, errors) - offset) / gain, dtype=np.float64)
 
 
 class Sampler:

@@ -51,7 +51,7 @@ phase [rad], which winds without changing anything."""
 KINDS = (GAIN, BIAS, WAVE, CYCLES, PHASE)
 """Errors of a column."""
 UNITS = {GAIN: "1", CYCLES: "1", PHASE: "rad"}
-"""Units of those that have not their column's."""
+"""Units of those that have not their channel's."""
 
 
 @dataclass(frozen=True)
@@ -93,23 +93,25 @@ class Reading:
             added = [free("bias", BIAS, -most, most, span=own.sigma, unit=own.unit,
                           text="constant error, 0 = absent")]  # fmt: skip
         else:
+            most, tried = GREATEST_WAVE / own.angle, TRIED_WAVE / own.angle
+            cycle = self._one_cycle(problem, own.angle)
             added = [
-                free("A", WAVE, -GREATEST_WAVE, GREATEST_WAVE, span=TRIED_WAVE, unit=own.unit,
+                free("A", WAVE, -most, most, span=tried, unit=own.unit,
                      text="amplitude of the error, 0 = absent"),
                 free("n", CYCLES, FEWEST, MOST_CYCLES, start=1.0, text="cycles per turn",
-                     span=self._one_cycle(problem), hints=SearchHints(cycles=own.signal)),
+                     span=cycle, hints=SearchHints(cycles=own.signal)),
                 free("psi", PHASE, -WINDING, WINDING, unit="rad", text="phase at angle 0",
                      hints=SearchHints(mix="turn")),
             ]  # fmt: skip
         return problem.with_parameters([*problem.parameters, *added])
 
-    def _one_cycle(self, problem: Problem) -> float:
-        """How much more cycles per turn are one cycle more in a run."""
+    def _one_cycle(self, problem: Problem, angle: float) -> float:
+        """How much more cycles per turn are one cycle more in a run, of angles in so many rad."""
         column = [c.name for c in problem.channels].index(self.channel)
         turned = [np.nanmax(rows) - np.nanmin(rows) for run in problem.chosen("identification")
                   if np.isfinite(rows := run.data[:, column]).any()]  # fmt: skip
         most = max(turned, default=0.0)
-        return 2.0 * math.pi / most if most > 0.0 else 1.0
+        return 2.0 * math.pi / (most * angle) if most > 0.0 else 1.0
 
 
 def recorded(parameters: Iterable[Parameter]) -> set[str]:
@@ -134,11 +136,11 @@ def check_column(target: str, channels: Iterable[str], where: str) -> None:
 
 
 def column_unit(target: str, columns: Mapping[str, str]) -> Unit | None:
-    """Of an error of a column; of a bias and a wave its column's, None where nobody says it.
+    """Of an error of a column; of a bias and a wave its channel's, None where nobody says it.
 
     Args:
         target: `column:KIND:NAME`.
-        columns: unit of each channel's column that has one.
+        columns: unit of each channel that has one.
     """
     kind, _, name = target.removeprefix(COLUMN).partition(":")
     if kind + ":" in UNITS:

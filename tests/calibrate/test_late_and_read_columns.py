@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.calibrate.recorder import Reading
 from tests.calibrate.test_log_habits import SIZE, SPEED, STEP, TIMES, TORQUE, read, written
 from tests.problems import simulator
 
@@ -73,3 +74,16 @@ def test_a_wave_of_a_column_repeats_with_the_turn_whatever_its_unit(tmp_path: Pa
     wanted = np.degrees(0.02) * np.sin(np.radians(plain))
     np.testing.assert_allclose(found - plain, wanted, rtol=0, atol=1e-9)
     assert np.ptp(plain) > 45.0
+
+
+def test_a_wave_is_sought_over_the_same_angles_whatever_their_unit(tmp_path: Path) -> None:
+    found = []
+    for unit, angle in (("deg", ANGLE), ("rad", np.radians(ANGLE))):
+        top = f'[channels.phi]\nsignal = "load.phi"\nunit = "{unit}"\nsigma = 0.1'
+        (tmp_path / unit).mkdir()
+        log = written("time,tau,w,phi", ",", TIMES, TORQUE, SPEED, angle)
+        problem = Reading("phi", "angle_ripple").added_to(read(tmp_path / unit, log, TOP=top), "")
+        size, cycles, _ = problem.parameters[-3:]
+        one = 1.0 if unit == "rad" else np.radians(1.0)
+        found.append((one * size.maximum, one * size.span, cycles.span))
+    assert found[0] == pytest.approx(found[1])
