@@ -444,7 +444,7 @@ def _turned(quaternion: SX, turn: SX) -> SX:
     """A quaternion, then a fixed rotation; of any length."""
     w, x, y, z = (quaternion[k] for k in range(4))
     fixed = np.array(ca.DM(turn))
-    if fixed[0, 0] == 1.0:
+    if fixed[0, 0] == 1.0 and fixed[1, 1] > -0.5:  # a half turn would be scaled by 0
         # about x by alpha: the half angle's cosine and sine times 2 cos(alpha/2)
         cos, sin = 1 + float(turn[1, 1]), float(turn[2, 1])
         return ca.vertcat(
