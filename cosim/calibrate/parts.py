@@ -200,16 +200,18 @@ class Sampler:
     Args:
         times: at which sensors sample [s].
         recorded: at which the signals were recorded [s], rising.
+        begin: since when clocks drift [s]; the first of `times` if not given.
     """
 
-    def __init__(self, times: Vector, recorded: Vector) -> None:
+    def __init__(self, times: Vector, recorded: Vector, begin: float | None = None) -> None:
         self.times, self.recorded = times, recorded
+        self.begin = times[0] if begin is None else begin
         self._places: dict[tuple[float, float], tuple[NDArray[np.intp], Vector | None]] = {}
 
     def drifted(self, shift: float, drift: float) -> Vector:
-        """Sample times plus a shift [s], less what a clock has lost since the first of them."""
+        """Sample times plus a shift [s], less what a clock has lost since the begin."""
         times = self.times + shift
-        return times - drift * (self.times - self.times[0]) if drift else times
+        return times - drift * (self.times - self.begin) if drift else times
 
     def at(self, shift: float, values: Vector, drift: float = 0.0) -> Vector:
         """Values at `drifted` sample times, between recorded ones on straight lines."""

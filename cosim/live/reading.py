@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -235,19 +235,28 @@ class Reading:
         value = lookup(entries, key.removeprefix("begin:"), where)
         return value - self.lead if begun else value
 
+    def errors(self, starts: Mapping[str, float]) -> dict[str, float]:
+        """What is wrong with columns of the stream, see `Problem.log_errors`."""
+        return self.problem.log_errors(self.theta, _run(starts))
+
     def twin(self, starts: Mapping[str, float]) -> Twin:
         """A twin at the begin of a run, with the parameters of this reading."""
         problem = self.problem
-        run = MeasuredRun("stream", "identification", np.zeros(1), np.zeros((1, 1)), {}, starts)
-        values = problem.values(self.theta, replace(run, starts=starts))
-        system = problem.model.system({**values})
-        master = Master(system, problem.algorithm, problem.step, scenario=problem.name)
+        system = problem.model.system({**problem.values(self.theta, _run(starts))})
+        master = Master(
+            system, problem.algorithm, problem.step, scenario=problem.name, options=problem.options
+        )
         return Twin(
             master,
             inputs={driver.target: 0.0 for driver in self.drivers},
             record=list(dict.fromkeys(channel.signal for channel in problem.channels)),
             every=self._every,
         )
+
+
+def _run(starts: Mapping[str, float]) -> MeasuredRun:
+    """A run of a stream, of which nothing is known but its start values."""
+    return MeasuredRun("stream", "identification", np.zeros(1), np.zeros((1, 1)), {}, starts)
 
 
 def read_calibrated(path: Path | str) -> dict[str, float]:

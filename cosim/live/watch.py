@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.parts import COINCIDENT, Sampler
+from ..calibrate.parts import COINCIDENT, DRIFT, Sampler
+from ..data.signals import Shifted
 from ..errors import InputError, ScenarioError
 from ..master.twin import Twin
 from .alarm import Alarms
@@ -71,18 +72,20 @@ class _Run:
         twin: at its newest sample.
         begun: time of its first sample by the machine's clock [s].
         last: its newest sample.
-        known: per driver the newest sample that has a value: time in the twin, value.
+        known: per driver the samples that the twin may still need: times in it, values.
         pending: samples that are not compared yet: times in the twin, measured values.
-        past: rows that channels with a window still need: times, rows.
+        past: rows that channels still need: times, rows.
+        errors: of the stream's columns, see `Problem.log_errors`.
     """
 
     name: str
     twin: Twin
     begun: float
     last: Sample
-    known: list[tuple[float, float] | None]
+    known: list[tuple[Vector, Vector]]
     pending: tuple[Vector, Vector]
     past: tuple[Vector, Vector]
+    errors: Mapping[str, float]
 
 
 @dataclass
@@ -117,8 +120,8 @@ class Watch:
         )
         self.raised: dict[tuple[str, str], int] = {}
         self._sorter = Sorter(reading.interval, settings.wait, self.counts)
-        self._keep = max(c.window for c in channels) + 4.0 * reading.size
-        self._ahead = max(0.0, *(c.shift for c in channels))
+        self._shifts = np.array([c.shift for c in channels])
+        self._windows = np.array([c.window for c in channels])
         self._entries: Mapping[str, Any] | None = None if reading.needs else {}
         self._run: _Run | None = None
         self._offset: float | None = None
@@ -126,6 +129,9 @@ class Watch:
         self._square = np.zeros(len(channels))
         self._count = np.zeros(len(channels))
         self._first: float | None = None
+        self._latest: float | None = None
+        self._told = False
+        self._named: set[tuple[str, str]] = set()
 
     # -- the stream --------------------------------------------------------------------------------
 
@@ -181,8 +187,11 @@ class Watch:
                 ready = []
                 self._end_run("a new run was told")
                 self._sorter.restart()
-                self._entries = message.values
+                self._entries, self._told = message.values, True
                 continue
+            if self._told and self._latest is not None and message.time < self._latest:
+                self._begin_anew(message.time)
+            self._told, self._latest = False, message.time
             self._wait_until_due(message, arrival, paced)
             if self._first is None:
                 self._first = message.time
@@ -194,6 +203,12 @@ class Watch:
                 return False
         self._go(ready)
         return True
+
+    def _begin_anew(self, now: float) -> None:
+        """Let a run's clock begin anew: what counts from earlier times goes on from here."""
+        assert self._first is not None and self._latest is not None
+        self._first += now - self._latest
+        self._offset, self._part.since = None, now
 
     def _wait_until_due(self, sample: Sample, arrival: float, paced: bool) -> None:
         """Note when samples are due; the quickest one so far sets the clocks' difference."""
@@ -238,12 +253,14 @@ class Watch:
         name = self.folder.begin(entries, first) if self.folder else str(entries.get("name", ""))
         width = len(twin.recorded)
         self._run = _Run(
-            name, twin, first.time, first, [None] * len(self.reading.drivers),
+            name, twin, first.time, first,
+            [(np.zeros(0), np.zeros(0))] * len(self.reading.drivers),
             (np.zeros(0), np.zeros((0, len(self.reading.problem.channels)))),
-            (np.zeros(0), np.zeros((0, width))),
+            (np.zeros(0), np.zeros((0, width))), self.reading.errors(starts),
         )  # fmt: skip
         self._entries = None if self.reading.needs else {}
         self.alarms.restart()
+        self._named.clear()
         self.emit({"event": "run", "t": first.time, "run": name, "starts": starts})
         return True
 
@@ -279,22 +296,27 @@ class Watch:
             self.folder.add(samples)
         reading = self.reading
         stamps = np.array([sample.time for sample in samples]) - run.begun + reading.lead
-        times = reading.times(stamps)
+        times, until = reading.times(stamps), float(stamps[-1])
         for index, driver in enumerate(reading.drivers):
             values = reading.column(samples, driver.column)
             good = np.isfinite(values)
-            known, before = (times[good], values[good]), run.known[index]
-            if before is not None:
-                known = (np.append(before[0], known[0]), np.append(before[1], known[1]))
+            before = run.known[index]
+            known = (np.append(before[0], times[good]), np.append(before[1], values[good]))
             if not known[0].size:
                 raise ScenarioError(
                     f"the first sample has no value of {driver.column!r}, which drives "
                     f"{driver.target}"
                 )
-            run.twin.set(driver.target, driver.table(*known))
-            run.known[index] = (float(known[0][-1]), float(known[1][-1]))
+            table, step = driver.table(*known), reading.problem.step
+            late = run.errors.get(driver.target, 0.0)
+            run.twin.set(driver.target, Shifted(table, -late, step) if late else table)
+            # beyond these times later samples may say something else
+            newest = float(stamps[-1] if driver.interpolation == "hold" else known[0][-1])
+            until = min(until, newest - late - step if late else newest)
+            first = int(np.searchsorted(known[0], run.twin.time + min(late, 0.0), "right")) - 2
+            run.known[index] = (known[0][max(first, 0) :], known[1][max(first, 0) :])
         run.last = samples[-1]
-        self._step(run, float(stamps[-1]))
+        self._step(run, until)
         kept, measured = run.pending
         run.pending = (
             np.concatenate([kept, stamps]),
@@ -323,19 +345,22 @@ class Watch:
         times, rows = run.past
         if not times.size:
             return
-        reach = times[-1] - self._ahead + COINCIDENT * self.reading.interval
-        count = int(np.searchsorted(stamps, reach, side="right"))
+        problem, close = self.reading.problem, COINCIDENT * self.reading.interval
+        seen = self._seen(run, stamps)
+        needed = np.maximum((seen + self._shifts).max(axis=1), stamps)
+        count = int(np.searchsorted(needed, times[-1] + close, side="right"))
         if not count:
             return
-        problem = self.reading.problem
-        sampler = Sampler(stamps[:count], times)
+        sampler = Sampler(stamps[:count], times, self.reading.lead)
         record = {name: i for i, name in enumerate(run.twin.recorded)}
         model = np.column_stack(
-            [c.of(sampler, rows[:, record[c.signal]]) for c in problem.channels]
+            [c.of(sampler, rows[:, record[c.signal]], run.errors) for c in problem.channels]
         )
         residuals = (measured[:count] - model) / problem.sigma
+        residuals[seen[:count] < -close] = np.nan  # before the run, as its clocks are
         run.pending = (stamps[count:], measured[count:])
-        first = int(np.searchsorted(times, stamps[count - 1] - self._keep))
+        oldest = float((seen[count - 1] + np.minimum(self._shifts, 0.0) - self._windows).min())
+        first = int(np.searchsorted(times, oldest - 4.0 * self.reading.size))
         run.past = (times[first:], rows[first:])
         clock = stamps[:count] - self.reading.lead + run.begun
         settled = stamps[:count] - self.reading.lead >= self.settings.settle
@@ -347,11 +372,20 @@ class Watch:
         if clock[-1] - self._part.since >= self.settings.report:
             self._tell(float(clock[-1]))
 
+    def _seen(self, run: _Run, stamps: Vector) -> Vector:
+        """When what channels show at these times was: times in the twin, one column each."""
+        columns = []
+        for channel in self.reading.problem.channels:
+            late, drift = (run.errors.get(key + channel.name, 0.0) for key in ("", DRIFT))
+            columns.append(stamps - late - drift * (stamps - self.reading.lead))
+        return np.column_stack(columns)
+
     def _judge(self, times: Vector, residuals: Vector) -> None:
         for alarm in self.alarms.take(times, residuals):
             key = (alarm.channel, alarm.kind)
             self.raised[key] = self.raised.get(key, 0) + 1
-            if self.raised[key] == 1:
+            if key not in self._named:
+                self._named.add(key)
                 self.emit({"event": "alarm", **alarm.to_dict()})
 
     def _tell(self, now: float) -> None:
