@@ -21,7 +21,7 @@ from ..diagnose.models import GATE
 from .change import Change, Found
 from .evidence import Evidence, Moments
 from .patterns import Direction
-from .profiles import Profile, constants, profiles, regress, weights
+from .profiles import Profile, chances, constants, profiles, regress, weights
 
 Vector = NDArray[np.float64]
 MOST = 6
@@ -96,7 +96,7 @@ class Detector:
         least = 1.0
         for column in self.watched:
             series, own = values[:, column], deviations[:, column]
-            p = regress(series, weights(series, own), known, self.matrix).p
+            p = chances(series, own, known, self.matrix)
             least = min(least, float(p.min()))
         return least
 

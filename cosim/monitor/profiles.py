@@ -133,3 +133,17 @@ def weights(values: Vector, deviations: Vector) -> Vector:
     scatter = max(0.5 * float(MEDIAN * np.median(np.abs(steps))) ** 2 - own, 0.0)
     total = np.where(good, deviations, 1.0) ** 2 + scatter
     return np.asarray(1.0 / np.maximum(total, 1e-300))
+
+
+def chances(values: Vector, deviations: Vector, known: Vector, shapes: Vector) -> Vector:
+    """Probability of each profile if nothing has changed, two-sided.
+
+    Weights are guessed from few logs; where these are not equally precise, what is seen with them
+    alone is no change. So it must show with equal ones, too.
+
+    Args:
+        values, known, shapes: of `regress`.
+        deviations: own ones of the numbers.
+    """
+    weighted = regress(values, weights(values, deviations), known, shapes).p
+    return np.asarray(np.maximum(weighted, regress(values, np.ones_like(values), known, shapes).p))

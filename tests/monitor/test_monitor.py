@@ -17,7 +17,7 @@ from cosim.cli import app as cli
 from cosim.diagnose.candidates import candidates
 from cosim.errors import InputError, ScenarioError
 from cosim.monitor import Monitored, monitor, read_series
-from cosim.monitor.profiles import constants, profiles, regress
+from cosim.monitor.profiles import chances, constants, profiles, regress
 from cosim.monitor.series import SOURCES, date_in
 from cosim.report.monitor import monitor_page
 from tests.monitor.bench import LOGS, day, write
@@ -112,6 +112,21 @@ def test_the_rate_of_false_alarms_is_at_most_the_stated_one() -> None:
     )
     # binomial: three deviations above the most that is stated
     assert 0 < alarms < rate * count + 3.0 * np.sqrt(count * rate * (1.0 - rate))
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("often", [0.05, 0.5])
+def test_logs_of_unequal_precision_give_no_more_false_alarms(often: float, scatter: float) -> None:
+    random, logs, rate, count = np.random.default_rng(3), 12, 0.01, 400
+    shapes = np.array([p.values for p in profiles(7.0 * np.arange(logs))])
+    known = constants(["same"] * logs)
+    own = np.where(np.arange(logs) % 3 == 0, 0.55 - often, often)  # a third is another kind
+    values = np.hypot(own, scatter) * random.standard_normal((count, logs))
+    alarms = sum(bool(chances(v, own, known, shapes).min() < rate / len(shapes)) for v in values)
+    # binomial: three deviations above the most that is stated
+    assert alarms < rate * count + 3.0 * np.sqrt(count * rate * (1.0 - rate))
+    jump = np.where(np.arange(logs) < logs // 2, 0.0, 12.0 * np.hypot(0.5, scatter))
+    assert all(chances(v + jump, own, known, shapes).min() < rate / len(shapes) for v in values[:9])
 
 
 def test_dates_come_from_names_and_from_times_of_files(tmp_path: Path) -> None:
