@@ -4,7 +4,7 @@
     s_x = J1_i R xi' + r phi',   s_y = C1_i R xi' + e beta'   (slip along and across the heading)
     p = -N (c_x s_x, c_y s_y)/V,   V = sqrt((r phi')^2 + v_0^2)
     f = p tanh(a)/a,   a = |p|/(mu N)
-    sum N_i = W,   sum N_i C_i = W r_G   (level floor, no load transfer by acceleration)
+    sum N_i = W,   sum N_i C_i = W r_G   (level floor, no load transfer by acceleration; N_i >= 0)
     axles: -b_s beta',   -b_d phi' - f_r N r tanh(phi'/w_r)
 
 T has the rotors of the steering motors, J_beta, on beta'' alone; what the rotors of the rolling
@@ -75,7 +75,7 @@ def equations(m: Model) -> None:
     masses = body.masses
     contact_x = g.x - g.e * ca.cos(motion.beta)
     contact_y = g.y - g.e * ca.sin(motion.beta)
-    normal = m.output(NORMAL, loads(body, contact_x, contact_y))
+    normal = m.output(NORMAL, ca.fmax(loads(body, contact_x, contact_y), 0))
 
     j1, c1 = rolling_rows(g, motion.beta), lateral_rows(g, motion.beta)
     along = m.output(SLIP_ALONG, j1 @ motion.u + g.r * phi_rate)

@@ -9,6 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sources.function import Oracle
+from sources.screw_axis import elastic
+from sources.variant import device_values
 from tests.support import oracle_of
 
 
@@ -27,7 +29,7 @@ def test_cascade_is_position_loop_around_speed_loop(q_ref: float, u_add: float) 
     oracle = oracle_of("position_servo/cascade")
     angles = (0.30, 0.299, 0.2975)  # now, one and two ticks ago
     values = {**CASCADE, "q_ref": q_ref, "u_add": u_add, "phi": angles[0],
-              "phi_before": angles[1], "phi_before_last": angles[2]}  # fmt: skip
+              "phi_before": angles[1], "phi_before_last": angles[2], "started": 1.0}  # fmt: skip
     after = ticked(oracle, values)
     speed = (angles[0] - angles[2]) / (2 * 2e-3)
     wanted = 0.5 * (20.0 * (q_ref - angles[0]) - speed) + u_add
@@ -37,6 +39,18 @@ def test_cascade_is_position_loop_around_speed_loop(q_ref: float, u_add: float) 
     assert (after["phi_before"], after["phi_before_last"]) == angles[:2]
     outputs = oracle.outputs({**values, **after})
     assert outputs["tau"] == pytest.approx(0.1 * expected, abs=1e-12)
+
+
+def test_cascade_is_at_rest_where_it_begins_whatever_the_angle() -> None:
+    oracle = oracle_of("position_servo/cascade")
+    values = {**CASCADE, "q_ref": 0.5, "phi": 0.5}
+    for _ in range(3):
+        after = ticked(oracle, values)
+        assert after["u_held"] == 0.0
+        values |= after
+    # moved by 0.01 rad in one tick: a difference over two
+    after = ticked(oracle, {**values, "phi": 0.51})
+    assert after["u_held"] == pytest.approx(0.5 * (-20.0 * 0.01 - 0.01 / (2 * 2e-3)), abs=1e-12)
 
 
 HOBBY = {"k_d": 2.0, "K_t": 0.3, "R_a": 4.0, "u_supply": 7.0}
@@ -59,6 +73,19 @@ def test_open_bridge_gives_no_torque() -> None:
     values = {**HOBBY, "u_held": 5.0, "w": 2.0, "brush_drop.u_b": 0.5}
     assert oracle.outputs({**values, "enable": 0.0})["tau"] == 0.0
     assert oracle.outputs({**values, "enable": 1.0})["tau"] != 0.0
+
+
+def test_the_ball_screw_swings_as_its_values_say() -> None:
+    """Two masses on a spring: 90 Hz and 1 %, as `ball_screw` says it is taken for."""
+    values = {
+        name: entry.value for name, entry in device_values("screw_axis", "ball_screw").items()
+    }
+    share = elastic.SHARE.start
+    whole = values["M"] * (values["lead"] / (2 * math.pi)) ** 2
+    between = share * (1 - share) * whole
+    eigen = math.sqrt(values["k"] / between)
+    assert eigen / (2 * math.pi) == pytest.approx(90.0, rel=0.02)  # two digits
+    assert values["d"] * eigen / (2 * values["k"]) == pytest.approx(0.01, rel=0.05)
 
 
 AXIS = {"lead": 0.005, "M": 40.0, "F_v": 150.0, "F_c": 12.0, "F_0": -3.0, "v_0": 1e-3}

@@ -57,6 +57,21 @@ def test_a_payload_presses_on_the_wheels_that_it_is_near() -> None:
     np.testing.assert_allclose(full - bare, [30 * 9.81, 0.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("shift", [0.1, 0.25])
+def test_a_wheel_that_is_lifted_is_not_driven_by_the_floor(shift: float) -> None:
+    base = oracle_of("omni_base/creep+load_shift")
+    at = named(rolling_rate=[-5.0] * 3, vel_x=0.5)
+    seen = base.outputs({**at, "load_shift.shift": shift, "load_shift.direction": 0.0})
+    normal = vector(seen, "normal")
+    assert normal.min() == 0.0 < normal.max()
+    free = {**at, "load_shift.shift": shift, "load_shift.direction": 0.0, "f_r": 0.0}
+    rolling = seen["P_loss"] - base.outputs(free)["P_loss"]
+    # tanh(5 / 0.1) is 1
+    radius = base.outputs(at)["P_loss"] - base.outputs({**at, "f_r": 0.0})["P_loss"]
+    whole = vector(base.outputs(at), "normal").sum()
+    assert rolling == pytest.approx(radius * normal.sum() / whole, rel=1e-9)
+
+
 class Sheet:
     """The rig's sentences written out with Lagrange's equations; p' is positive forward."""
 
