@@ -47,6 +47,11 @@ class Folder:
         self._waiting: list[Sample] = []
         self._span = (0.0, 0.0)
 
+    @property
+    def begun(self) -> bool:
+        """Whether there is a run in it."""
+        return bool(self._runs)
+
     def begin(self, entries: Mapping[str, Any], first: Sample) -> str:
         """Begin a run; its name."""
         self.end()
@@ -58,7 +63,8 @@ class Folder:
         kept = {k: v for k, v in entries.items() if k not in ("name", "file", "files", "purpose")}
         self._runs.append({"name": name, "file": file, "purpose": purpose, **kept})
         clock = self.reading.clock
-        self._columns = [clock, *(column for column in first.values if column != clock)]
+        columns = dict.fromkeys([*first.values, *self.reading.sources()])  # some may begin late
+        self._columns = [clock, *(column for column in columns if column != clock)]
         import pyarrow as pa
 
         schema = pa.schema([(column, pa.float64()) for column in self._columns])
@@ -139,7 +145,8 @@ class Folder:
 
 
 def _pairs(table: Mapping[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_toml(value)}" for key, value in table.items()]
+    """Lines of a table; TOML has no null, what is null is left out."""
+    return [f"{_key(key)} = {_toml(value)}" for key, value in table.items() if value is not None]
 
 
 def _key(key: str) -> str:
@@ -150,6 +157,8 @@ def _toml(value: Any) -> str:
     """A value in TOML, whose texts, lists and numbers are those of JSON."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(_pairs(value)) + " }"
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return repr(math.nan if value is None else value)
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return json.dumps(value, ensure_ascii=False)

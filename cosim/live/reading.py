@@ -172,6 +172,11 @@ class Reading:
         """Times on the grid of communication steps where they miss it by rounding alone."""
         return snapped(times, self.problem.step)
 
+    def sources(self) -> list[str]:
+        """Columns of the stream that drive the model, or are compared with it."""
+        columns = [*(driver.column for driver in self.drivers), *self.joined.columns.values()]
+        return [str(self._made.get(name, {}).get("source", name)) for name in columns]
+
     def check(self, sample: Sample) -> None:
         """Refuse a stream that lacks what drives the model.
 

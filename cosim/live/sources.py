@@ -12,6 +12,7 @@ A thread reads and notes when each line came; the address decides nothing else.
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import socket
 import sys
@@ -180,7 +181,8 @@ def _tcp(address: str, put: Put, stop: threading.Event) -> Callable[[], None]:
     def serve() -> None:
         with server:
             for connection in _accepted(server, stop):
-                with connection:
+                # one that breaks off has ended, and the next one may come
+                with connection, contextlib.suppress(ConnectionError):
                     connection.settimeout(POLL)
                     _split(connection.recv, put, stop)
 

@@ -156,7 +156,11 @@ class Watch:
                     break
         finally:
             source.close()
-            self.finish()
+            try:
+                self.finish()
+            finally:
+                if self.folder and self.folder.begun:
+                    self.folder.close()  # whatever has ended it
         return self.summary()
 
     def _idle(self, seconds: float) -> bool:
