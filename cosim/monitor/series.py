@@ -31,7 +31,8 @@ LEAST = 6
 """Logs of a series: with fewer, no step between them can be told from their scatter."""
 SOURCES = ("date of the runs", "names of the files", "times at which the files were changed")
 _ISO = re.compile(
-    r"(?<!\d)(\d{4})(-?)(\d{2})\2(\d{2})(?:[T _-]+(\d{2})[-:_h]?(\d{2})(?:[-:_m]?(\d{2}))?)?(?!\d)"
+    r"(?<!\d)((?:19|20)\d{2})(-?)(\d{2})\2(\d{2})"
+    r"(?:[T _-]+(\d{2})[-:_h]?(\d{2})(?:[-:_m]?(\d{2}))?)?(?!\d)"
 )
 
 
@@ -255,10 +256,13 @@ def read_date(value: Any, where: str) -> datetime:
 def date_in(name: str) -> datetime | None:
     """The ISO date in a name, with the time of day if it follows; None without one."""
     for match in _ISO.finditer(name):
-        year, _, month, day, hour, minute, second = match.groups()
+        year, _, month, day, *clock = match.groups()
+        hour, minute, second = (int(part or 0) for part in clock)
+        if hour > 23 or minute > 59 or second > 59:  # a number of its own
+            hour = minute = second = 0
         try:
             return datetime(int(year), int(month), int(day)) + timedelta(
-                hours=int(hour or 0), minutes=int(minute or 0), seconds=int(second or 0)
+                hours=hour, minutes=minute, seconds=second
             )
         except ValueError:  # digits that are no date
             continue

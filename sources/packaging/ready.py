@@ -53,9 +53,10 @@ def target_path(name: Name, out: Path, fmi: int, kind: Kind) -> Path:
 def stamp_path(name: Name, fmi: int, kind: Kind, platform: str) -> Path:
     """A file that holds the hash of the FMU built from these very sources."""
     key = f"{sources_key()} {name} {fmi} {kind} {platforms(platform)}"
-    own = devices.find(name.component, name.device)
-    if own is not None:
-        key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
+    for folder in devices.folders() if name.device else ():  # parts may have one each
+        own = folder / f"{name.device}.toml"
+        if own.is_file():
+            key += f" {hashlib.sha256(own.read_bytes()).hexdigest()}"
     return cache_folder("built") / hashlib.sha256(key.encode()).hexdigest()
 
 

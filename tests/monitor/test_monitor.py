@@ -148,6 +148,9 @@ def test_dates_come_from_names_and_from_times_of_files(tmp_path: Path) -> None:
     [
         ("2025-03-14", datetime(2025, 3, 14)),
         ("run_20250314T0930.csv", datetime(2025, 3, 14, 9, 30)),
+        ("2025-03-14_2500", datetime(2025, 3, 14)), ("20250314_3001", datetime(2025, 3, 14)),
+        ("2025-03-14_0061.csv", datetime(2025, 3, 14)),
+        ("SN10001231_2025-03-14", datetime(2025, 3, 14)),
         ("2025-13-14", None), ("bench12", None), ("120250314", None),
     ],
 )  # fmt: skip
