@@ -17,6 +17,7 @@ from sources.packaging.platforms import PLATFORMS, host_platform
 SHELL = (Path(__file__).parent / "tiny_fmu.c").read_text(encoding="utf-8")
 INNER = {"Float64": "Real", "Int32": "Integer"}
 """FMI 2's names of what FMI 3 calls otherwise."""
+NONE = '""'
 CAN = (
     'canGetAndSetFMUState="true" canGetAndSetFMUstate="true" '
     'canHandleVariableCommunicationStepSize="true"'
@@ -34,6 +35,7 @@ class V:
         more: attributes of the variable.
         inner: attributes of the value (the same element in FMI 3).
         alias: a second name of FMI 3.
+        late: an output of FMI 3 that follows inputs in initialization only.
     """
 
     name: str
@@ -44,6 +46,7 @@ class V:
     more: str = ""
     inner: str = ""
     alias: str = ""
+    late: bool = False
 
     def xml(self, number: int, fmi: int) -> str:
         head = f'name="{self.name}" valueReference="{number}" causality="{self.causality}"'
@@ -120,7 +123,11 @@ def _xml(variables: Sequence[V], fmi: int, definitions: str, interface: str) -> 
     structure = (
         "<Outputs>" + "".join(f'<Unknown index="{n + 1}"/>' for n in given) + "</Outputs>"
         if fmi == 2
-        else "".join(f'<Output valueReference="{n}"/>' for n in given)
+        else "".join(
+            f'<Output valueReference="{n}"{" dependencies=" + NONE if variables[n].late else ""}/>'
+            for n in given
+        )
+        + "".join(f'<InitialUnknown valueReference="{n}"/>' for n in given if variables[n].late)
     )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'

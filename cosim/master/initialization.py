@@ -40,7 +40,8 @@ def initialize(run: Interpreter) -> None:
     if not settled and run.newtons:
         run.values[:] = begin
         _exchange(run, sweep, 1, SETTLED)
-        settled, change = _exchange(run, decoded(run.plan.solving), SWEEPS, LOOPED)
+        # outputs without feedthrough may follow inputs here, too: their initial states do
+        settled, change = _exchange(run, sweep + decoded(run.plan.solving), SWEEPS, LOOPED)
         for index in range(len(run.instances)):
             run.do(Op.COPY, *run.layout.copies[index].tolist())
             run.do(Op.SET, index, 0)
