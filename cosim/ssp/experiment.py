@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.signals import Signal, SignalVector, as_signal, objects
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing
 from ..scenario.scenario import Scenario
+from ..spec.units import conversion, parse
 from ..system.provider import Provider
 from ..system.variants import apply
-from .read import Experiment, Package, read_package
+from .read import Experiment, Package, Terminal, read_package
 from .write import write
 
 Vector = NDArray[np.float64]
@@ -65,6 +66,7 @@ def read_scenario(
     Raises:
         ScenarioError: it cannot be read, or neither it nor the arguments give duration and step.
         UnknownNameError: no such input.
+        UnitError: the unit of an input does not convert.
     """
     path = Path(path)
     package = read_package(path, ssd=ssd)
@@ -113,10 +115,7 @@ def drive(
         signal = as_signal(driver)
         if name in package.inputs:
             for terminal in package.inputs[name]:
-                plain = (terminal.factor, terminal.offset) == (1.0, 0.0)
-                found[terminal.name] = (
-                    signal if plain else _Scaled(signal, terminal.factor, terminal.offset)
-                )
+                found[terminal.name] = _inside(name, signal, terminal)
         elif "." in name:
             found[name] = signal
         else:
@@ -125,6 +124,21 @@ def drive(
                 f"{listing(package.inputs, name)}"
             )
     return found
+
+
+def _inside(name: str, signal: Signal, terminal: Terminal) -> Signal:
+    """What a variable behind a connector is given: the connector's unit counts on the way."""
+    factor, offset = terminal.factor, terminal.offset
+    if (factor, offset) == (1.0, 0.0):
+        return signal
+    if signal.unit and terminal.unit is not None:
+        try:
+            gain, shift = conversion(parse(signal.unit), terminal.unit)
+        except UnitError as error:
+            raise UnitError(f"input {name} from {signal.text}: unit {error}") from error
+        offset += 0.0 if terminal.relative else factor * shift
+        factor *= gain
+    return _Scaled(signal, factor, offset)
 
 
 def export(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..errors import ConnectError, UnitError, listing
 from ..fmu.archive import Fmu, open_fmu
@@ -32,6 +33,25 @@ class Route:
     offset: float
     unit: Unit | None
     order: int = 0
+
+
+class _Way(NamedTuple):
+    """From the value at a start to that at a node.
+
+    Attributes:
+        factor, offset: as in `Route`.
+        difference: the offset without those of units, which differences do not have.
+        unit: at the node, None if not known.
+    """
+
+    factor: float
+    offset: float
+    difference: float
+    unit: Unit | None
+
+    def offset_of(self, relative: bool) -> float:
+        """The offset of a difference (`relative`) or of another quantity."""
+        return self.difference if relative else self.offset
 
 
 @dataclass(frozen=True)
@@ -195,26 +215,28 @@ class Net:
             UnitError: units on the way do not convert.
         """
         own = self.leaf(start)
-        factor, offset, unit = 1.0, 0.0, self._units.get(start)
+        relative = own is not None and own.relative
+        way = _Way(1.0, 0.0, 0.0, self._units.get(start))
         if own is not None:
-            factor, offset, unit = self._step(1.0, 0.0, own.unit, unit, f"{shown(start[0])}")
-        first = unit if own is None else own.unit
+            way = self._step(_Way(1.0, 0.0, 0.0, own.unit), way.unit, f"{shown(start[0])}")
+        first = way.unit if own is None else own.unit
         found: list[Route] = []
         seen = {start}
-        queue = deque([(start, factor, offset, unit, first)])
+        queue = deque([(start, way, first)])
         while queue:
-            node, factor, offset, unit, first = queue.popleft()
+            node, before, first = queue.popleft()
             for edge in self._edges.get(node, ()):
                 if edge.node in seen:
                     continue
                 seen.add(edge.node)
-                way = self._along(edge, factor, offset, unit)
-                origin = first if first is not None else way[2]
+                way = self._along(edge, before)
+                origin = first if first is not None else way.unit
                 leaf = self.leaf(edge.node)
                 if leaf is None:
-                    queue.append((edge.node, *way, origin))
+                    queue.append((edge.node, way, origin))
                     if not edge.node[0]:
-                        found.append(Route(edge.node, way[0], way[1], origin, edge.order))
+                        offset = way.offset_of(relative)
+                        found.append(Route(edge.node, way.factor, offset, origin, edge.order))
                 elif leaf.causality in ("output", "local", "calculatedParameter"):
                     if own is not None:
                         raise ConnectError(
@@ -224,39 +246,41 @@ class Net:
                         )
                 else:
                     what = f"{shown(edge.node[0])}.{edge.node[1]}"
-                    way = self._step(way[0], way[1], way[2], leaf.unit, what)
+                    way = self._step(way, leaf.unit, what)
                     origin = origin if origin is not None else leaf.unit
-                    found.append(Route(edge.node, way[0], way[1], origin, edge.order))
+                    offset = way.offset_of(relative or leaf.relative)
+                    found.append(Route(edge.node, way.factor, offset, origin, edge.order))
         return found
 
-    def _along(
-        self, edge: _Edge, factor: float, offset: float, unit: Unit | None
-    ) -> tuple[float, float, Unit | None]:
+    def _along(self, edge: _Edge, way: _Way) -> _Way:
         there, link = self._units.get(edge.node), edge.link
         if there is None:
             variable = self.leaf(edge.node)
             there = variable.unit if variable is not None else None
         what = _name(link) if link else shown(edge.node[0])
         if link is None or not link.suppress:
-            factor, offset, unit = self._step(factor, offset, unit, there, what)
+            way = self._step(way, there, what)
         else:
-            unit = there
+            way = way._replace(unit=there)
         if link is not None:
             gain, shift = self._affine(link.transformation, what)
             if (gain, shift) != (1.0, 0.0):
-                factor, offset, unit = factor * gain, offset * gain + shift, there
-        return factor, offset, unit
+                way = _Way(
+                    way.factor * gain,
+                    way.offset * gain + shift,
+                    way.difference * gain + shift,
+                    there,
+                )
+        return way
 
-    def _step(
-        self, factor: float, offset: float, unit: Unit | None, there: Unit | None, what: str
-    ) -> tuple[float, float, Unit | None]:
-        if unit is None or there is None:
-            return factor, offset, there if there is not None else unit
+    def _step(self, way: _Way, there: Unit | None, what: str) -> _Way:
+        if way.unit is None or there is None:
+            return way._replace(unit=there if there is not None else way.unit)
         try:
-            gain, shift = conversion(unit, there)
+            gain, shift = conversion(way.unit, there)
         except UnitError as error:
             raise UnitError(f"{self.file.shown}: {what}: unit {error}") from error
-        return factor * gain, offset * gain + shift, there
+        return _Way(way.factor * gain, way.offset * gain + shift, way.difference * gain, there)
 
     def _affine(self, transformation: Transformation, what: str) -> tuple[float, float]:
         if transformation.kind == "linear":

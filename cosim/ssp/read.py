@@ -20,6 +20,7 @@ from ..errors import listing
 from ..fmu.archive import Fmu
 from ..reading import markup
 from ..reading.limits import TEXT
+from ..spec.units import Unit
 from ..system.system import System
 from ..system.toml import DeclaredConnection, SystemFile
 from . import flatten
@@ -50,11 +51,17 @@ class Terminal:
     """A variable behind a connector of the root system: `inside = factor * outside + offset`.
 
     For outputs it is `outside = factor * inside + offset`.
+
+    Attributes:
+        unit: outside, of an input; None if nothing on the way has one.
+        relative: the variable is a difference, which offsets of units do not move.
     """
 
     name: str
     factor: float
     offset: float
+    unit: Unit | None = None
+    relative: bool = False
 
 
 @dataclass(frozen=True)
@@ -194,7 +201,9 @@ class _Flat:
                 if _element(node) in outputs:
                     continue
                 terminals = tuple(
-                    Terminal(self.full(route.end), route.factor, route.offset)
+                    Terminal(
+                        self.full(route.end), route.factor, route.offset, route.unit, leaf.relative
+                    )
                     for route in self.net.routes(node)
                     if (leaf := self.net.leaf(route.end)) is not None and leaf.causality == "input"
                 )
@@ -271,7 +280,7 @@ class _Flat:
         place, name, index = route.end
         variable = self.net.variable(place, name)
         items = _items(self.net.fmus[place], name) if value.kind == "item" else {}
-        given = value.given(route.unit, items)
+        given = value.given(route.unit, items, variable.relative)
         if (route.factor, route.offset) != (1.0, 0.0):
             given = [
                 item if isinstance(item, str) else route.factor * float(item) + route.offset
@@ -402,7 +411,7 @@ def _signals(file: File, step: float) -> dict[str, Signal]:
         raise file.error("has times that go back, or numbers that are not finite; export it again")
     found: dict[str, Signal] = {}
     for head, column in zip(heads[1:], columns[1:], strict=True):
-        name, _, unit = head.partition(" ")
+        name, _, unit = head.partition(" [")  # names may have spaces
         found[name] = _Steps(
             times,
             np.array(column),

@@ -46,20 +46,29 @@ class Value:
     file: File
     steps: tuple[tuple[Transformation, bool], ...] = ()
 
-    def given(self, unit: Unit | None, items: Mapping[str, int]) -> list[Scalar]:
+    def given(
+        self, unit: Unit | None, items: Mapping[str, int], relative: bool = False
+    ) -> list[Scalar]:
         """What a variable with this unit and these enumeration items is given.
+
+        Args:
+            unit, items: of the variable.
+            relative: it is a difference, which offsets of units do not move.
 
         Raises:
             ScenarioError, UnitError: it does not fit.
         """
-        return [self._one(value, unit, items) for value in self.values]
+        return [self._one(value, unit, items, relative) for value in self.values]
 
-    def _one(self, value: Scalar, unit: Unit | None, items: Mapping[str, int]) -> Scalar:
+    def _one(
+        self, value: Scalar, unit: Unit | None, items: Mapping[str, int], relative: bool
+    ) -> Scalar:
         own = self.unit
         for transformation, suppressed in self.steps or ((Transformation(), False),):
             if own is not None and unit is not None and not suppressed:
                 try:
-                    gain, offset = conversion(own, unit)
+                    gain, shift = conversion(own, unit)
+                    offset = 0.0 if relative else shift
                 except UnitError as error:
                     raise UnitError(f"{self.file.shown}: {self.origin}: unit {error}") from error
                 if (gain, offset) != (1.0, 0.0):

@@ -130,11 +130,12 @@ class _Writer:
     def conversion(self, element: str, signal: Signal) -> tuple[float, float]:
         """From the unit of a signal to that of the input that it drives."""
         instance, _, variable = self.whole(element).partition(".")
-        unit = self.system.members[instance].description.variables[variable].unit
-        if not signal.unit or unit is None:
+        declared = self.system.members[instance].description.variables[variable]
+        if not signal.unit or declared.unit is None:
             return 1.0, 0.0
         try:
-            return conversion(parse(signal.unit), unit)
+            gain, offset = conversion(parse(signal.unit), declared.unit)
+            return gain, 0.0 if declared.relative else offset
         except UnitError as error:
             raise UnitError(f"input {element} from {signal.text}: unit {error}") from error
 
