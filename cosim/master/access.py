@@ -15,8 +15,10 @@ from ..data.signals import SignalVector, Table
 from ..errors import GraphError, UnitError, UnknownNameError, ValueRangeError, listing
 from ..fmu.description import Variable
 from ..fmu.exchange import Block
+from ..fmu.values import check_values
 from ..spec.units import conversion, parse
 from ..system.inputs import Driver
+from .driven import DrivenInputs
 from .interpreter import Interpreter
 
 WHOLE = 1e-6
@@ -72,6 +74,9 @@ class Access:
         self._run, self._system = run, run.system
         self._driven = {name: column for column, name in enumerate(driven)}
         self._members = {name: index for index, name in enumerate(run.system.members)}
+        names = run.layout.names
+        first = int(run.layout.inputs[0, 0])
+        self._slots = {names[slot]: slot for slot in range(first, len(names))}
         self._targets: dict[str, Target] = {}
         self._sources: dict[str, Source] = {}
 
@@ -119,6 +124,30 @@ class Access:
             name.partition(".")[2],
             columns if whole else None,
         )
+
+    def put(self, name: str, value: Any, inputs: DrivenInputs) -> None:
+        """Give a target a value; where a signal drives an element, in place of that signal.
+
+        Raises:
+            ValueRangeError: out of bounds, or not finite.
+        """
+        target = self.target(name)
+        items = check_values(name, target.variables, value)
+        if target.columns is not None:
+            for column, item in zip(target.columns, items, strict=True):
+                inputs.set(column, item)
+            return
+        run, layout = self._run, self._run.layout
+        run.instances[target.member].set({target.name: value})
+        for alias, item in zip(self._system.elements(name), items, strict=True):
+            element = self._system.first_name(alias)
+            slot = self._slots.get(element, -1)
+            if element in self._driven:
+                inputs.set(self._driven[element], item)
+            elif slot >= 0 and layout.objects[slot]:
+                run.objects[slot] = item
+            elif slot >= 0:  # beside driven ones: steps give arrays as a whole
+                run.values[slot] = float(item)
 
     def source(self, name: str) -> Source:
         """Where the value of a variable comes from.

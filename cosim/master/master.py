@@ -155,7 +155,7 @@ class Master:
         times: Vector = start + self.step * np.arange(count + 1, dtype=np.float64)
         times[-1] = start + duration
         tables = like.tables_for(self.system, signals, times) if like is not None else None
-        carried = {} if tables else self._objects(signals, times)
+        carried = {} if tables else self.carried(signals, times)
         times, external = tables or (times, self._external(signals, times, carried))
         return Outline(
             system=self.system,
@@ -183,7 +183,23 @@ class Master:
         Raises:
             InputError: values that do not fit.
         """
-        return self._external(signals, times, {})
+        return self._external(signals, times, self.carried(signals, times))
+
+    def carried(self, signals: Mapping[str, Signal], times: Vector) -> dict[int, list[Any]]:
+        """Values of the driven inputs that travel as objects, by their column.
+
+        Raises:
+            InputError: values that do not fit.
+        """
+        found = {}
+        for column, (name, signal) in enumerate(signals.items()):
+            declared = self.system.declaration(name)
+            if declared.type in OBJECTS:
+                given = objects(signal, times) or signal.at(times).tolist()
+                where = f"input {name} from {signal.text}"
+                scalar = replace(declared, dimensions=())
+                found[column] = [check_values(where, [scalar], item)[0] for item in given]
+        return found
 
     # -- checks ----------------------------------------------------------------------------------
 
@@ -214,11 +230,12 @@ class Master:
     def _external(
         self, signals: Mapping[str, Signal], times: Vector, carried: Mapping[int, Sequence[Any]]
     ) -> Vector:
-        """Values of the driven inputs; in place of `carried` objects a number for each."""
+        """Values of the driven inputs; in place of `carried` texts a number for each."""
         table = np.empty((times.size, len(signals)))
         for column, (name, signal) in enumerate(signals.items()):
             if column in carried:
-                codes = {item: code for code, item in enumerate(dict.fromkeys(carried[column]))}
+                different = enumerate(dict.fromkeys(carried[column]))
+                codes = {i: float(i) if isinstance(i, int) else code for code, i in different}
                 table[:, column] = [codes[item] for item in carried[column]]
                 continue
             values = self._numbers(name, signal, times)
@@ -250,15 +267,3 @@ class Master:
         scalar, where = replace(declared, dimensions=()), f"input {name} from {signal.text}"
         checked = {item: check_values(where, [scalar], item)[0] for item in dict.fromkeys(given)}
         return np.array([float(checked[item]) for item in given])
-
-    def _objects(self, signals: Mapping[str, Signal], times: Vector) -> dict[int, list[Any]]:
-        """Values of the driven inputs that travel as objects, by their column."""
-        found = {}
-        for column, (name, signal) in enumerate(signals.items()):
-            declared = self.system.declaration(name)
-            if declared.type in OBJECTS:
-                given = objects(signal, times) or signal.at(times).tolist()
-                where = f"input {name} from {signal.text}"
-                scalar = replace(declared, dimensions=())
-                found[column] = [check_values(where, [scalar], item)[0] for item in given]
-        return found

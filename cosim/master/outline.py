@@ -54,7 +54,7 @@ class Outline:
     every: int
     signals: Mapping[str, Signal]
     external: Vector
-    objects: Mapping[int, Sequence[Any]]
+    objects: Mapping[int, list[Any]]
     endless: bool = False
 
     def tables_for(

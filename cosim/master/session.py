@@ -250,6 +250,8 @@ class Session:
         for name, value in (later or {}).items():
             driving[name] = Shifted(driving[name], value, outline.step)
         self._run.external[:] = self.master.tabulate(driving, outline.times)
+        for column, items in self.master.carried(driving, outline.times).items():
+            outline.objects[column][:] = items
         self._later = {}
 
     def _advance_within(self, limit: float) -> None:

@@ -34,12 +34,12 @@ from ..errors import (
     ValueRangeError,
 )
 from ..fmu.surroundings import Surroundings
-from ..fmu.values import check_values
 from ..system.inputs import Driver
 from .access import Access, held, whole_steps
 from .driven import DrivenInputs
 from .execution import Execution
 from .initialization import initialize
+from .kernel.stepper import Compiled
 from .master import Master
 from .memory import Memory, Saved
 from .plan import Op, decoded
@@ -180,12 +180,7 @@ class Twin:
             return
         if unit:
             value = self._access.convert(name, value, unit, into=True)
-        if target.columns is None:
-            self._run.instances[target.member].set({target.name: value})
-        else:
-            found = check_values(name, target.variables, value)
-            for column, item in zip(target.columns, found, strict=True):
-                self._inputs.set(column, float(item))
+        self._access.put(name, value, self._inputs)
         self._told.add(name)
 
     def get(self, name: str, unit: str = "") -> Any:
@@ -207,9 +202,7 @@ class Twin:
         if source.slot >= 0:
             value: Any = float(self._run.values[source.slot] * source.gain + source.offset)
         elif source.column >= 0:
-            row = self._run.external[self._run.index]
-            self._inputs.put(self._run.index, self._run.index + 1)
-            value = float(row[source.column])
+            value = self._inputs.get(source.column)
         else:
             value = self._access.fetch(source)
         return self._access.convert(name, value, unit, into=False) if unit else value
@@ -321,6 +314,10 @@ class Twin:
         self._check_alive()
         memory = Memory.of(self._run, self._stepper.save(), self._base, self._inputs.given)
         memory.blocks = len(self._blocks)
+        for instance in self._run.instances:  # steps from here on may be taken back
+            instance.returning(True)
+        if isinstance(self._stepper, Compiled):
+            self._stepper.kernel.run.final = 0
         saved = Saved(self.time, memory)
         self._saved.append(saved)
         return saved

@@ -24,7 +24,7 @@ from cosim.master.twin import Twin
 from cosim.system.system import System
 from tests.cosim.bench import bench
 from tests.cosim.test_fmi_runs import CLOCK, EARLY, END, TIME
-from tests.tiny_fmus import tiny
+from tests.tiny_fmus import V, tiny
 
 STEP, COUNT = 1e-3, 60
 RECORD = ["load.w", "motor.i", "motor.w_ref", "gearbox.tau_b"]
@@ -264,3 +264,24 @@ def test_fmus_of_version_3_are_saved_and_forked(provider) -> None:
         go(twin, 20)
     assert np.array_equal(twin.recording.values, first)
     assert np.array_equal(fork.recording.values, first)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("executor", ["c", "python"])
+def test_steps_after_a_saved_state_are_not_said_to_be_final(
+    tmp_path: Path, executor: str, fmi: int
+) -> None:
+    # the FMU refuses to return to before a step that was said to be final
+    variables = [V("u", "Float64", "input", "0"), V("y", "Float64", "output")]
+    law = "v->r[9][0] += h * v->r[0][0];"
+    system = System()
+    system.add("m", str(tiny(tmp_path, variables, "v->r[1][0] = v->r[9][0];", law, fmi=fmi)))
+    with Twin(Master(system, step=0.125, executor=executor)) as twin:
+        twin.set("m.u", 1.0)
+        twin.step(0.25)
+        saved = twin.save()
+        for _ in range(2):
+            twin.step(0.5)
+            assert twin.get("m.y") == 0.75
+            twin.restore(saved)
+            assert twin.get("m.y") == 0.25
