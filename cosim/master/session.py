@@ -125,10 +125,10 @@ class Session:
     def _begin(self, name: str) -> list[Any]:
         """Values of an array as the system has them."""
         member, (variable,) = self.system.variables(name)
-        given = member.parameters.get(variable.name, variable.start)
-        if len(given) != variable.size:
+        given = member.parameters.get(variable.name)  # as it was written: rows, one for all
+        if given is None and len(variable.start) != variable.size:
             raise ValueRangeError(f"{name} has no start values; set it as a whole")
-        return check_values(name, [variable], list(given))
+        return check_values(name, [variable], variable.start if given is None else given)
 
     def run(
         self, values: Mapping[str, float] | Vector | None = None, *, limit: float = math.inf
@@ -199,7 +199,8 @@ class Session:
 
     def _give(self, values: Mapping[str, Any]) -> None:
         """Give values one by one."""
-        arrays: dict[str, tuple[Block, list[Any]]] = {}
+        wholes: dict[str, list[Any]] = {}
+        elements: list[tuple[str, Block, int, Any]] = []
         for name, value in values.items():
             if name not in self._blocks:
                 self._blocks[name] = self._block(name)
@@ -207,11 +208,17 @@ class Session:
             found = check_values(name, variables, value)
             if variables[0].index is None:
                 block.set(found)
-            else:  # an element: FMI sets arrays as a whole
-                whole = name.rpartition("[")[0]
-                arrays.setdefault(whole, (block, self._begin(whole)))[1][variables[0].index] = (
-                    found[0]
-                )
+                if variables[0].dimensions:
+                    wholes[self.system.first_name(name)] = found
+            else:
+                whole = self.system.first_name(name).rpartition("[")[0]
+                elements.append((whole, block, variables[0].index, found[0]))
+        arrays: dict[str, tuple[Block, list[Any]]] = {}
+        for whole, block, index, item in elements:  # FMI sets arrays as a whole
+            if whole not in arrays:
+                begin = wholes[whole] if whole in wholes else self._begin(whole)
+                arrays[whole] = (block, list(begin))
+            arrays[whole][1][index] = item
         for block, items in arrays.values():
             block.set(items)
 

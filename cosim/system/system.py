@@ -166,6 +166,8 @@ class System:
         where = f"{self.name}: {member.name}"
         found = check_values(where, variables, value)
         if first.index is None:
+            for variable in variables if len(variables) > 1 else ():  # said of one of them before
+                member.parameters.pop(variable.name, None)
             plain = isinstance(value, (bool, int, float)) and not variables[0].items
             member.parameters[name.partition(".")[2]] = value if plain else _given(value, found)
             return

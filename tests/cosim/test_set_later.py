@@ -121,6 +121,57 @@ def test_an_element_beside_driven_ones_keeps_what_it_was_set_to(
         assert twin.get("m.y").tolist() == [3.0, 0.0, 7.0]
 
 
+@pytest.mark.parametrize(
+    ("own", "given", "expected"),
+    [
+        ({}, {"m.x[2]": 9.0}, [1.0, 9.0, 3.0, 4.0]),
+        ({"x": 5.0}, {"m.x[2]": 9.0}, [5.0, 9.0, 5.0, 4.0]),
+        ({"x": [5.0, 6.0, 7.0]}, {"m.x[2]": 9.0}, [5.0, 9.0, 7.0, 4.0]),
+        ({"x[1]": 5.0}, {"m.x[2]": 9.0, "m.x[3]": 8.0}, [5.0, 9.0, 8.0, 4.0]),
+        ({"A": [[2.0, 3.0], [5.0, 6.0]]}, {"m.A[2,2]": 9.0}, [1.0, 2.0, 3.0, 9.0]),
+        ({}, {"m.x": [7.0, 7.0, 7.0], "m.x[2]": 9.0}, [7.0, 9.0, 7.0, 4.0]),
+        ({}, {"m.x[2]": 9.0, "m.x": [7.0, 7.0, 7.0]}, [7.0, 9.0, 7.0, 4.0]),
+        ({}, {"m.xx": [7.0, 7.0, 7.0], "m.x[2]": 9.0}, [7.0, 9.0, 7.0, 4.0]),
+        ({}, {"m.x": 7.0, "m.xx[2]": 9.0}, [7.0, 9.0, 7.0, 4.0]),
+    ],
+)
+def test_a_session_gives_elements_beside_what_the_whole_is(
+    tmp_path: Path, own: dict[str, Any], given: dict[str, Any], expected: list[float]
+) -> None:
+    fmu = tiny(
+        tmp_path,
+        [
+            V("x", "Float64", "parameter", "1 2 3", (3,), alias="xx"),
+            V("A", "Float64", "parameter", "1 2 3 4", (2, 2)),
+            V("y", "Float64", "output", None, (4,)),
+        ],
+        "for (int i = 0; i < 3; i++) v->r[2][i] = v->r[0][i]; v->r[2][3] = v->r[1][3];",
+        begin="for (int i = 0; i < 4; i++) { v->r[0][i] = i + 1; v->r[1][i] = i + 1; }",
+    )
+    system = System()
+    system.add("m", str(fmu), own)
+    with Session(Master(system, step=0.1), 0.2, record=["m.y"]) as session:
+        assert session.run(given)[1][-1].tolist() == expected
+
+
+def test_the_last_word_on_a_vector_of_fmi_2_counts(tmp_path: Path) -> None:
+    system = System()
+    names = [V(f"q[{i}]", "Float64", "parameter", "0") for i in (1, 2)]
+    outputs = [V(f"y[{i}]", "Float64", "output") for i in (1, 2)]
+    law = "v->r[2][0] = v->r[0][0]; v->r[3][0] = v->r[1][0];"
+    system.add("m", str(tiny(tmp_path, names + outputs, law, fmi=2)))
+    for name, value, expected in (
+        ("m.q", 1.0, [1.0, 1.0]),
+        ("m.q[1]", 5.0, [5.0, 1.0]),
+        ("m.q", 2.0, [2.0, 2.0]),
+        ("m.q[2]", 3.0, [2.0, 3.0]),
+        ("m.q", [7.0, 8.0], [7.0, 8.0]),
+    ):
+        system.set(name, value)
+        rows = Master(system, step=0.1).run(0.2, record=["m.y"]).values
+        assert rows[-1].tolist() == expected
+
+
 def test_a_vector_of_fmi_2_is_set_with_its_driven_elements(tmp_path: Path) -> None:
     fmu = tiny(
         tmp_path,
