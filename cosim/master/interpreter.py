@@ -160,13 +160,18 @@ class Interpreter:
             try:
                 self.do(op, a, b)
             except EndRequest as request:
-                if op is not Op.STEP or request.time < self.instants[self.index + 1]:
+                if op is not Op.STEP or not self.completes(request):
                     raise
                 end = end or request
         self.index += 1
         if end is not None:
             end.complete = True
             raise end
+
+    def completes(self, request: EndRequest) -> bool:
+        """Whether an FMU asked to end where the present step ends, to rounding."""
+        end = self.instants[self.index + 1]  # start + step * number, FMUs count from the last one
+        return request.time >= end - ROUNDING * self.step - 2.0 * math.ulp(end)
 
     def restart(self) -> None:
         """Return to the state before initialization, with the system's values set again."""

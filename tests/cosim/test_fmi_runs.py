@@ -129,6 +129,39 @@ def test_an_end_inside_a_step_keeps_the_last_values_of_all(
     assert "asked to end the simulation at t = 0.45 s" in recording.notes[0]
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("executor", ["python", "auto"])
+def test_an_end_is_one_at_every_point_however_times_round(
+    executor: str, fmi: int, tmp_path: Path
+) -> None:
+    count = V("k", "Int32", "parameter", "1")
+    law = "if (++v->n[3][0] == v->n[2][0]) { v->end = true; v->last = t + h; }"
+    path = tiny(tmp_path, [*CLOCK, count], TIME, law, fmi=fmi, name="clock")
+    for start, step in ((0.0, 0.1), (3.0, 1e-3), (1.7e9, 1e-3)):
+        assert any(start + k * step + step < start + (k + 1) * step for k in range(1, 13))
+        for k in range(2, 14):
+            system = alone(path, 2)
+            system.set("a.k", k)
+            master = Master(system, step=step, executor=executor)
+            recording = master.run(20 * step, record=["a.y", "b.y"], start=start)
+            assert len(recording) == k + 1 and not recording.error
+            # both count t + h; where t is the point before, rounding is that of one sum
+            assert recording["a.y"][-1] == pytest.approx(recording.time[-1], rel=1e-15)
+            assert recording["b.y"].tolist() == recording["a.y"].tolist()
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "iterated", "adaptive"])
+def test_no_step_goes_beyond_the_stop_time_by_rounding(algorithm: str, tmp_path: Path) -> None:
+    law = "if (t + h > v->stop) return 3; v->r[9][0] += h * (1 - v->r[1][0]);"
+    path = tiny(tmp_path, CLOCK, "v->r[0][0] = v->r[9][0];", law)
+    for k in range(1, 31):
+        system = alone(path, 2)
+        system.connect("a.y", "b.u")
+        system.connect("b.y", "a.u")
+        recording = Master(system, algorithm, step=0.1).run(round(0.1 * k, 1))
+        assert len(recording) == k + 1 and not recording.error
+
+
 def test_a_discarded_step_that_asks_for_no_end_is_an_error(tmp_path: Path) -> None:
     path = tiny(tmp_path, CLOCK, TIME, "if (t > 0.25) return 2;", fmi=2)
     with pytest.raises(StepError, match=r"t = 0\.3 s failed with status 'discard'") as caught:

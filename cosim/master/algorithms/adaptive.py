@@ -182,7 +182,7 @@ class StepControl:
         """A step of all instances; energy into both ends of each bond, and what went over it."""
         run, layout = self.run, self.run.layout
         before = run.values[layout.bond_output].copy()
-        self.programs.do(STEP, time, size)
+        self.programs.do(STEP, time, run.size(time, size))
         inputs = run.values[layout.bond_input]
         terms = layout.bond_sign * inputs * (before + run.values[layout.bond_output]) * 0.5 * size
         energy, passed = np.zeros(len(layout.bonds)), np.zeros(len(layout.bonds))

@@ -87,7 +87,7 @@ class Compiled:
         """Raise; if an FMU asked to end, the interpreter first brings the others to its time."""
         run = self.run
         steps, row = decoded(run.plan.step), (Op.STEP, run.instances.index(instance), 0)
-        ended = isinstance(error, EndRequest) and error.time >= run.instants[run.index + 1]
+        ended = isinstance(error, EndRequest) and run.completes(error)
         if isinstance(error, EndRequest) and ended and row in steps:  # not in parts of a step
             self.kernel.hand_over()
             try:
