@@ -91,7 +91,8 @@ def read_scenario(
         start=start,
         step=step,
         algorithm=experiment.algorithm or "jacobi",
-        tolerance=None,
+        options=dict(experiment.options),
+        tolerance=experiment.tolerance,
         variants={},
         parameters={},
         inputs={**package.signals, **drive(package, inputs or {})},
@@ -165,6 +166,7 @@ def export(
     file = replace(scenario.system, instances=instances)
     system = file.build(provider, scenario.parameters)
     experiment = Experiment(
-        scenario.start, scenario.start + scenario.duration, scenario.step, scenario.algorithm
-    )
+        scenario.start, scenario.start + scenario.duration, scenario.step, scenario.algorithm,
+        scenario.options, scenario.tolerance,
+    )  # fmt: skip
     return write(system, path, version=version, experiment=experiment, inputs=scenario.inputs)

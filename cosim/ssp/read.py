@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import re
@@ -38,12 +39,16 @@ class Experiment:
     Attributes:
         start, stop, step: [s].
         algorithm: a co-simulation algorithm of ours.
+        options: of the algorithm.
+        tolerance: handed to the FMUs, None for their own.
     """
 
     start: float | None = None
     stop: float | None = None
     step: float | None = None
     algorithm: str | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -339,13 +344,30 @@ class _Flat:
             elif local == "FixedStepMaster":
                 step = self.number(item, "stepSize")
         algorithm, signals = None, {}
+        options: dict[str, Any] = {}
+        tolerance: float | None = None
         if ours is not None:
             step = self.number(ours, "step") or step
             algorithm = ours.get("algorithm")
+            options, tolerance = self.options(ours), self.number(ours, "tolerance")
             if source := ours.get("inputs"):
                 signals = _signals(self.file.beside(source, "the default experiment"), step or 0.0)
         start, stop = self.number(element, "startTime"), self.number(element, "stopTime")
-        return Experiment(start, stop, step, algorithm), signals
+        return Experiment(start, stop, step, algorithm, options, tolerance), signals
+
+    def options(self, element: ET.Element) -> dict[str, Any]:
+        """Options of the algorithm."""
+        text = element.get("options", "{}")
+        try:
+            found = json.loads(text)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict):
+            raise self.file.error(
+                f"default experiment: options = {text!r} is no JSON object such as "
+                '{"extrapolation": 1}'
+            )
+        return found
 
     def number(self, element: ET.Element, key: str) -> float | None:
         text = element.get(key)

@@ -8,6 +8,7 @@ tools skip.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -416,6 +417,14 @@ class _Writer:
             "    </ssd:Annotations>",
         ]
 
+    def options(self) -> str | None:
+        """Options of the algorithm as JSON."""
+        options = dict(self.experiment.options)
+        try:
+            return json.dumps(options, sort_keys=True, allow_nan=False) if options else None
+        except (TypeError, ValueError) as error:
+            raise GraphError(f"algorithm option of {options} is no JSON ({error})") from None
+
     def default_experiment(self) -> list[str]:
         content = self.experiment
         if content == Experiment() and not self.signals:
@@ -432,8 +441,11 @@ class _Writer:
                 f"<osp:FixedStepAlgorithm{attributes(baseStepSize=content.step)}/></osp:Algorithm>",
                 "      </ssc:Annotation>",
             ]
-        if content.step is not None or content.algorithm or table:
-            run = attributes(step=content.step, algorithm=content.algorithm, inputs=table)
+        run = attributes(
+            step=content.step, algorithm=content.algorithm, options=self.options(),
+            tolerance=content.tolerance, inputs=table,
+        )  # fmt: skip
+        if run:
             notes += [
                 '      <ssc:Annotation type="cosim">',
                 f"        <cosim:Run{run}/>",

@@ -199,6 +199,34 @@ def test_a_scenario_with_logged_inputs(tmp_path: Path) -> None:
     assert np.ptp(runs[0]["load.w"]) > 0.1
 
 
+def test_a_scenario_keeps_the_options_of_its_algorithm_and_its_tolerance(tmp_path: Path) -> None:
+    plain = ssp.read_scenario(
+        ssp.write(bench(), tmp_path / "a.ssp", experiment=ssp.Experiment(0.0, 0.05, STEP, "jacobi"))
+    )
+    assert (plain.options, plain.tolerance) == ({}, None)
+    options = {"extrapolation": 2, "substeps": {"motor": 3}}
+    given = replace(plain, options=options, tolerance=1e-7)
+    again = ssp.read_scenario(ssp.export(given, tmp_path / "b.ssp", None))
+    assert (again.algorithm, again.options, again.tolerance) == ("jacobi", options, 1e-7)
+    plainly, *both = (
+        Master(
+            item.system.build(None), item.algorithm, item.step,
+            options=item.options, tolerance=item.tolerance,
+        ).run(item.duration)
+        for item in (plain, given, again)
+    )  # fmt: skip
+    assert np.array_equal(both[0].values, both[1].values)
+    assert not np.array_equal(both[0].values, plainly.values)
+    bad = tmp_path / "bad.ssp"
+    with zipfile.ZipFile(tmp_path / "b.ssp") as old, zipfile.ZipFile(bad, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"extrapolation", b"\\"))
+    with pytest.raises(ScenarioError, match="is no JSON object"):
+        ssp.read_scenario(bad)
+    with pytest.raises(GraphError, match="is no JSON"):
+        ssp.export(replace(plain, options={"extrapolation": Path()}), tmp_path / "c.ssp", None)
+
+
 def test_constant_inputs_are_start_values(tmp_path: Path) -> None:
     path = ssp.write(bench(), tmp_path / "bench.ssp", inputs={"motor.w_ref": Constant(42.0)})
     again = ssp.read(path)
