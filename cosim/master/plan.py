@@ -230,7 +230,8 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
     for name in external:
         add(given, name)
     passed_in = {connection.target for connection in system.connections} | set(external)
-    for name in observed:
+    firsts = [system.first_name(name) for name in observed]
+    for name in firsts:
         if name not in passed_in:
             add(fetched, name)
 
@@ -253,7 +254,7 @@ def lay_out(system: System, external: Sequence[str], observed: Sequence[str]) ->
               for i in range(len(instances))]  # fmt: skip
     by_target = {c.target: c for c in wires}
     record = []
-    for name in observed:
+    for name in firsts:
         wire = by_target.get(name)
         if wire is not None:
             record.append((outputs[wire.source], wire.gain, wire.offset))

@@ -219,7 +219,7 @@ class System:
         found = [
             self._wire(
                 what,
-                (out, f"{giver.name}.{out_name}"),
+                (out, self.first_name(f"{giver.name}.{out_name}")),
                 (into, self.first_name(f"{taker.name}.{into_name}")),
                 (factor, offset),
                 convert,
