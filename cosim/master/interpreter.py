@@ -19,7 +19,7 @@ from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from ..fmu.intermediate import Moved
-from .extrapolation import derivatives_at_begin, mean_of_part, mean_of_step
+from .extrapolation import continuous, derivatives_at_begin, mean_of_part, mean_of_step
 from .input_derivatives import InputDerivatives, asked_for
 from .newton import Newton
 from .objects import ObjectPassing
@@ -372,6 +372,11 @@ class Interpreter:
             instance = self.instances[a]
             if not instance.description.can("providesDirectionalDerivatives"):
                 return None
+        declared = [self.system.declaration(name) for name in layout.names]
+        if not all(continuous(declared[slot]) for slot in loop.sources):
+            return None
+        copied = [s for a in members for s in range(*layout.copies[a].tolist())]
+        needed = {*loop.sources.tolist(), *layout.copy_source[copied].tolist()}
         jacobian = np.zeros((loop.sources.size, loop.sources.size))
         for column in range(loop.sources.size):
             tangent = np.zeros(self.values.size)
@@ -381,12 +386,16 @@ class Interpreter:
                 targets, sources = layout.copy_target[first:last], layout.copy_source[first:last]
                 tangent[targets] = tangent[sources] * layout.copy_gain[first:last]
                 seeded = [int(slot) for slot in targets if tangent[slot] != 0.0]
-                fetched = range(*layout.outputs[a].tolist())
-                if not seeded:
-                    tangent[fetched.start : fetched.stop] = 0.0
+                # others, which are recorded alone, may have no derivative
+                fetched = [s for s in range(*layout.outputs[a].tolist()) if s in needed]
+                fetched = [slot for slot in fetched if continuous(declared[slot])]
+                if not (seeded and fetched):
+                    tangent[fetched] = 0.0
                     continue
+                if any(declared[slot].dimensions for slot in (*fetched, *seeded)):
+                    return None  # FMI has them of whole arrays only
                 name = len(layout.instances[a]) + 1
-                tangent[fetched.start : fetched.stop] = self.instances[a].directional_derivative(
+                tangent[fetched] = self.instances[a].directional_derivative(
                     [layout.names[slot][name:] for slot in fetched],
                     [layout.names[slot][name:] for slot in seeded],
                     tangent[seeded],

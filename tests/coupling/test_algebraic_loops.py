@@ -11,7 +11,7 @@ from cosim.errors import AlgebraicLoopError, StepError
 from cosim.master.master import Master
 from cosim.master.newton import invert
 from cosim.system.system import System
-from tests.tiny_fmus import V, tiny
+from tests.tiny_fmus import CAN, SHELL, V, tiny
 
 EXECUTORS = ["python", "c"]
 
@@ -113,6 +113,55 @@ def test_arm_and_base_by_newton_move_as_with_the_arms_inertia(provider) -> None:
     # after initialization both solve the same equations: [F; M] = inertia * acceleration + bias
     for name in ("base.mount_acceleration[1]", "base.mount_angular_acceleration[2]"):
         assert wrench[name][0] == pytest.approx(reference[name][0], abs=1e-8)
+
+
+def test_what_is_recorded_besides_needs_no_derivative(provider) -> None:
+    system = arm_and_base(provider)
+    base = system.members["base"].description.variables.values()
+    state = next(v.name for v in base if v.causality == "local")
+    names = [*system.signals(), "base.mount_x", f"base.{state}"]
+    with_more = Master(system, step=1e-3).run(2e-3, record=names)
+    plain = Master(system, step=1e-3).run(2e-3)
+    np.testing.assert_array_equal(with_more.values[:, :-2], plain.values)
+
+
+DERIVATIVE = r"""
+EXPORT int fmi3GetDirectionalDerivative(Model *m, const Ref *u, size_t nu, const Ref *k, size_t nk,
+                                        const double *seed, size_t ns, double *out, size_t no) {
+  size_t values = 0, seeds = 0;
+  for (size_t i = 0; i < nu; i++) values += SIZE[u[i]];
+  for (size_t i = 0; i < nk; i++) seeds += SIZE[k[i]];
+  if (values != no || seeds != ns) { say(m, 3, "too little room"); return 3; }
+  for (size_t i = 0; i < nu; i++) if (u[i] != 1) { say(m, 3, "no continuous output"); return 3; }
+  for (size_t i = 0; i < no; i++) out[i] = 2 * seed[i];
+  return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("size", [(), (2,)])
+def test_loops_of_arrays_and_beside_integers_are_solved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: tuple[int, ...]
+) -> None:
+    monkeypatch.setattr("tests.tiny_fmus.SHELL", SHELL + DERIVATIVE)
+    fmu = tiny(
+        tmp_path,
+        [
+            V("u", "Float64", "input", "0 0" if size else "0", size),
+            V("y", "Float64", "output", None, size),
+            V("n", "Int32", "output"),
+        ],
+        "for (int i = 0; i < 2; i++) v->r[1][i] = 2 * v->r[0][i] + 1 + i; v->n[2][0] = 3;",
+        interface=f'{CAN} providesDirectionalDerivatives="true"',
+    )
+    system = System("pair")
+    for name in "ab":
+        system.add(name, str(fmu))
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    recording = Master(system, step=0.1).run(0.2, record=["a.y", "b.n"])
+    exact = [-1.0, -2.0, 3.0] if size else [-1.0, 3.0]  # y = 2 y + 1 + i
+    np.testing.assert_allclose(recording.values, [exact] * 3, rtol=1e-9)
 
 
 def test_inverse() -> None:
