@@ -258,7 +258,8 @@ class Interpreter:
     def extrapolate(self, index: int, mean: Mean) -> None:
         """Let an input follow the polynomial through the last values of its source."""
         past, now = self.history[:, index].tolist(), float(self.values[mean.source])
-        order = min(mean.order, self.index + int(self.past[0]) + mean.ahead)  # values there are
+        known = self.index + int(self.past[0]) + mean.ahead  # values before the newest
+        order = min(mean.order, known, 1 if known < 3 else 2)  # a parabola looks at four
         if mean.bonded or not mean.moving:
             average = mean_of_step(order, mean.ahead, now, past) * mean.gain + mean.offset
             self.derivatives.average[index] = average

@@ -260,7 +260,8 @@ static void extrapolate(Run *run, int64_t first, int64_t last) {
   for (int64_t i = first, n; i < last; i += n) {
     const Mean *const m = run->means + i;
     const int64_t known = run->index + *run->past + (m->ahead ? 1 : 0);
-    const int64_t order = m->order < known ? m->order : known;
+    const int64_t most = known < 1 ? 0 : known < 3 ? 1 : 2; /* a parabola looks at four values */
+    const int64_t order = m->order < most ? m->order : most;
     n = m->alike < last - i ? m->alike : last - i;
     if (m->bonded || !m->moving)
       for (int64_t j = 0, k = i; j < n; j++, k++) {
