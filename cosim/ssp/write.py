@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data.signals import Constant, Signal
+from ..data.signals import Constant, Signal, objects
 from ..errors import GraphError, InputError, UnitError
 from ..files import atomic
 from ..fmu.archive import Fmu
@@ -116,14 +116,29 @@ class _Writer:
         """Note a parameter or start value, element by element."""
         member, variables = self.system.variables(name)
         items = check_values(name, variables, value)
+        given = self.values[member.name]
         for variable in variables:
-            self.values[member.name][variable.name] = items[: variable.size]
-            items = items[variable.size :]
+            if variable.index is None:
+                given[variable.name] = items[: variable.size]
+                items = items[variable.size :]
+                continue
+            whole = member.description.whole(variable.name)
+            if whole.name not in given and len(whole.start) != whole.size:
+                raise GraphError(f"{member.name}.{whole.name} has no start values; give all of it")
+            given.setdefault(whole.name, list(whole.start))[variable.index] = items[0]
 
     def drive(self, element: str, signal: Signal) -> None:
         """Note an input: numbers as start values, the rest as a table as well."""
         start = np.array([self.experiment.start or 0.0], dtype=np.float64)
         gain, offset = self.conversion(element, signal)
+        if isinstance(signal, Constant) and (gain, offset) == (1.0, 0.0):
+            self.give(element, signal.value)
+            return
+        if objects(signal, start):
+            raise GraphError(
+                f"input {element} from {signal.text} has texts, or integers that are not exact as "
+                "floating-point numbers; only constant ones can be written"
+            )
         self.give(element, gain * float(np.asarray(signal.at(start))[0]) + offset)
         if not isinstance(signal, Constant):
             self.signals[element] = signal
@@ -206,13 +221,22 @@ class _Writer:
             columns.append(np.asarray(signal.at(times), dtype=np.float64) * gain + offset)
         values = np.column_stack(columns)
         kept = np.concatenate(([True], np.any(values[1:] != values[:-1], axis=1)))
-        heads = [f"{name} [{self.system.unit(name)}]".removesuffix(" []") for name in self.signals]
+        heads = [f"{name} [{self.symbol(name)}]".removesuffix(" []") for name in self.signals]
         rows = [",".join(["time [s]", *heads])]
         rows += [
             ",".join(map(repr, [time, *row]))
             for time, row in zip(times[kept].tolist(), values[kept].tolist(), strict=True)
         ]
         return ("\n".join(rows) + "\n").encode()
+
+    def symbol(self, name: str) -> str:
+        """The unit of an input if it is read as what the FMU means by it, else ""."""
+        declared = self.system.declaration(name)
+        try:
+            known = declared.unit is None or parse(declared.symbol) == declared.unit
+        except UnitError:
+            known = False
+        return declared.symbol if known else ""
 
     # -- elements ----------------------------------------------------------------------------------
 
@@ -364,6 +388,10 @@ class _Writer:
                     f"{member.name}.{name} is an array, which SSP 1.0 cannot set; write version 2.0"
                 )
             type_ = self.type(variable, member)
+            if type_ == "Binary":
+                raise GraphError(
+                    f"{member.name}.{name} is of type Binary, whose values are not written"
+                )
             if type_ in ("Real", "Float64", "Float32"):
                 values = " ".join(text(float(item)) for item in items)
             elif type_ == "Boolean":
