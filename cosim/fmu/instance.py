@@ -428,7 +428,9 @@ class Instance:
         self._call("restoring a state", self._state_function("Set"), state.address)
 
     def release(self, state: State) -> None:
-        """Free a saved state."""
+        """Free a saved state; after `fatal` no call may follow, and it is lost."""
+        if self.dead:
+            return
         pointer = ct.c_void_p(state.address)
         self._call("releasing a state", self._state_function("Free"), ct.addressof(pointer))
 

@@ -97,6 +97,7 @@ class Session:
         self.times = outline.times[:: outline.every].copy()
         self.targets = tuple(targets)
         self.work = 0
+        self._signals: dict[str, Signal] = {}
         self._later: dict[str, float] = {}
         self._numbers: dict[tuple[str, ...], Numbers | None] = {}
         self._stack = ExitStack()
@@ -232,8 +233,7 @@ class Session:
         wanted = {name: value for name, value in later.items() if value}
         if wanted == self._later:
             return
-        self.drive({}, wanted)
-        self._later = wanted
+        self.drive(self._signals, wanted)
 
     def drive(
         self, signals: Mapping[str, Signal], later: Mapping[str, float] | None = None
@@ -259,7 +259,8 @@ class Session:
         self._run.external[:] = self.master.tabulate(driving, outline.times)
         for column, items in self.master.carried(driving, outline.times).items():
             outline.objects[column][:] = items
-        self._later = {}
+        self._signals = dict(signals)
+        self._later = {name: value for name, value in (later or {}).items() if value}
 
     def _advance_within(self, limit: float) -> None:
         if math.isinf(limit):

@@ -18,6 +18,7 @@ from cosim import Master, Recording, System, Table, read_recording
 from cosim.cli import app as cli
 from cosim.errors import StepError
 from cosim.master.session import Session
+from tests import tiny_fmus
 from tests.cosim_fmus import slave
 from tests.fmus import fmu
 from tests.tiny_fmus import V, tiny
@@ -396,3 +397,29 @@ def test_a_column_of_texts_drives_no_number(tmp_path: Path, command: Command) ->
     assert "input a.u from log.csv:word: u = 'left' is not a number" in " ".join(
         done.stderr.split()
     )
+
+
+@pytest.mark.parametrize("executor", ["python", "auto"])
+def test_the_error_of_a_fatal_step_is_told_and_no_state_is_released(
+    executor: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = "EXPORT int STATE(Free)(Model *m, Values **state) {\n"
+    assert free in tiny_fmus.SHELL
+    refusing = tiny_fmus.SHELL.replace(free, f"{free}  if (m->v.length[0] == 7) return 3;\n")
+    monkeypatch.setattr(tiny_fmus, "SHELL", refusing)
+    law = "if (t > 0.25) { v->length[0] = 7; return 4; } v->r[9][0] += h * (1 - v->r[1][0]);"
+    system = alone(tiny(tmp_path, CLOCK, "v->r[0][0] = v->r[9][0];", law), 2)
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    with pytest.raises(StepError, match="status 'fatal'"):
+        Master(system, "iterated", step=0.1, executor=executor).run(1.0)
+
+
+def test_repeated_recordings_count_their_own_steps(tmp_path: Path) -> None:
+    law = "v->r[9][0] += h * (1 - v->r[1][0]);"
+    system = alone(tiny(tmp_path, CLOCK, "v->r[0][0] = v->r[9][0];", law), 2)
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    with Session(Master(system, "iterated", step=0.1), 1.0, record=["a.y"]) as session:
+        counts = {session.record().provenance["fmu_steps"] for _ in range(3)}
+    assert len(counts) == 1 and counts.pop() > 20  # two FMUs of ten steps, some of them again

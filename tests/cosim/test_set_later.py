@@ -192,3 +192,24 @@ def test_a_vector_of_fmi_2_is_set_with_its_driven_elements(tmp_path: Path) -> No
         twin.set("m.q", [5.0, 7.0])
         twin.step(0.2)
         assert twin.get("m.y").tolist() == [5.0, 7.0]
+
+
+def test_shifts_and_signals_of_a_session_add_up(echo: System) -> None:
+    ramp = Table([0.0, 0.2], [0.0, 1.0], extend=True)
+    own = {"m.u[1]": ramp, "m.u[2]": 0.0}
+    with Session(Master(echo, step=0.1), 0.5, inputs=own, record=["m.u"]) as session:
+
+        def rows() -> list[list[float]]:
+            return session.run()[1].T[:2].tolist()
+
+        held, shifted, zero = [0.0, 0.0, 1.0, 1.0, 1.0, 1.0], [0.0] * 3 + [1.0] * 3, [0.0] * 6
+        assert rows() == [held, zero]
+        session.drive({"m.u[2]": Constant(2.0)})
+        session.shift({"m.u[1]": 0.1})
+        np.testing.assert_allclose(rows(), [shifted, [2.0] * 6], atol=1e-12)  # rounding of means
+        session.shift({})
+        assert rows() == [held, [2.0] * 6]
+        session.drive({}, {"m.u[1]": 0.1})
+        np.testing.assert_allclose(rows(), [shifted, zero], atol=1e-12)
+        session.shift({})
+        assert rows() == [held, zero]

@@ -128,6 +128,7 @@ class Iterated:
         """Forget what earlier steps were like."""
         self.newton.valid[0] = 0
         self.change[:] = 0.0
+        self.repetitions = 0
 
     def save(self) -> tuple[Vector, Vector, int, int]:
         """Jacobian and changes that are kept from step to step, and how many steps there were."""

@@ -86,6 +86,8 @@ class Programs:
 
     def _states(self, what: int) -> None:
         assert self.kernel is not None
+        if what == FORGET and any(instance.dead for instance in self._run.instances):
+            return  # the error of the step is the one to tell
         status = self.kernel.states(what)
         if status:
             instance = self._run.instances[int(self.kernel.run.failed_member)]
