@@ -2,8 +2,8 @@
 
 Only what every reader of SSP 1.0 understands is used: one flat system, connectors with types,
 parameter sets per component, unit conversions spelled out as linear transformations. What SSP has
-no place for (communication step, algorithm, inputs over time) goes into annotations, which other
-tools skip.
+no place for (communication step, algorithm, tolerance, inputs over time) goes into annotations,
+which other tools skip.
 """
 
 from __future__ import annotations
