@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ class Outline:
         objects: per column of `external` whose values travel as objects, one per communication
             point.
         endless: the run goes on beyond `times`, which are a window of it.
+        driven: inputs whose values in `external` are no longer those of `signals`.
     """
 
     system: System
@@ -56,6 +57,7 @@ class Outline:
     external: Vector
     objects: Mapping[int, list[Any]]
     endless: bool = False
+    driven: set[str] = field(default_factory=set)
 
     def tables_for(
         self, system: System, signals: Mapping[str, Signal], times: Vector
@@ -70,7 +72,12 @@ class Outline:
             times: its communication points [s].
         """
         known = self.signals
-        if self.objects or not np.array_equal(times, self.times) or list(known) != list(signals):
+        if (
+            self.objects
+            or self.driven
+            or not np.array_equal(times, self.times)
+            or list(known) != list(signals)
+        ):
             return None
         for name, signal in signals.items():
             one, other = self.system.declaration(name), system.declaration(name)

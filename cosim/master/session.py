@@ -256,9 +256,11 @@ class Session:
         driving = {**outline.signals, **signals}
         for name, value in (later or {}).items():
             driving[name] = Shifted(driving[name], value, outline.step)
+        outline.driven.update(signals, later or {})
         self._run.external[:] = self.master.tabulate(driving, outline.times)
         for column, items in self.master.carried(driving, outline.times).items():
             outline.objects[column][:] = items
+        outline.driven.intersection_update({*signals, *(later or {})})
         self._signals = dict(signals)
         self._later = {name: value for name, value in (later or {}).items() if value}
 

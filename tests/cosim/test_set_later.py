@@ -213,3 +213,25 @@ def test_shifts_and_signals_of_a_session_add_up(echo: System) -> None:
         np.testing.assert_allclose(rows(), [shifted, zero], atol=1e-12)
         session.shift({})
         assert rows() == [held, zero]
+
+
+def test_a_table_that_is_driven_otherwise_is_not_shared(tmp_path: Path) -> None:
+    fmu = tiny(tmp_path, [V("u", "Float64", "input", "0"), V("y", "Float64", "output")])
+
+    def session(**like: Any) -> Session:
+        system = System()
+        system.add("m", str(fmu))
+        master = Master(system, step=0.1)
+        return Session(master, 0.5, inputs={"m.u": signal}, record=["m.u"], **like)
+
+    signal = Table([0.0, 0.2], [0.0, 1.0], extend=True)
+    own = [0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
+    with session() as first:
+        first.drive({"m.u": Constant(9.0)})
+        with session(like=first.outline) as second:
+            assert second.run()[1][:, 0].tolist() == own
+        assert first.run()[1][:, 0].tolist() == [9.0] * 6
+        first.drive({})
+        with session(like=first.outline) as third:
+            assert third.outline.external is first.outline.external
+            assert third.run()[1][:, 0].tolist() == own
