@@ -97,8 +97,7 @@ class MappedLogs:
                         self.logs[one], self.purposes[one] = kept, run.purpose
         if chosen and not self.logs:
             raise ScenarioError(
-                f"{path}: no run is left: windows are longer than their logs, or the inputs are "
-                "not known where they begin"
+                f"{path}: no run is left: the inputs are not known where any of the windows begins"
             )
 
     def _count_gaps(self, name: str, log: Log) -> None:
