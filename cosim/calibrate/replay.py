@@ -11,6 +11,7 @@ from ..master.master import Master
 from ..view.scene import needs, scenes
 from .parts import COINCIDENT, DRIFT, MeasuredRun, Sampler, Vector
 from .problem import Problem
+from .simulator import late_inputs
 
 
 def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording, list[Reference]]:
@@ -29,6 +30,7 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
     """
     system = problem.model.system(problem.values(theta, run))
     errors = problem.log_errors(theta, run)
+    late = late_inputs(run, errors)
     looks = scenes(system)
     interval = problem.period or run.interval
     every = max(round(interval / problem.step), 1)
@@ -41,7 +43,7 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
     recording = master.run(
         count * every * problem.step,
         inputs={
-            name: Shifted(signal, -errors[name], problem.step) if errors.get(name) else signal
+            name: Shifted(signal, late[name], problem.step) if name in late else signal
             for name, signal in run.inputs.items()
         },
         record=list(dict.fromkeys([*(c.signal for c in problem.channels), *needs(looks)])),

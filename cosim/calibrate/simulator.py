@@ -135,7 +135,7 @@ class Simulator:
         problem = self.problem
         run = problem.run(run) if isinstance(run, str) else run
         errors = problem.log_errors(theta, run)
-        ran = self._ran(problem.values(theta, run), run, _later(run, errors))
+        ran = self._ran(problem.values(theta, run), run, late_inputs(run, errors))
         with self._lock:
             # not the last one: threads would decide which that is
             self.costs[run.name] = min(ran.cost, self.costs.get(run.name, ran.cost))
@@ -150,7 +150,7 @@ class Simulator:
             StepError, ValueRangeError: as of `simulate`.
         """
         problem, errors = self.problem, self.problem.log_errors(theta, run)
-        session, later = self.session(run), _later(run, errors)
+        session, later = self.session(run), late_inputs(run, errors)
         found = []
         try:
             for given in inputs:
@@ -250,6 +250,6 @@ class Simulator:
         self._pool.close(self.problem.kind)
 
 
-def _later(run: MeasuredRun, errors: Mapping[str, float]) -> dict[str, float]:
+def late_inputs(run: MeasuredRun, errors: Mapping[str, float]) -> dict[str, float]:
     """Inputs of a run whose column in the log is not in time -> by how much they come later [s]."""
     return {name: -errors[name] for name in run.inputs if errors.get(name)}
