@@ -141,6 +141,14 @@ def test_every_algorithm_passes_exact_integers_and_texts(algorithm: str, tmp_pat
     assert recording["d.y"].tolist() == ["down"] * 5
 
 
+def test_step_control_stops_where_an_input_changes_by_less_than_a_double_tells(tmp_path) -> None:
+    sent = Table([0.0, 1.5], [2**64 - 1, 2**64 - 2], extend=True)
+    system = pair(tmp_path, "UInt64", "UInt64")
+    found = short(system, algorithm="adaptive", duration=3.0, inputs={"a.u": sent})
+    expected = [2**64 - 1] * 15 + [2**64 - 2] * 16
+    assert found["a.y"].tolist() == expected
+
+
 def test_an_integer_that_a_double_does_not_carry_is_refused_with_both_ends(
     tmp_path: Path,
 ) -> None:

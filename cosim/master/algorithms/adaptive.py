@@ -8,11 +8,13 @@ which are kept:
 A second measure is the energy that the coupling invented in the step, the sum over a power bond of
 what both ends say they took, relative to what went over it. A step is accepted if neither is above
 its tolerance; the next one is 0.9 e^(-1/2) as long. The communication step is the raster of
-recorded values, which are interpolated by the parabola through begin, middle and end; a step never
-goes over a change of an external input. Needs FMUs that can return to a saved state.
+recorded values. Those inside a longer step are interpolated, and what that leaves is kept within
+the tolerance, too (`between_points`): where recorded values need it, steps go from one
+communication point to the next, but are never shorter for them. A step never goes over a change
+of an external input. Needs FMUs that can return to a saved state.
 
 Options:
-    tolerance: relative error of one step.
+    tolerance: relative error of one step, in connected and in recorded values.
     energy: relative energy that the coupling may invent in one step.
     longest: longest step [s]; 100 communication steps if not given.
 
@@ -34,6 +36,7 @@ from numpy.typing import NDArray
 from ...errors import FmuCallError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
+from ..between_points import BetweenPoints, Moment
 from ..extrapolation import smooth
 from ..interpreter import Interpreter
 from ..kernel.programs import Programs
@@ -45,6 +48,8 @@ SHORTEST = 1e-6
 """Shortest step, relative to the communication step."""
 FRESH, STEP = 0, 1
 """Programs: connected values brought up to date; a step of all instances."""
+ROUNDING = 1e-6
+"""Part of a step that is not left over for a step of its own."""
 SLACK = 1e-9
 """Part of a communication step by which two instants may differ and be the same."""
 
@@ -126,13 +131,13 @@ class StepControl:
         self.programs = Programs(run, run.plan.solving, run.plan.step)
         self.sources = np.unique(layout.copy_source[settings.smooth])
         self.nominal = np.array([self._nominal(layout.names[slot]) for slot in self.sources])
-        held = set(layout.copy_source[~settings.smooth].tolist()) | set(layout.external.tolist())
-        self.interpolated = np.array([slot not in held for slot in layout.record_source.tolist()])
+        self.between = BetweenPoints(run.system, layout, settings.tolerance)
         self.restart()
 
     def restart(self) -> None:
         """Begin anew."""
         self.time, self.size = float(self.run.times[0]), min(self.raster, self.limit)
+        self.between.forget()
         self.taken = self.rejected = 0
         self.shortest, self.longest = np.inf, 0.0
         layout = self.run.layout
@@ -150,11 +155,12 @@ class StepControl:
     def save(self) -> dict[str, Any]:
         """Where it stands, and its step size."""
         kept = ("time", "size", "taken", "rejected", "shortest", "longest", "power")
-        return {name: getattr(self, name) for name in kept}
+        return {name: getattr(self, name) for name in kept} | {"past": self.between.memory}
 
     def restore(self, memory: dict[str, Any]) -> None:
         """Return to them."""
-        vars(self).update(memory)
+        self.between.memory = memory["past"]
+        vars(self).update({name: item for name, item in memory.items() if name != "past"})
 
     def advance(self, last: int) -> None:
         """Go on up to a communication point."""
@@ -162,20 +168,28 @@ class StepControl:
         if run.index == 0 and run.row == 0:
             self.arrive(0)
         while run.index < last:
+            size = min(self.size, self.limit)
             change = self._next_change()
             rest = float(run.times[change]) - self.time
-            size = min(self.size, self.limit)
-            whole = size >= rest * (1.0 - 1e-6)
-            if not whole and size > 0.5 * rest:
+            if 0.5 * rest < size < rest * (1.0 - ROUNDING):
                 size = 0.5 * rest  # two steps of like length instead of a long and a short one
-            self._step(rest if whole else size, change if whole else None)
+            # what goes beyond a communication point ends at one: the last within reach
+            within = int((self.time + size - float(run.times[0])) / self.raster + ROUNDING)
+            point = min(max(within, run.index + 1), change)
+            rest = float(run.times[point]) - self.time
+            whole = size >= rest * (1.0 - ROUNDING)
+            self._step(rest if whole else size, point if whole else None)
 
     def _next_change(self) -> int:
         """The first communication point ahead at which external inputs change, or the last."""
         run = self.run
         end = run.times.size - 1
         later = run.external[run.index + 1 : end] != run.external[run.index]
-        found = np.flatnonzero(later.any(axis=1))
+        changed = later.any(axis=1)
+        for items in run.outline.objects.values():
+            ahead = np.array(items[run.index + 1 : end], dtype=object)
+            changed |= ahead != items[run.index]
+        found = np.flatnonzero(changed)
         return run.index + 1 + int(found[0]) if found.size else end
 
     def go(self, time: float, size: float) -> tuple[Vector, Vector]:
@@ -194,37 +208,53 @@ class StepControl:
     def _step(self, size: float, target: int | None) -> None:
         """Try a step; `target` is the communication point at its end, if there is one."""
         run = self.run
-        begin = run.values.copy()
+        begin = self._now()
         time, half = self.time, 0.5 * size
         with self.programs.saved() as before:
             self.go(time, size)
-            whole = run.values[self.sources].copy()
+            whole = run.values.copy()
             self.programs.restore(before)
             first, passed = self.go(time, half)
-            middle = run.values.copy()
+            middle = self._now()
             second, also = self.go(time + half, half)
-            error = self._error(begin, whole, first + second, passed + also, size)
-            if not error <= 1.0:
+            error = self._error(begin.values, whole, first + second, passed + also, size)
+            beside = self.between.error(begin, middle, self._now(), whole, time, size)
+            refined = size <= self.raster * (1.0 + SLACK)
+            if not (error <= 1.0 and (beside <= 1.0 or refined)):
                 self.rejected += 1
                 if size <= SHORTEST * self.raster:
                     raise FmuCallError(
                         f"{run.system.name}: at t = {time:.9g} s even a step of "
                         f"{size:.3g} s misses the tolerance {self.settings.tolerance:g} of the "
-                        f"step control ({self._worst(begin, whole)})"
+                        f"step control ({self._worst(begin.values, whole)})"
                     )
                 self.programs.restore(before)
-                self.size = size * (max(0.2, 0.9 * error**-0.5) if np.isfinite(error) else 0.2)
+                self.size = self._next(size, error, beside)
                 return
         self.taken += 1
         self.shortest, self.longest = min(self.shortest, size), max(self.longest, size)
         run.bond_energy += first + second
         run.bond_turnover += passed + also
         self.power = np.maximum(self.power, (passed + also) / size)
-        self.size = size * min(3.0, 0.9 * max(error, 1e-6) ** -0.5)
+        self.size = self._next(size, error, beside)
         self.time = time + size if target is None else float(run.times[target])
         self._between(begin, middle, time, size, target)
+        self.between.keep(time + half, middle)
         if target is not None:
             self.arrive(target)
+
+    def _now(self) -> Moment:
+        return Moment(self.run.values.copy(), self.run.objects.copy())
+
+    def _next(self, size: float, error: float, beside: float) -> float:
+        """The next step's size: what coupling asks for, and for recorded values the raster."""
+
+        def asked(error: float) -> float:
+            if not np.isfinite(error):
+                return 0.2 * size
+            return size * float(np.clip(0.9 * max(error, 1e-6) ** -0.5, 0.2, 3.0))
+
+        return min(asked(error), max(asked(beside), self.raster))
 
     def _error(
         self, begin: Vector, whole: Vector, energy: Vector, passed: Vector, size: float
@@ -232,7 +262,7 @@ class StepControl:
         """Error of a step, 1 at the tolerance."""
         settings, now = self.settings, self.run.values[self.sources]
         scale = np.maximum(np.maximum(np.abs(begin[self.sources]), np.abs(now)), self.nominal)
-        local = np.abs(now - whole) / (settings.tolerance * scale)
+        local = np.abs(now - whole[self.sources]) / (settings.tolerance * scale)
         reference = np.maximum(passed, self.power * size)
         invented = np.abs(energy) / np.maximum(settings.energy * reference, 1e-300)
         everything = np.concatenate([local, np.where(reference > 0.0, invented, 0.0), [0.0]])
@@ -240,47 +270,42 @@ class StepControl:
 
     def _worst(self, begin: Vector, whole: Vector) -> str:
         now = self.run.values[self.sources]
-        difference = np.abs(now - whole) / np.maximum(np.abs(begin[self.sources]), self.nominal)
+        difference = np.abs(now - whole[self.sources]) / np.maximum(
+            np.abs(begin[self.sources]), self.nominal
+        )
         if not difference.size:
             return "energy of a power bond"
         worst = int(np.argmax(np.where(np.isfinite(difference), difference, np.inf)))
         return f"worst: {self.run.layout.names[int(self.sources[worst])]}"
 
     def _between(
-        self, begin: Vector, middle: Vector, time: float, size: float, target: int | None
+        self, begin: Moment, middle: Moment, time: float, size: float, target: int | None
     ) -> None:
         """Recorded values at the communication points inside a step."""
         run = self.run
-        end = run.values
+        end = self._now()
         last = run.times.size if target is None else target
         slack = SLACK * self.raster
         while run.index + 1 < last and run.times[run.index + 1] <= self.time + slack:
             run.index += 1
             x = (float(run.times[run.index]) - time) / size
-            curve = (
-                begin * ((2.0 * x - 1.0) * (x - 1.0))
-                + middle * (4.0 * x * (1.0 - x))
-                + end * (x * (2.0 * x - 1.0))
-            )
-            held = begin if x < 0.5 else middle if x < 1.0 - 1e-9 else end
-            self._keep(curve, held)
+            self._keep(self.between.values(begin, middle, end, x))
 
     def arrive(self, index: int) -> None:
         """Stand at a communication point: external inputs change, values are recorded."""
         run = self.run
         run.index = index
+        if index and (run.external[index] != run.external[index - 1]).any():
+            self.between.forget()
         run.do(Op.EXTERNAL, 0, 0)
         self.programs.do(FRESH, float(run.times[index]))
         if index < run.times.size - 1:  # the last one is recorded by the operations of the end
-            self._keep(run.values, run.values)
+            self._keep(run.values[run.layout.record_source])
 
-    def _keep(self, smooth: Vector, held: Vector) -> None:
+    def _keep(self, values: Vector) -> None:
         run, layout = self.run, self.run.layout
-        if run.index % run.every:
-            return
-        source = layout.record_source
-        found = np.where(self.interpolated, smooth[source], held[source])
-        run.keep(found * layout.record_gain + layout.record_offset)
+        if run.index % run.every == 0:
+            run.keep(values * layout.record_gain + layout.record_offset)
 
     def steps(self) -> int:
         """Steps of the whole system that were made: each is gone at once and in two halves."""
