@@ -146,7 +146,7 @@ def test_the_command_prints_poles_and_loops(provider, tmp_path: Path, monkeypatc
                  "--out", str(tmp_path)]  # fmt: skip
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
-    content = json.loads(result.output)
+    content = json.loads(result.stdout)
     heave = min(content["poles"], key=lambda pole: abs(pole["frequency_Hz"] - 11.3))
     # six contact springs of 1e5 N/m and dampers of 1500 N s/m under 118.6 kg: 11.3 Hz, 0.53
     assert heave["frequency_Hz"] == pytest.approx(11.3, abs=0.05)
@@ -161,7 +161,7 @@ def linear(provider, monkeypatch, *arguments: str) -> dict:
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     assert result.exit_code == 0, result.output
-    return json.loads(result.output)
+    return json.loads(result.stdout)
 
 
 def test_the_command_takes_variants_parameters_and_algorithms(provider, monkeypatch) -> None:
