@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import AlgebraicLoopError
 from .interpreter import Interpreter
+from .newton import floor
 from .plan import Op, decoded
 
 Vector = NDArray[np.float64]
@@ -58,14 +59,14 @@ def _exchange(
     run: Interpreter, sweep: list[tuple[Op, int, int]], sweeps: int, tolerance: float
 ) -> tuple[bool, Vector]:
     """Exchange connected values until nothing changes: whether they settled, last change."""
-    before = np.full_like(run.values, np.nan)
+    before, floors = np.full_like(run.values, np.nan), floor(run.system, run.layout.names)
     change, size = before, np.ones_like(before)
     for _ in range(sweeps):
         for op, a, b in sweep:
             run.do(op, a, b)
         if np.array_equal(before, run.values):
             return True, change
-        change, size = np.abs(run.values - before), np.maximum(np.abs(run.values), 1.0)
+        change, size = np.abs(run.values - before), np.maximum(np.abs(run.values), floors)
         before = run.values.copy()
         if tolerance > SETTLED and bool(np.all(change <= tolerance * size)):
             return True, change

@@ -21,7 +21,7 @@ from ..fmu.instance import Instance
 from ..fmu.intermediate import Moved
 from .extrapolation import continuous, derivatives_at_begin, mean_of_part, mean_of_step
 from .input_derivatives import InputDerivatives, asked_for
-from .newton import Newton
+from .newton import Newton, floor
 from .objects import ObjectPassing
 from .outline import Outline
 from .plan import PARTS, Loop, Mean, Op, decoded
@@ -115,7 +115,8 @@ class Interpreter:
         self.bond_energy = np.zeros(len(self.layout.bonds))
         self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
-        self.newtons = [Newton(loop.sources.size) for loop in self.plan.loops]
+        floors = floor(self.system, self.layout.names)
+        self.newtons = [Newton(floors[loop.sources]) for loop in self.plan.loops]
         self.history = np.zeros((4, len(self.plan.means)))
         self.past = np.zeros(1, dtype=np.int64)
         self.derivatives = InputDerivatives(self.plan, self.instances, self.values)

@@ -9,33 +9,44 @@ Source: Kelley, Solving nonlinear equations with Newton's method, 2003 (chord me
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..system.system import System
 
 Vector = NDArray[np.float64]
 ITERATIONS = 60
 """Newton iterations before a loop is said not to settle."""
 SETTLED = 1e-10
-"""Newton step, relative to max(1, |z|), at which a loop counts as solved."""
+"""Newton step, relative to max(floor, |z|), at which a loop counts as solved."""
 CONTRACTION = 0.25
 """The Jacobian is renewed when a Newton step is longer than this times the one before."""
 INCREMENT = 1e-6
-"""Of differences, relative to max(1, |z|)."""
+"""Of differences, relative to max(floor, |z|)."""
+
+
+def floor(system: System, names: Iterable[str]) -> Vector:
+    """Sizes of variables below which errors are not relative: 1, or a smaller nominal value."""
+    return np.array([min(1.0, abs(system.declaration(name).nominal or 1.0)) for name in names])
 
 
 class Newton:
     """Solves z = G(z), keeping the inverse of I - dG/dz.
+
+    Args:
+        floor: size of each unknown below which errors are not relative: see `floor`.
+        tolerance: relative error.
 
     Attributes:
         inverse: n x n.
         valid: one number, whether `inverse` is good for anything.
     """
 
-    def __init__(self, n: int, tolerance: float = SETTLED) -> None:
-        self.n, self.tolerance = n, tolerance
-        self.inverse = np.zeros((n, n))
+    def __init__(self, floor: Vector, tolerance: float = SETTLED) -> None:
+        self.n, self.floor, self.tolerance = floor.size, floor, tolerance
+        self.inverse = np.zeros((self.n, self.n))
         self.valid = np.zeros(1, dtype=np.int64)
 
     def keep(self, jacobian: Vector) -> bool:
@@ -83,7 +94,7 @@ class Newton:
             # each sum is made in the order of its row and begins with 0, as in compiled code
             sums = np.add.accumulate(self.inverse * np.array(rest), axis=1)
             total = sums[:, -1] + 0.0 if self.n else np.zeros(0)
-            relatives = np.abs(total) / np.fmax(1.0, np.abs(z))
+            relatives = np.abs(total) / np.fmax(self.floor, np.abs(z))
         size = 0.0
         for relative in relatives.tolist():
             if not relative <= size:  # so that nan counts as large
@@ -98,7 +109,7 @@ class Newton:
         matrix = [[0.0] * n for _ in range(n)]
         for j in range(n):
             moved = list(z)
-            increment = INCREMENT * max(1.0, abs(z[j]))
+            increment = INCREMENT * max(float(self.floor[j]), abs(z[j]))
             moved[j] += increment
             there = function(moved)
             for i in range(n):

@@ -178,3 +178,25 @@ def test_a_loop_that_is_lost_on_the_way_ends_the_run(affine: Path) -> None:
         Master(system, step=0.1).run(0.8)
     assert caught.value.recording is not None
     assert caught.value.recording.time[-1] == pytest.approx(0.3)  # the last point before
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.parametrize("algorithm", ["jacobi", "iterated"])
+def test_small_signals_that_say_their_nominal_value_are_solved_as_well(
+    tmp_path: Path, algorithm: str, executor: str
+) -> None:
+    # a.y = 1e-9 t - 3 b.y, b.y = a.y: relative to 1, any value of these is a solution
+    small = 'nominal="1e-9"'
+    law = "v->r[1][0] = {} v->r[0][0]"
+    feeding = V("u", "Float64", "input", "0", inner=small), V("y", "Float64", "output", inner=small)
+    line = V("x", "Float64", "input", "0", inner=small)
+    system = System()
+    system.add("a", str(tiny(tmp_path, [*feeding, line], law.format("v->r[2][0] - 3.0 *") + ";")))
+    system.add("b", str(tiny(tmp_path, feeding, law.format("1.0 *") + ";", name="n")))
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    master = Master(system, algorithm, 0.1, executor=executor)
+    found = master.run(1.0, inputs={"a.x": lambda t: 1e-9 * (1.0 + np.sin(5.0 * t))})
+    exact = 0.25e-9 * (1.0 + np.sin(5.0 * found.time))
+    # loops are solved to 1e-10 of the nominal value
+    np.testing.assert_allclose(found["a.y"], exact, rtol=1e-9, atol=1e-18)

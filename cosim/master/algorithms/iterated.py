@@ -36,7 +36,7 @@ from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import means, set_derivatives, smooth
 from ..interpreter import Interpreter
 from ..kernel.programs import Programs
-from ..newton import Newton
+from ..newton import Newton, floor
 from ..options import positive, refuse_without_states
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..rollback import Checkpoint
@@ -100,7 +100,8 @@ class Iterated:
     def __init__(self, run: Interpreter, tolerance: float, smooth: NDArray[np.bool_]) -> None:
         self.run, self.tolerance = run, tolerance
         self.sources = np.unique(run.layout.copy_source[smooth])
-        self.newton = Newton(self.sources.size, tolerance)
+        names = [run.layout.names[slot] for slot in self.sources]
+        self.newton = Newton(floor(run.system, names), tolerance)
         everyone = range(len(run.instances))
         ends = operations([(op, index) for op in (Op.SET, Op.GET) for index in everyone])
         self.programs = Programs(run, run.plan.solving, run.plan.step, ends)
@@ -180,10 +181,8 @@ class Iterated:
         last = np.inf
         for _ in range(FIXED_POINT):
             found = self.attempt(before, begin, end)
-            size = max(
-                (abs(a - b) / max(1.0, abs(b)) for a, b in zip(found, end, strict=True)),
-                default=0.0,
-            )
+            ends = zip(found, end, self.newton.floor.tolist(), strict=True)
+            size = max((abs(a - b) / max(least, abs(b)) for a, b, least in ends), default=0.0)
             end[:] = found
             if size <= self.tolerance:
                 return True

@@ -237,6 +237,7 @@ class Kernel:
                     self._array(loop.sources),
                     self._array(newton.inverse),
                     self._array(newton.valid),
+                    self._array(newton.floor),
                     self._array(np.zeros(5 * newton.n + 2 * newton.n**2)),
                     newton.n,
                     first,

@@ -49,7 +49,7 @@ static int difference(Run *run, const Loop *loop, const double *z, const double 
                       double *rows) {
   const int64_t n = loop->n;
   for (int64_t j = 0; j < n; j++) {
-    const double increment = INCREMENT * larger(1.0, fabs(z[j]));
+    const double increment = INCREMENT * larger(loop->floor[j], fabs(z[j]));
     for (int64_t i = 0; i < n; i++) moved[i] = z[i];
     moved[j] += increment;
     const int status = sweep(run, loop, moved, there);
@@ -73,7 +73,7 @@ static double newton_step(const Loop *loop, const double *z, const double *value
     double total = 0.0;
     for (int64_t j = 0; j < loop->n; j++) total += loop->inverse[loop->n * i + j] * (value[j] - z[j]);
     change[i] = total;
-    const double relative = fabs(total) / larger(1.0, fabs(z[i]));
+    const double relative = fabs(total) / larger(loop->floor[i], fabs(z[i]));
     if (!(relative <= size)) size = relative;
   }
   return size;

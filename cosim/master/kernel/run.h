@@ -84,6 +84,7 @@ typedef struct {
   const int64_t *sources;    /* slots of z */
   double *inverse;           /* of I - dG/dz */
   int64_t *valid;            /* whether it is good for anything */
+  const double *floor;       /* size of each unknown below which errors are not relative */
   double *work;              /* 5 n + 2 n n numbers */
   int64_t n, first, last;    /* instructions of a sweep */
 } Loop;

@@ -55,8 +55,8 @@ class Loop(ct.Structure):
     """As in `run.h`."""
 
     _fields_ = (
-        ("sources", P), ("inverse", P), ("valid", P), ("work", P), ("n", I64),
-        ("first", I64), ("last", I64),
+        ("sources", P), ("inverse", P), ("valid", P), ("floor", P), ("work", P),
+        ("n", I64), ("first", I64), ("last", I64),
     )  # fmt: skip
 
 
