@@ -7,8 +7,8 @@ step before, at x = p < 0, makes it a cubic, which differs from the parabola by 
 
 since |x (x - 1/2) (x - 1)| is 1/(12 sqrt(3)) at most. Without a step before (at the begin, after a
 jump of an input) the straight line through both ends is compared with the middle, which asks for
-more. Values that jump, truths, whole numbers and texts may not change in a step that has
-communication points inside.
+more. Values that jump, truths, whole numbers and texts may not change in a step that is longer than
+the communication step: those that are recorded would come late, those that are connected act late.
 """
 
 from __future__ import annotations
@@ -39,10 +39,13 @@ class BetweenPoints:
 
     Args:
         system, layout: what is run.
+        held: slots of connected outputs that jump.
         tolerance: relative error.
     """
 
-    def __init__(self, system: System, layout: Layout, tolerance: float) -> None:
+    def __init__(
+        self, system: System, layout: Layout, held: NDArray[np.int64], tolerance: float
+    ) -> None:
         self._source, self._tolerance = layout.record_source, tolerance
         slots = layout.record_source.tolist()
         declared = [system.declaration(layout.names[slot]) for slot in slots]
@@ -53,6 +56,7 @@ class BetweenPoints:
         ]
         self._smooth = np.array(smooth, dtype=np.bool_)
         self._curves = layout.record_source[self._smooth]
+        self._jumps = np.union1d(layout.record_source[~self._smooth], held)
         self._nominal = np.array(
             [abs(v.nominal or 1.0) for v, known in zip(declared, smooth, strict=True) if known]
         )
@@ -86,7 +90,7 @@ class BetweenPoints:
             time: of its begin [s].
             size: of the step [s].
         """
-        jumps = self._source[~self._smooth]
+        jumps = self._jumps
         for other in (middle, end):
             if (begin.values[jumps] != other.values[jumps]).any():
                 return np.inf

@@ -11,7 +11,10 @@ its tolerance; the next one is 0.9 e^(-1/2) as long. The communication step is t
 recorded values. Those inside a longer step are interpolated, and what that leaves is kept within
 the tolerance, too (`between_points`): where recorded values need it, steps go from one
 communication point to the next, but are never shorter for them. A step never goes over a change
-of an external input. Needs FMUs that can return to a saved state.
+of an external input. An FMU that fails in a step, discards it or asks to end the run may do so
+because the step is too long for what it is connected to: the step is taken back and made
+shorter, and the failure counts where even the shortest one has it. Needs FMUs that can return
+to a saved state.
 
 Options:
     tolerance: relative error of one step, in connected and in recorded values.
@@ -25,6 +28,7 @@ co-simulations, 2017.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -33,7 +37,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FmuCallError
+from ...errors import AlgebraicLoopError, FmuCallError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
 from ..between_points import BetweenPoints, Moment
@@ -42,6 +46,7 @@ from ..interpreter import Interpreter
 from ..kernel.programs import Programs
 from ..options import positive, refuse_without_states
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
+from ..rollback import Checkpoint
 
 Vector = NDArray[np.float64]
 SHORTEST = 1e-6
@@ -50,6 +55,8 @@ FRESH, STEP = 0, 1
 """Programs: connected values brought up to date; a step of all instances."""
 ROUNDING = 1e-6
 """Part of a step that is not left over for a step of its own."""
+RESOLVED = 8
+"""Units in the last place of the time that a step has at least: its middle is rounded to one."""
 SLACK = 1e-9
 """Part of a communication step by which two instants may differ and be the same."""
 
@@ -131,7 +138,8 @@ class StepControl:
         self.programs = Programs(run, run.plan.solving, run.plan.step)
         self.sources = np.unique(layout.copy_source[settings.smooth])
         self.nominal = np.array([self._nominal(layout.names[slot]) for slot in self.sources])
-        self.between = BetweenPoints(run.system, layout, settings.tolerance)
+        held = np.unique(layout.copy_source[~settings.smooth])
+        self.between = BetweenPoints(run.system, layout, held, settings.tolerance)
         self.restart()
 
     def restart(self) -> None:
@@ -171,14 +179,22 @@ class StepControl:
             size = min(self.size, self.limit)
             change = self._next_change()
             rest = float(run.times[change]) - self.time
-            if 0.5 * rest < size < rest * (1.0 - ROUNDING):
+            if 0.5 * rest < size < self._less(rest):
                 size = 0.5 * rest  # two steps of like length instead of a long and a short one
             # what goes beyond a communication point ends at one: the last within reach
             within = int((self.time + size - float(run.times[0])) / self.raster + ROUNDING)
             point = min(max(within, run.index + 1), change)
             rest = float(run.times[point]) - self.time
-            whole = size >= rest * (1.0 - ROUNDING)
+            whole = size >= self._less(rest)
             self._step(rest if whole else size, point if whole else None)
+
+    def _less(self, rest: float) -> float:
+        """What counts as all of the rest [s]: times round, those since 1970 to 0.2 us."""
+        return rest * (1.0 - ROUNDING) - RESOLVED * math.ulp(self.time)
+
+    def _least(self) -> float:
+        """The shortest step [s]."""
+        return max(SHORTEST * self.raster, RESOLVED * math.ulp(self.time))
 
     def _next_change(self) -> int:
         """The first communication point ahead at which external inputs change, or the last."""
@@ -211,25 +227,30 @@ class StepControl:
         begin = self._now()
         time, half = self.time, 0.5 * size
         with self.programs.saved() as before:
-            self.go(time, size)
-            whole = run.values.copy()
-            self.programs.restore(before)
-            first, passed = self.go(time, half)
-            middle = self._now()
-            second, also = self.go(time + half, half)
+            try:
+                self.go(time, size)
+                whole = run.values.copy()
+                self.programs.restore(before)
+                first, passed = self.go(time, half)
+                middle = self._now()
+                second, also = self.go(time + half, half)
+            except (FmuCallError, AlgebraicLoopError):
+                dead = any(instance.dead for instance in run.instances)
+                if dead or size <= self._least():
+                    raise
+                self._reject(before, 0.2 * size)
+                return
             error = self._error(begin.values, whole, first + second, passed + also, size)
             beside = self.between.error(begin, middle, self._now(), whole, time, size)
-            refined = size <= self.raster * (1.0 + SLACK)
+            refined = target is None or target == run.index + 1  # no communication point inside
             if not (error <= 1.0 and (beside <= 1.0 or refined)):
-                self.rejected += 1
-                if size <= SHORTEST * self.raster:
+                if size <= self._least():
                     raise FmuCallError(
                         f"{run.system.name}: at t = {time:.9g} s even a step of "
                         f"{size:.3g} s misses the tolerance {self.settings.tolerance:g} of the "
                         f"step control ({self._worst(begin.values, whole)})"
                     )
-                self.programs.restore(before)
-                self.size = self._next(size, error, beside)
+                self._reject(before, self._next(size, error, beside))
                 return
         self.taken += 1
         self.shortest, self.longest = min(self.shortest, size), max(self.longest, size)
@@ -242,6 +263,12 @@ class StepControl:
         self.between.keep(time + half, middle)
         if target is not None:
             self.arrive(target)
+
+    def _reject(self, before: Checkpoint, size: float) -> None:
+        """Take a step back; the next one is as long as `size` [s]."""
+        self.rejected += 1
+        self.programs.restore(before)
+        self.size = size
 
     def _now(self) -> Moment:
         return Moment(self.run.values.copy(), self.run.objects.copy())
