@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .facts import Force, Law, Left
-from .whiteness import structured
 
 
 @dataclass(frozen=True)
@@ -226,7 +225,7 @@ def over(left: Sequence[Left]) -> str:
 
 def _above(left: Left) -> str:
     """By how much a channel is above its noise."""
-    if structured(left.lasting, left.p_value):
+    if left.structured:
         return f"{left.rms:.3g} times its noise"
     return f"slow parts of {left.slow:.3g} times its noise's"
 

@@ -11,6 +11,8 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints
 
+from .whiteness import structured
+
 
 @dataclass(frozen=True)
 class Value:
@@ -143,6 +145,7 @@ class Left:
         lasting: the same without the few worst windows (`whiteness.BURST`).
         p_value: that noise alone has such slow parts.
         slow: these parts over what noise has, likewise (`whiteness.WhitenessTest`).
+        p_fast: that noise alone has neighbours so alike.
     """
 
     channel: str
@@ -151,6 +154,12 @@ class Left:
     lasting: float
     p_value: float
     slow: float = 1.0
+    p_fast: float = 1.0
+
+    @property
+    def structured(self) -> bool:
+        """More than noise: see `whiteness.structured`."""
+        return structured(self.lasting, self.p_value, self.p_fast)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
 from .verdict import above, doubts, threshold
-from .whiteness import structured, whiteness_tests
+from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
 NEAR, MOST = 0.9, 12
@@ -120,8 +120,8 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
         parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
     for purpose, stack, residual in parts:
         found += [
-            Left(test.channel, purpose, test.rms, test.lasting, test.p_value, test.slow)
-            for test in whiteness_tests(residual, stack)
+            Left(t.channel, purpose, t.rms, t.lasting, t.p_value, t.slow, t.p_fast)
+            for t in whiteness_tests(residual, stack)
         ]
     return tuple(found)
 
@@ -137,7 +137,7 @@ def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model
     late = [x for x in above(model) if x.purpose == judge.purpose]
     if not judge.unused or not model.laws or not late or doubts(table, model):
         return model
-    if any(structured(x.lasting, x.p_value) for x in late):
+    if any(x.structured for x in late):
         return model
     known = judge.foretold.get(model.labels)
     if known is None or known[0] is not fitted.estimate.theta:

@@ -24,7 +24,7 @@ from .answer import Hint, Verdict, over, percent
 from .facts import Force, Gain, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
-from .whiteness import CALIBRATED, slowly, structured
+from .whiteness import CALIBRATED, slowly
 
 FITTED = "identification"
 TENTH = 0.1
@@ -171,7 +171,7 @@ def above(model: Model) -> tuple[Left, ...]:
     tests, named = len(model.left), bool(model.laws)
     found = [
         x for x in model.left
-        if structured(x.lasting, x.p_value) or (named and slowly(x.slow, x.p_value, tests))
+        if x.structured or (named and slowly(x.slow, x.p_value, tests))
     ]  # fmt: skip
     return tuple(sorted(found, key=lambda x: -x.rms))
 

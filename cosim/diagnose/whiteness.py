@@ -1,4 +1,17 @@
-"""Does a residual hold more than white noise? Size, slow parts, correlation, by channel."""
+"""Does a residual hold more than white noise? Size, slow parts, correlation, by channel.
+
+Runs are cut into windows of like length, as near to `WINDOW` samples as goes. Slow parts are sums
+s_w over the n_w samples of a window, fast ones the products of samples up to `NEAR` apart in one:
+
+    sum of s_w^2 / n_w,   sum over k of c_k^2 / (N_k v^2),   c_k = sum of r_i r_(i+k)
+
+with N_k pairs and the mean square v of the residual itself: chi-square with as many degrees of
+freedom as there are windows and distances, of white noise of the stated size and of any size. The
+second sees a hum of whole periods per window, of which the first sees nothing.
+
+Source: Box and Pierce, Distribution of residual autocorrelations in autoregressive-integrated
+moving average time series models, 1970.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +25,8 @@ from ..calibrate.loss import WINDOW
 from .linear import MATERIAL, SampleStack
 
 Vector = NDArray[np.float64]
+NEAR = WINDOW // 2
+"""Samples up to which neighbours are compared: those in half of a window's pairs."""
 BURST = 0.01
 """Share of the windows, those with the largest residuals, that do not count where start values
 decide when something turns over (`Problem.late`): for some tenths of a second a model that is right
@@ -40,6 +55,7 @@ class WhitenessTest:
         correlation: of neighbouring samples.
         freedom: effective number of independent residuals.
         p_value: that noise alone has such slow parts, the worst windows left out.
+        p_fast: that white noise of any size has neighbours so alike, likewise.
     """
 
     channel: str
@@ -49,11 +65,12 @@ class WhitenessTest:
     correlation: float
     freedom: float
     p_value: float
+    p_fast: float
 
     @property
     def structured(self) -> bool:
         """More than noise, and enough to look for a cause."""
-        return structured(self.lasting, self.p_value)
+        return structured(self.lasting, self.p_value, self.p_fast)
 
     def to_dict(self) -> dict[str, float | bool | str]:
         """As in the JSON."""
@@ -61,18 +78,18 @@ class WhitenessTest:
             "channel": self.channel, "rms_over_noise": self.rms,
             "lasting_over_noise": self.lasting, "slow_over_noise": self.slow,
             "correlation": self.correlation, "effective_samples": self.freedom,
-            "p_value": self.p_value, "structured": self.structured,
+            "p_value": self.p_value, "p_fast": self.p_fast, "structured": self.structured,
         }  # fmt: skip
 
 
-def structured(lasting: float, p_value: float) -> bool:
+def structured(lasting: float, *p_values: float) -> bool:
     """Whether a channel holds more than noise, and enough to look for a cause.
 
     Args:
         lasting: RMS over noise without the worst windows.
-        p_value: that noise alone has such slow parts.
+        p_values: that noise alone has such slow parts, or such fast ones.
     """
-    return p_value < 0.01 and lasting > CALIBRATED
+    return min(p_values) < 0.01 and lasting > CALIBRATED
 
 
 def slowly(slow: float, p_value: float, tests: int) -> bool:
@@ -92,31 +109,50 @@ def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]
     share = BURST if stack.problem.late else 0.0
     found = []
     for column, channel in enumerate(stack.problem.channels):
-        squares, products, pairs, count = 0.0, 0.0, 0, 0
-        windows = np.empty((0, WINDOW))
-        for values in rows:
-            one = values[:, column]
-            one = one[np.isfinite(one)]
-            squares += float(one @ one)
-            count += one.size
-            products += float(one[1:] @ one[:-1])
-            pairs += max(one.size - 1, 0)
-            whole = one.size // WINDOW * WINDOW
-            windows = np.concatenate([windows, one[:whole].reshape(-1, WINDOW)])
+        parts = [one[np.isfinite(one)] for one in (values[:, column] for values in rows)]
+        counts = np.array([part.size for part in parts])
+        one, count = np.concatenate(parts), int(counts.sum())
         if not count:
             continue
-        variance = squares / count
+        products = sum(float(part[1:] @ part[:-1]) for part in parts)
+        pairs = int(np.sum(np.maximum(counts - 1, 0)))
+        variance = float(one @ one) / count
         correlation = products / max(pairs, 1) / max(variance, 1e-300)
-        sums = np.square(windows.sum(axis=1)) / WINDOW
-        every = float(np.mean(sums)) if sums.size else variance
-        freedom = count * min(variance / max(every, 1e-300), 1.0)
-        sizes = np.mean(np.square(windows), axis=1)
-        kept = np.argsort(sizes)[: sizes.size - int(share * sizes.size)]
-        slow = float(np.mean(sums[kept])) if sums.size else variance
-        lasting = float(np.mean(sizes[kept])) if sizes.size else variance
-        p_value = float(chdtrc(kept.size, np.sum(sums[kept]))) if sums.size else 1.0
+        lengths = np.concatenate([_windows(size) for size in counts.tolist()])
+        begins = np.cumsum(lengths) - lengths
+        sums = np.square(np.add.reduceat(one, begins)) / lengths
+        squares = np.add.reduceat(np.square(one), begins)
+        freedom = count * min(variance / max(float(np.mean(sums)), 1e-300), 1.0)
+        kept = np.argsort(squares / lengths)[: lengths.size - int(share * lengths.size)]
+        lasting = float(np.sum(squares[kept]) / np.sum(lengths[kept]))
+        slow = float(np.mean(sums[kept]))
+        numbers = np.repeat(np.arange(lengths.size), lengths)
+        numbers[~np.isin(numbers, kept)] = -1
         found.append(
-            WhitenessTest(channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
-                      float(np.sqrt(slow)), float(correlation), freedom, p_value)
+            WhitenessTest(
+                channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
+                float(np.sqrt(slow)), float(correlation), freedom,
+                float(chdtrc(kept.size, np.sum(sums[kept]))), _fast(one, numbers, lasting),
+            )
         )  # fmt: skip
     return found
+
+
+def _windows(size: int) -> NDArray[np.int64]:
+    """Lengths of the windows of a run with so many samples, which differ by one at most."""
+    count = max(round(size / WINDOW), 1) if size else 0
+    return np.array([len(part) for part in np.array_split(np.empty(size), count or 1)][:count],
+                    dtype=np.int64)  # fmt: skip
+
+
+def _fast(one: Vector, numbers: NDArray[np.int64], variance: float) -> float:
+    """P value of the products of neighbours in a window; windows of number -1 do not count."""
+    total, distances = 0.0, 0
+    for k in range(1, NEAR + 1):
+        near = (numbers[k:] == numbers[:-k]) & (numbers[k:] >= 0)
+        if pairs := int(near.sum()):
+            total += float(np.sum(one[k:][near] * one[:-k][near])) ** 2 / pairs
+            distances += 1
+    if not distances or variance == 0.0:
+        return 1.0
+    return float(chdtrc(distances, total / variance**2))
