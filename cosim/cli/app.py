@@ -113,6 +113,10 @@ def run_command(
     ] = None,
     step: Annotated[float | None, typer.Option(help="Communication step [s].")] = None,
     duration: Annotated[float | None, typer.Option(help="Duration [s].")] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SIGNAL", help="Record this, too, e.g. motor.i; may be repeated."),
+    ] = None,
     record_period: Annotated[
         float | None, typer.Option(help="Time between recorded points [s].")
     ] = None,
@@ -153,6 +157,7 @@ def run_command(
             options=chosen,
             step=step,
             duration=duration,
+            record=record or (),
             record_period=record_period,
             provider=provider,
             out=folder,

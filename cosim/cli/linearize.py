@@ -95,7 +95,8 @@ def _master(
     """What is linearized, what drives it, and notes; changes as in `cosim run`."""
     from ..errors import InputError
     from ..master.master import Master
-    from ..running.runner import adjusted, prepare
+    from ..running.preparation import adjusted
+    from ..running.runner import prepare
     from ..scenario import scenario as scenarios
     from ..system.system import System
 

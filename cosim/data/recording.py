@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import need_text
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
 from ..spec.distribution import has, needed
@@ -80,13 +81,18 @@ class Recording:
 
         Raises:
             UnknownNameError: it was not recorded.
+            InputError: it is no text.
         """
+        need_text("a signal of a recording", name, 'take one by name, as in recording["load.w"]')
         if name in self.names:
             return [self.names.index(name)]
         element = re.compile(re.escape(name) + r"\[\d+(,\d+)*\]")
         found = [column for column, item in enumerate(self.names) if element.fullmatch(item)]
         if not found:
-            raise UnknownNameError(f"no signal {name!r} was recorded; {listing(self.names, name)}")
+            raise UnknownNameError(
+                f"no signal {name!r} was recorded; {listing(self.names, name)}; a run records more "
+                f'with record=["{name}"] (--record {name})'
+            )
         return found
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -97,6 +103,16 @@ class Recording:
             return objects[:, 0] if name in self.names else objects
         whole = self.values[:, columns]
         return whole[:, 0] if name in self.names else whole
+
+    def __contains__(self, name: object) -> bool:
+        """Whether a signal, or a vector, was recorded."""
+        if not isinstance(name, str):
+            return False
+        return name in self.names or any(item.startswith(f"{name}[") for item in self.names)
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the signals, as of a data frame; `len` counts times."""
+        return iter(self.names)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -229,20 +245,21 @@ class Recording:
 
     def plot(
         self,
-        signals: Sequence[str] | None = None,
+        signals: Sequence[str] | str | None = None,
         path: Path | str | None = None,
         references: Mapping[str, tuple[Vector, Vector, str]] | None = None,
     ) -> Figure:
         """Plot signals over time, those with the same unit in one axes, named by what it measures.
 
         Args:
-            signals: names (vectors too); all if not given, of the units with most signals.
+            signals: names, or one (vectors too); all if not given, of the units with most signals.
             path: where to write the figure; the suffix says how.
             references: signal -> (times, values, label), drawn with it.
         """
         from matplotlib.figure import Figure
 
-        wanted = list(signals) if signals is not None else list(self.names)
+        wanted = [signals] if isinstance(signals, str) else list(signals or ())
+        wanted = list(self.names) if signals is None else wanted
         names = [self.names[column] for name in wanted for column in self.find(name)]
         names = [name for name in names if self.objects.get(name, self.time).dtype != object]
         groups: dict[str, list[str]] = {}

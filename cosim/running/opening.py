@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,8 @@ from ..errors import ValueRangeError, listing
 from ..installation import builder
 from ..master.twin import Twin
 from ..system.provider import Provider
-from .runner import adjusted, find_runs, prepare
+from .preparation import adjusted
+from .runner import find_runs, prepare
 
 
 def open(
@@ -23,6 +24,7 @@ def open(
     options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
+    record: Sequence[str] = (),
     record_period: float | None = None,
     provider: Provider | None = None,
     folder: Path | None = None,
@@ -31,8 +33,8 @@ def open(
 
     Args:
         name: `mobile_manipulator/IY`, a folder, a scenario.toml, an .ssp archive or .ssd file.
-        variants, parameters, algorithm, options, step, record_period, provider, folder: as of
-            `cosim.run`.
+        variants, parameters, algorithm, options, step, record, record_period, provider, folder:
+            as of `cosim.run`.
         duration: how far it can go [s]; the scenario's if not given, `math.inf` for no end (its
             inputs are then held beyond their last values).
 
@@ -54,7 +56,7 @@ def open(
         )
     item = adjusted(
         next(iter(items.values())), algorithm=algorithm, options=options, step=step,
-        duration=duration, record_period=record_period,
+        duration=duration, record=record, record_period=record_period,
     )  # fmt: skip
     prepared = prepare(
         item, builder.default_provider() if provider is None else provider,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..arguments import need_texts
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import overlay
 from ..scenario.scenario import Scenario
@@ -84,7 +85,7 @@ def recorded_signals(
             return False
         return True
 
-    kept = list(filter(has, (*everything, *shown)))
+    kept = list(filter(has, (*everything, *scenario.also, *shown)))
     checked = filter(has, (name for check in scenario.checks for name in check.needs))
     return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
 
@@ -94,3 +95,42 @@ def shortened(scenario: Scenario, duration: float) -> Scenario:
     end = scenario.start + duration
     kept = tuple(check for check in scenario.checks if check.before <= end)
     return replace(scenario, duration=duration, checks=kept)
+
+
+def adjusted(
+    item: Scenario,
+    algorithm: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+    record: Sequence[str] = (),
+    record_period: float | None = None,
+) -> Scenario:
+    """A scenario with another algorithm, step, duration or record period where these are given.
+
+    Signals of `record` are recorded, too. Raises InputError where these are no names.
+
+    Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
+    does not reach.
+    """
+    need_texts("signals to record", record, 'record=["motor.i"]')
+    if duration is not None and duration < item.duration:
+        item = shortened(item, duration)
+    used = step if step is not None else item.step
+    if record_period is not None and record_period < used:
+        raise ValueRangeError(
+            f"{item.name}: the record period {record_period:g} s is shorter than a step of "
+            f"{used:g} s; record every {used:g} s, or take a shorter step"
+        )
+    return replace(
+        item,
+        algorithm=algorithm or item.algorithm,
+        options={
+            **(item.options if algorithm in (None, item.algorithm) else {}),
+            **(options or {}),
+        },
+        step=used,
+        duration=duration if duration is not None else item.duration,
+        also=(*item.also, *record),
+        period=record_period if record_period is not None else item.period,
+    )

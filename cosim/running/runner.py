@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -36,10 +36,10 @@ from .checks_table import checks_html
 from .comparison_table import ComparedQuantity, overview
 from .plots import plot_overview, plot_run
 from .preparation import (
+    adjusted,
     left_out,
     recorded_signals,
     recording_interval,
-    shortened,
     swapped_system,
 )
 
@@ -355,6 +355,7 @@ def run(
     options: Mapping[str, Any] | None = None,
     step: float | None = None,
     duration: float | None = None,
+    record: Sequence[str] = (),
     record_period: float | None = None,
     provider: Provider | None = None,
     out: Path | str | None = None,
@@ -373,6 +374,7 @@ def run(
         options: of the algorithm; those of the scenario if that is its algorithm, too.
         algorithm, step, duration: replace the scenario's; a shorter run drops the checks that it
             does not reach.
+        record: signals that are recorded besides those of the scenario, `motor.i` or a vector.
         record_period: replaces the scenario's [s]; a whole number of steps.
         provider: where variants come from; by default they are built from the sources, or taken
             from the installed FMUs where those are missing.
@@ -412,7 +414,7 @@ def run(
         return _run(
             found, None if out is None else Path(out), provider, progress,
             {"algorithm": algorithm, "options": options, "step": step, "duration": duration,
-             "record_period": record_period},
+             "record": record, "record_period": record_period},
             {"variants": variants, "parameters": parameters, "isolate": isolate, "guard": guard,
              "scene": True},
         )  # fmt: skip
@@ -463,37 +465,3 @@ def _run(
         final = replace(final, files=(*files, path))
         write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
     return final
-
-
-def adjusted(
-    item: Scenario,
-    algorithm: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    step: float | None = None,
-    duration: float | None = None,
-    record_period: float | None = None,
-) -> Scenario:
-    """A scenario with another algorithm, step, duration or record period where these are given.
-
-    Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
-    does not reach.
-    """
-    if duration is not None and duration < item.duration:
-        item = shortened(item, duration)
-    used = step if step is not None else item.step
-    if record_period is not None and record_period < used:
-        raise ValueRangeError(
-            f"{item.name}: the record period {record_period:g} s is shorter than a step of "
-            f"{used:g} s; record every {used:g} s, or take a shorter step"
-        )
-    return replace(
-        item,
-        algorithm=algorithm or item.algorithm,
-        options={
-            **(item.options if algorithm in (None, item.algorithm) else {}),
-            **(options or {}),
-        },
-        step=used,
-        duration=duration if duration is not None else item.duration,
-        period=record_period if record_period is not None else item.period,
-    )

@@ -54,6 +54,7 @@ class Scenario:
         parameters: full name -> value.
         inputs: input -> signal.
         record: signals, None for all outputs.
+        also: signals that are recorded besides.
         period: time between recorded points [s], None for every communication point.
         references: what is compared, by name.
         checks: what must hold.
@@ -85,6 +86,7 @@ class Scenario:
     plots: tuple[Axes, ...] = ()
     figures: tuple[FigureSpec, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
+    also: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ import numpy as np
 
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
-from ..running.runner import Prepared, adjusted, find_runs, prepare
+from ..running.preparation import adjusted
+from ..running.runner import Prepared, find_runs, prepare
 from ..scenario.scenario import Scenario
 from ..spec import distribution
 from ..system.provider import Provider
