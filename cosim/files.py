@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
+import math
 import os
 import pickle
 import sys
@@ -203,4 +205,19 @@ def read_toml(path: Path) -> dict[str, Any]:
     if parsed is None:
         raise ScenarioError(f"{path}: its lists and tables lie more than {DEPTH} deep")
     content: dict[str, Any] = pickle.loads(parsed)
+    return content
+
+
+def json_text(content: Any, indent: int | None = 2) -> str:
+    """JSON with a line break at its end; numbers that are not finite, which it lacks, are null."""
+    return json.dumps(_finite(content), indent=indent, allow_nan=False) + "\n"
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, float):
+        return content if math.isfinite(content) else None
+    if isinstance(content, Mapping):
+        return {key: _finite(item) for key, item in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(item) for item in content]
     return content

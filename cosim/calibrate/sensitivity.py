@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..display.literal import literal
 from ..errors import FmuCallError
 from ..files import atomic
 from ..study.sensitivity import significance_limit
@@ -139,5 +140,5 @@ def tornado(correlation: Correlation, path: Path) -> Path:
     axes.set_xlim(-1.0, 1.0)
     axes.set_xlabel(f"correlation with the residual, {correlation.samples} sets; dashed: 5 % limit")
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        literal(figure).savefig(temporary, dpi=120)
     return path

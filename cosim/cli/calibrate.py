@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..files import claimed, write_text
+from ..files import claimed, json_text, write_text
 from ..installation.builder import default_provider
 from .output import open_console
 from .progress import Display
@@ -119,7 +118,7 @@ def calibrate_command(
                     drawn.append(tornado_by_run(correlation, pictures / "sensitivity.png"))
                 content["files"] += map(str, drawn)
                 _add_first_guess(content, problem, guess)
-            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_text(table, json_text(content))
             write_calibration_page(content, estimate, unused, page)
         finally:  # what was found is said, whatever becomes of the files
             if as_json:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..files import claimed, write_text
+from ..files import claimed, json_text, write_text
 from ..installation.builder import default_provider
 from .calibrate import clock_lines
 from .guard import heard
@@ -107,7 +107,7 @@ def diagnose_command(
         content = result.to_dict()
         try:
             write_page(result, page)
-            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_text(table, json_text(content))
             write_text(models, json.dumps(result.table.to_dict(), indent=1) + "\n")
         finally:  # what was found is said, whatever becomes of the files
             if as_json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..files import write_text
+from ..files import json_text, write_text
 from ..installation.builder import default_provider
 from .output import open_console
 from .pairs import pairs, values
@@ -77,8 +76,8 @@ def linearize_command(
         if loops:
             plot_bode(loops, out / "bode.png")
         matrices = {key: getattr(system, key).tolist() for key in "abcd"}
-        text = json.dumps({**content, **matrices}, indent=1)
-        write_text(out / "linear.json", text + "\n")
+        text = json_text({**content, **matrices}, 1)
+        write_text(out / "linear.json", text)
     if as_json:
         print_json(content)
     else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..files import claimed, write_text
+from ..files import claimed, json_text, write_text
 from ..installation.builder import default_provider
 from .output import open_console
 from .progress import Display
@@ -83,7 +82,7 @@ def monitor_command(
         page, table = results / "report.html", results / "monitor.json"
         content = result.to_dict() | {"files": [str(table), str(page)]}
         try:
-            write_text(table, json.dumps(content, indent=2) + "\n")
+            write_text(table, json_text(content))
             write_monitor_page(result, page)
         finally:  # what was found is said, whatever becomes of the files
             if as_json:

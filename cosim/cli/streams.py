@@ -6,12 +6,13 @@ written when the process ends. So the descriptor is turned away until then.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
+
+from ..files import json_text
 
 _kept: list[TextIO] = []
 
@@ -41,5 +42,5 @@ def stdout_for_json() -> Iterator[None]:
 def print_json(content: Any, indent: int | None = 2) -> None:
     """Print one JSON value; on one line without an indent."""
     out = _kept[-1] if _kept else sys.stdout
-    out.write(json.dumps(content, indent=indent) + "\n")
+    out.write(json_text(content, indent))
     out.flush()

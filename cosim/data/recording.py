@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import need_text
+from ..display.literal import literal
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import atomic
 from ..spec.distribution import has, needed
@@ -283,6 +284,7 @@ class Recording:
         axes[-1].set_xlabel("time [s]")
         title = str(self.provenance.get("scenario") or self.provenance.get("system") or "")
         figure.suptitle(title + (f" (stopped: {self.error[:80]})" if self.error else ""))
+        literal(figure)
         if path is not None:
             with atomic(Path(path)) as temporary:
                 figure.savefig(temporary, dpi=120)

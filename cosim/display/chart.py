@@ -71,7 +71,7 @@ def lines(
     high = max(float(v.y.max()) for v in drawn)
     if band is not None:
         low, high = min(low, -band), max(high, band)
-    margin = 0.05 * (high - low) or 1.0
+    margin = 0.05 * (high - low) or max(1.0, 0.05 * abs(high))  # 1 is lost beside 1e16
     low, high = low - margin, high + margin
     if high_x <= low_x:
         high_x = low_x + 1.0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..display.literal import literal
 from ..files import atomic
 from .inspect import ColumnReport, FileReport, TopicReport
 
@@ -72,5 +73,5 @@ def draw(files: Sequence[FileReport], path: Path) -> tuple[Path, list[str]]:
         axis.set_xlabel("time [s]" if topic.clock.column else "row", fontsize=8)
         axis.tick_params(labelsize=8)
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=110)
+        literal(figure).savefig(temporary, dpi=110)
     return path, left

@@ -92,7 +92,7 @@ class _Run:
 class _Part:
     """What a report sums up."""
 
-    since: float = 0.0
+    since: float | None = None
     rows: list[Vector] = field(default_factory=list)
 
 
@@ -373,6 +373,8 @@ class Watch:
         known = np.isfinite(residuals)
         self._square += (np.where(known, residuals, 0.0) ** 2).sum(axis=0)
         self._count += known.sum(axis=0)
+        if self._part.since is None:
+            self._part.since = min(0.0, float(clock[0]))  # a clock may begin before 0
         if clock[-1] - self._part.since >= self.settings.report:
             self._tell(float(clock[-1]))
 

@@ -30,6 +30,7 @@ from ..data.recording import Recording
 from ..data.signals import Signal, objects
 from ..errors import GraphError, UnitError, ValueRangeError
 from ..fmu.values import OBJECTS, TYPES, check_values
+from ..reading.limits import DATA
 from ..spec.units import conversion, parse
 from ..system.inputs import Driver, spread
 from ..system.system import System
@@ -212,6 +213,11 @@ class Master:
             raise ValueRangeError(f"duration {duration} s is not positive")
         if every < 1:
             raise ValueRangeError(f"record every {every}-th point: must be 1 or more")
+        if duration / self.step > DATA.value() / 8:  # its times alone would be more
+            raise ValueRangeError(
+                f"duration {duration:g} s in steps of {self.step:g} s: the times alone take more "
+                f"than {DATA.value():g} bytes ({DATA.variable}); take a shorter run or longer steps"
+            )
         count = round(duration / self.step)
         if count < 1 or abs(count * self.step - duration) > 1e-6 * self.step:
             fitting = max(count, 1) * self.step

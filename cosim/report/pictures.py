@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.sensitivity import Correlation
+from ..display.literal import literal
 from ..files import atomic, make_folder
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def run_pictures(
         figure.suptitle(f"{problem.name} {run.name} ({run.purpose})")
         path = folder / f"{run.name}.png"
         with atomic(path) as temporary:
-            figure.savefig(temporary, dpi=80)
+            literal(figure).savefig(temporary, dpi=80)
         written.append(path)
     return written
 
@@ -126,5 +127,5 @@ def tornado_by_run(correlation: Correlation, path: Path) -> Path:
         fontsize="medium",
     )
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=110)
+        literal(figure).savefig(temporary, dpi=110)
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -100,7 +101,7 @@ def text(arm: Arm, source: str) -> str:
         units = [along if flag else unit for flag in slides]
         shown = f'"{unit}"' if not along or not any(slides) else _listed(units)
         out.extend([f"# {comment}", f"[{name}]", f"value = {_numbers(value)}", f"unit = {shown}"])
-        out.append(f'origin = "{origin}"')
+        out.append(f"origin = {_text(origin)}")
         out.extend(["assumed = true", ""] if assumed else [""])
 
     turns = [pose.rotation.ravel() for pose in arm.poses]
@@ -131,7 +132,7 @@ def text(arm: Arm, source: str) -> str:
 
     made = "computed by cosim arm import"
     out += ["# Speed over which the sign of the Coulomb friction is smoothed.", "[w_0]",
-            f"value = {SMOOTH}", 'unit = "rad/s"', f'origin = "{made}"', "assumed = true",
+            f"value = {SMOOTH}", 'unit = "rad/s"', f"origin = {_text(made)}", "assumed = true",
             ""]  # fmt: skip
     add("angle", middle, "rad", "Start of `serial_arm`: the middle of each range.", along="m",
         origin=made)  # fmt: skip
@@ -167,18 +168,23 @@ def text(arm: Arm, source: str) -> str:
         along="m", origin=made, assumed=True)  # fmt: skip
     out += ["# Distance of the frequencies of `multisine`: joints stay below seven tenths of their",
             "# largest speeds.", "[joint_trajectory.f]", f"value = {LINE}", 'unit = "Hz"',
-            f'origin = "{made}"', "assumed = true", ""]  # fmt: skip
+            f"origin = {_text(made)}", "assumed = true", ""]  # fmt: skip
     add("q_start", middle, "rad", "`quintic` from here.", along="m", origin=made, assumed=True)
     add("q_end", [a + b for a, b in zip(middle, swing, strict=True)], "rad", "`quintic` to here.",
         along="m", origin=made, assumed=True)  # fmt: skip
-    return "\n".join(out)
+    return "\n".join(" ".join(line.splitlines()) if line[:1] == "#" else line for line in out)
 
 
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def _listed(items: Iterable[str]) -> str:
-    return "[" + ", ".join(f'"{item}"' for item in items) + "]"
+    return "[" + ", ".join(map(_text, items)) + "]"
+
+
+def _text(value: str) -> str:
+    """A text of TOML, which takes JSON's escapes."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _number(value: float) -> str:

@@ -149,7 +149,7 @@ class Tree:
         found: list[Joint] = []
         link = tip
         while link != base:
-            if link not in above:
+            if link not in above or len(found) > len(self.joints):  # no joint, or a ring of them
                 raise InputError(f"link {tip!r} does not hang on {base!r}; choose another --tip")
             found.append(above[link])
             link = above[link].parent

@@ -98,6 +98,17 @@ def _inertial(link: str, element: ET.Element | None) -> Inertial | None:
     return Inertial(finite(where, "mass", mass.get("value", "")), pose.position, turned)
 
 
+def _refuse_negative(where: str, key: str, value: float) -> None:
+    if value < 0.0:
+        raise InputError(f"{where}: its {key} is {value:g}; it must not be negative")
+
+
+def _loss(where: str, key: str, dynamics: ET.Element | None) -> float:
+    value = 0.0 if dynamics is None else finite(where, key, dynamics.get(key, "0"))
+    _refuse_negative(where, key, value)
+    return value
+
+
 def _joint(name: str, element: ET.Element, links: Any) -> Joint:
     where = f"joint {name!r}"
     kind = element.get("type", "")
@@ -118,6 +129,10 @@ def _joint(name: str, element: ET.Element, links: Any) -> Joint:
                 kind == "continuous" and key in ("lower", "upper")
             ):
                 limits[key] = finite(where, key, limit.get(key, ""))
+        if {"lower", "upper"} & set(limits):  # one of them alone: the other is 0
+            limits = {"lower": 0.0, "upper": 0.0} | limits
+    for key in ("effort", "velocity"):
+        _refuse_negative(where, key, limits.get(key, 0.0))
     if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
         raise InputError(
             f"{where}: its lower limit {limits['lower']:g} lies above its upper limit "
@@ -138,9 +153,7 @@ def _joint(name: str, element: ET.Element, links: Any) -> Joint:
         upper=limits.get("upper", math.inf),
         effort=limits.get("effort", 0.0) or math.inf,  # 0: files whose author knew none
         speed=limits.get("velocity", 0.0) or math.inf,
-        damping=0.0 if dynamics is None else finite(where, "damping", dynamics.get("damping", "0")),
-        friction=0.0
-        if dynamics is None
-        else finite(where, "friction", dynamics.get("friction", "0")),
+        damping=_loss(where, "damping", dynamics),
+        friction=_loss(where, "friction", dynamics),
         mimics="" if mimic is None else mimic.get("joint", "?"),
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..data.comparison import Comparison, Reference, convert_reference
 from ..data.recording import Recording
+from ..display.literal import literal
 from ..errors import UnknownNameError
 from ..files import atomic
 from ..scenario.axes import Axes
@@ -99,6 +100,7 @@ def _path_column(place: Any, count: int, height: float) -> list[MatplotlibAxes]:
 
 def save(figure: Figure, path: Path | str | None, dots: int = 120) -> None:
     """Write a picture, `dots` per inch; the suffix says how."""
+    literal(figure)
     if path is not None:
         with atomic(Path(path)) as temporary:
             figure.savefig(temporary, dpi=dots)

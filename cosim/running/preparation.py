@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -113,6 +114,9 @@ def adjusted(
     Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
     does not reach.
     """
+    for what, value in (("step", step), ("duration", duration), ("record period", record_period)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueRangeError(f"{item.name}: {what} {value:g} s: must be a positive number")
     need_texts("signals to record", record, 'record=["motor.i"]')
     if duration is not None and duration < item.duration:
         item = shortened(item, duration)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,7 @@ from ..arguments import need_function, need_number, need_table, need_text
 from ..data.comparison import Comparison, compare, convert_reference
 from ..data.recording import Recording
 from ..errors import StepError, ValueRangeError
-from ..files import claimed, write_text
+from ..files import claimed, json_text, write_text
 from ..installation import builder
 from ..master.algorithms import names
 from ..master.master import Master
@@ -44,6 +43,8 @@ from .preparation import (
 )
 
 Vector = NDArray[np.float64]
+WHOLE = ("result.json", "report.html", "overview.png")
+"""Files that tell of all runs together; where one of them fails there are none."""
 SHOWN_RUNS = 3
 """Recordings that a result of many runs shows in a notebook."""
 
@@ -440,7 +441,12 @@ def _run(
         try:
             result = run_scenario(item, provider, progress=told, base=Path.cwd(), **how)
         except StepError as error:
-            if place is not None and error.recording is not None:
+            if out is not None and place is not None and error.recording is not None:
+                for stale in (
+                    *(place / n for n in ("recording.csv", "plot.png")),
+                    *(out / n for n in WHOLE),
+                ):  # of a run before
+                    stale.unlink(missing_ok=True)
                 path = error.recording.keep(place / "recording")
                 error.add_note(f"the recording up to then is in {path}")
             raise
@@ -463,5 +469,5 @@ def _run(
             files.append(path)
         path = out / "result.json"
         final = replace(final, files=(*files, path))
-        write_text(path, json.dumps(final.to_dict(), indent=2) + "\n")
+        write_text(path, json_text(final.to_dict()))
     return final

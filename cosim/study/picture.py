@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..display.literal import literal
 from ..files import atomic
 from .table import StudyTable
 
@@ -62,7 +63,7 @@ def plot(table: StudyTable, title: str, path: Path) -> None:
         figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize="small")
     figure.suptitle(title)
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        literal(figure).savefig(temporary, dpi=120)
 
 
 def _points(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..data.recording import Recording
 from ..errors import UnknownNameError, ValueRangeError
-from ..files import write_text
+from ..files import json_text, write_text
 from ..installation import builder
 from ..master.cores import cores
 from ..spec.distribution import has
@@ -241,7 +240,7 @@ def _write(study: Study, folder: Path, table: StudyTable, picture: bool) -> list
     ]
     if has("pyarrow"):
         files.append(table.write_parquet(folder / "study.parquet"))
-    write_text(files[1], json.dumps(_rows(study, table), indent=1) + "\n")
+    write_text(files[1], json_text(_rows(study, table), 1))
     if picture:
         files.append(folder / "study.png")
         plot(table, study.text or study.name, files[-1])

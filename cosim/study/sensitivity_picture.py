@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..display.literal import literal
 from ..files import atomic
 from .definition import Study
 from .sensitivity import Sensitivity, made_with, outputs, samples_of
@@ -46,7 +47,7 @@ def tornado(found: Sequence[Sensitivity], title: str, path: Path) -> None:
     left = f"; {len(found) - len(shown)} more in sensitivity.csv" if len(found) > len(shown) else ""
     figure.suptitle(title + left)
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        literal(figure).savefig(temporary, dpi=120)
 
 
 def _tornado(axis: Any, item: Sensitivity) -> None:
@@ -129,7 +130,7 @@ def parallel(
     bar.set_label(names[0])
     figure.suptitle(f"{title}: {data.shape[1]} of {len(table.rows)} runs")
     with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        literal(figure).savefig(temporary, dpi=120)
     return True
 
 

@@ -278,6 +278,14 @@ REFUSED = {
         robot(link("a"), link("b"), joint("1", "a", "b", inside='<limit lower="1" upper="0"/>')),
         "its lower limit 1 lies above its upper limit 0",
     ),
+    "effort": (
+        robot(link("a"), link("b"), joint("1", "a", "b", inside='<limit effort="-1"/>')),
+        "joint '1': its effort is -1; it must not be negative",
+    ),
+    "damping": (
+        robot(link("a"), link("b"), joint("1", "a", "b", inside='<dynamics damping="-2"/>')),
+        "joint '1': its damping is -2; it must not be negative",
+    ),
     "xacro": (
         '<robot xmlns:xacro="http://ros.org/xacro" name="r"><xacro:include/></robot>',
         "is a xacro file",
@@ -307,6 +315,28 @@ def test_what_is_no_serial_chain_is_refused_in_one_sentence(what: str, tmp_path:
     with pytest.raises(InputError, match=message) as caught:
         read(text, tmp_path)
     assert "\n" not in str(caught.value) and "robot.urdf" in str(caught.value)
+
+
+def test_a_tip_in_a_ring_of_its_own_is_refused(tmp_path: Path) -> None:
+    ring = joint("2", "c", "d"), joint("3", "d", "c")
+    with pytest.raises(InputError, match="link 'c' does not hang on 'a'"):
+        read(robot(TWO, link("d"), joint("1", "a", "b"), *ring), tmp_path, tip="c")
+
+
+def test_one_limit_alone_leaves_the_other_at_0(tmp_path: Path) -> None:
+    for key, lower, upper in (("upper", 0.0, 1.5), ("lower", -1.5, 0.0)):
+        value = upper if key == "upper" else lower
+        inside = f'<limit {key}="{value}" effort="1"/>'
+        arm = read(robot(link("a"), link("b"), joint("1", "a", "b", inside=inside)), tmp_path)
+        assert (arm.joints[0].lower, arm.joints[0].upper) == (lower, upper)
+    bare = joint("1", "a", "b", inside='<limit effort="1"/>')  # many files say no position
+    assert read(robot(link("a"), link("b"), bare), tmp_path).joints[0].upper == np.inf
+
+
+def test_names_with_quotes_and_line_breaks_make_a_device_file(tmp_path: Path) -> None:
+    odd = joint("j&#10;value = 1 &quot;", "a", "b")
+    arm = read(robot(link("a"), link("b"), odd), tmp_path)
+    assert len(tomllib.loads(device.text(arm, 'a "robot".urdf'))["mass"]["value"]) == 1
 
 
 def test_links_without_mass_are_told_and_real_bodies_are_not(tmp_path: Path) -> None:

@@ -223,6 +223,12 @@ def test_without_wait_the_same_disorder_loses_samples(reading) -> None:
     assert Followed(reading, given).summary["late"] == 2
 
 
+@pytest.mark.parametrize("clock", [0.0, -100.0])
+def test_reports_come_as_often_where_a_clock_begins_before_0(reading, clock: float) -> None:
+    reports = Followed(reading, lines(reading, 2000, clock=clock), report=1.0).reports
+    assert len(reports) == len(Followed(reading, lines(reading, 2000), report=1.0).reports) > 2
+
+
 def test_missing_samples_are_counted_by_their_numbers(reading) -> None:
     given = []
     for number, line in enumerate(lines(reading, 300)):
