@@ -228,9 +228,10 @@ def _exact(values: ArrayLike) -> list[Any]:
     items = values.tolist() if isinstance(values, np.ndarray) else values
     if not isinstance(items, Sequence):
         return []
-    integers = [item for item in items if isinstance(item, (int, np.integer))]
-    if len(integers) == len(items) and any(float(item) != item for item in integers):
-        return [int(item) for item in integers]
+    numbers = all(isinstance(item, (int, float, np.integer, np.floating)) for item in items)
+    whole = (item for item in items if isinstance(item, (int, np.integer)))
+    if numbers and any(float(item) != item for item in whole):
+        return [item.item() if isinstance(item, np.generic) else item for item in items]
     if items and all(isinstance(item, (str, bytes)) for item in items):
         return list(items)
     return []

@@ -215,6 +215,11 @@ def _some(check: Check, inside: NDArray[np.bool_]) -> None:
         )
 
 
+def _exact(column: NDArray[Any]) -> NDArray[Any]:
+    """Integers of 64 bits as Python's: their squares and differences do not wrap around."""
+    return column.astype(object) if column.dtype.kind in "iu" else column
+
+
 def _measure(
     check: Check, recording: Recording, comparisons: Mapping[str, Comparison]
 ) -> tuple[float, str]:
@@ -229,12 +234,13 @@ def _measure(
         return abs(recording.energy_residual), "J"
     inside = (recording.time >= check.after) & (recording.time <= check.before)
     _some(check, inside)
-    columns = [recording[name][inside] for name in check.signals]
+    columns = [_exact(recording[name][inside]) for name in check.signals]
     if check.minus:
-        columns[0] = columns[0] - recording[check.minus][inside]
+        columns[0] = columns[0] - _exact(recording[check.minus][inside])
     unit = recording.units.get(check.signals[0], "")
     if len(columns) == 1:
         return _SIGNAL[check.of](columns[0]), unit
+    columns = [column.astype(np.float64) for column in columns]
     if check.of == "circle_radius":
         return circle_radius(*columns), unit
     steps = np.hypot(np.diff(columns[0]), np.diff(columns[1]))

@@ -373,7 +373,10 @@ class _Reader:
         times = log[str(entry.get("time", "time"))]
         if exact and column in log.exact:
             return times, log.exact[column], unit, text
-        return times, log[column], unit, text
+        values = log[column]
+        if origin := log.origins.get(column):
+            values = values + float(origin)
+        return times, values, unit, text
 
     def signal(self, name: str, entry: Any) -> Signal | SignalVector:
         """The signal of an input, or those of all elements of a vector input."""
