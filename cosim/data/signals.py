@@ -23,6 +23,11 @@ EXACT = 1e-9
 have long intervals; only communication points carry rounding."""
 
 
+PAUSE = 3.0
+"""Intervals of a table longer than this many usual ones are pauses: it may end a usual interval
+before the run, not a pause."""
+
+
 class Signal(Protocol):
     """Values over time, in `unit`."""
 
@@ -98,8 +103,8 @@ class Table:
         unit: of the values.
         interpolation: `hold` (a set value held between samples) or `linear`.
         text: where it comes from.
-        extend: hold the first and last value beyond the table; else leaving it by more than its
-            longest sample interval is an error.
+        extend: hold the first and last value beyond the table; else leaving it by more than a
+            sample interval is an error (the longest one, but for pauses: `PAUSE`).
 
     Raises:
         ValueRangeError: times that do not increase, or values that are not finite.
@@ -177,8 +182,12 @@ class Table:
             clock = min(clock, EXACT)
         if not self.extend and times.size:
             first, last = self.times[0], self.times[-1]
-            margin = clock + (float(np.max(intervals)) if intervals.size else 0.0)
-            if times[0] < first - margin or times[-1] > last + margin:
+            before = after = clock
+            if intervals.size:
+                usual = min(float(np.max(intervals)), PAUSE * float(np.median(intervals)))
+                before += max(usual, float(intervals[0]))
+                after += max(usual, float(intervals[-1]))
+            if times[0] < first - before or times[-1] > last + after:
                 raise ValueRangeError(
                     f"{self.text}: covers {first:.9g} s to {last:.9g} s, but the run needs "
                     f"{times[0]:.9g} s to {times[-1]:.9g} s; shorten the run or extend the table"

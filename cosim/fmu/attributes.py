@@ -13,6 +13,17 @@ INTEGERS = (
     "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration",
     "Enumeration2",
 )  # fmt: skip
+_DEFAULT_INITIAL = {
+    "constant": {"output": "exact", "local": "exact"},
+    "fixed": {"structuralParameter": "exact", "parameter": "exact",
+              "calculatedParameter": "calculated", "local": "calculated"},
+    "tunable": {"structuralParameter": "exact", "parameter": "exact",
+                "calculatedParameter": "calculated", "local": "calculated"},
+    "discrete": {"input": "exact", "output": "calculated", "local": "calculated"},
+    "continuous": {"input": "exact", "output": "calculated", "local": "calculated",
+                   "independent": ""},
+}  # fmt: skip
+"""Initial by variability and causality where it is not given; both tables of FMI agree."""
 
 
 def number_of(element: ET.Element, key: str) -> float | None:
@@ -34,6 +45,11 @@ def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str,
             exponents = tuple(int(base.get(key, "0")) for key in BASE)
             units[name] = Unit(name, exponents, factor, offset)
     return units
+
+
+def initial_of(given: str | None, causality: str, variability: str) -> str:
+    """`initial` with FMI's default filled in; "" where there is none."""
+    return given or _DEFAULT_INITIAL.get(variability, {}).get(causality, "")
 
 
 def start_of(text: str | None, type_: str) -> tuple[Start, ...]:

@@ -19,7 +19,7 @@ from ..errors import FmuFileError, UnknownNameError, listing
 from ..reading import markup
 from ..reading.limits import TEXT, VALUES
 from ..spec.units import Unit
-from .attributes import Start, Types, number_of, read_units, start_of, unit_of
+from .attributes import Start, Types, initial_of, number_of, read_units, start_of, unit_of
 from .metadata import read_metadata
 
 Causality = Literal[
@@ -238,15 +238,17 @@ def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
     for element in root.iterfind("ModelVariables/ScalarVariable"):
         inner = next(child for child in element if child.tag in FMI2_TYPES)
         type_ = FMI2_TYPES[inner.tag]
+        causality = element.get("causality", "local")
         default = "continuous" if inner.tag == "Real" else "discrete"
+        variability = element.get("variability", default)
         found.append(
             Variable(
                 name=element.attrib["name"],
                 reference=int(element.attrib["valueReference"]),
                 type=type_,
-                causality=element.get("causality", "local"),
-                variability=element.get("variability", default),
-                initial=element.get("initial", ""),
+                causality=causality,
+                variability=variability,
+                initial=initial_of(element.get("initial"), causality, variability),
                 unit=unit_of(types.get(inner, "unit"), units),
                 start=start_of(inner.get("start"), type_),
                 minimum=types.number(inner, "min"),
@@ -303,15 +305,17 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
         )
         if dimensions and len(start) == 1:
             start = start * math.prod(dimensions)
+        causality = element.get("causality", "local")
         default = "continuous" if element.tag in ("Float64", "Float32") else "discrete"
+        variability = element.get("variability", default)
         found.append(
             Variable(
                 name=element.attrib["name"],
                 reference=int(element.attrib["valueReference"]),
                 type=type_,
-                causality=element.get("causality", "local"),
-                variability=element.get("variability", default),
-                initial=element.get("initial", ""),
+                causality=causality,
+                variability=variability,
+                initial=initial_of(element.get("initial"), causality, variability),
                 unit=unit_of(types.get(element, "unit"), units),
                 start=start,
                 minimum=types.number(element, "min"),

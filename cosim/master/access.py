@@ -95,18 +95,19 @@ class Access:
     def _find_target(self, name: str) -> Target:
         system = self._system
         member, variables = system.variables(name)
-        kind = variables[0].causality
-        tunable = kind == "parameter" and variables[0].variability == "tunable"
-        if kind != "input" and not tunable:
+        for variable in variables:
+            kind, variability = variable.causality, variable.variability
+            if kind == "input" or (kind == "parameter" and variability == "tunable"):
+                continue
             way = (
                 "give it as a parameter when you open the twin"
                 if kind == "parameter"
                 else listing(system.open_inputs(), name)
             )
             raise UnknownNameError(
-                f"{name} cannot be set in steps: it is a variable of causality {kind!r} and "
-                f"variability {variables[0].variability!r} (inputs and tunable parameters can); "
-                + way
+                f"{member.name}.{variable.name} cannot be set in steps: it is a variable of "
+                f"causality {kind!r} and variability {variability!r} (inputs and tunable "
+                f"parameters can); {way}"
             )
         elements = [system.first_name(element) for element in system.elements(name)]
         for element in elements:

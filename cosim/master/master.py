@@ -27,7 +27,7 @@ from ..arguments import (
     wrong,
 )
 from ..data.recording import Recording
-from ..data.signals import Signal, objects
+from ..data.signals import Constant, Signal, objects
 from ..errors import GraphError, UnitError, ValueRangeError
 from ..fmu.values import OBJECTS, TYPES, check_values
 from ..reading.limits import DATA
@@ -88,6 +88,11 @@ class Master:
         for what, value in (("tolerance", self.tolerance), ("time limit isolate", self.isolate)):
             if value is not None:
                 need_number(f"the {what} of a Master", value)
+        if self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
+            raise ValueRangeError(
+                f"the tolerance of a Master, {self.tolerance}, is no positive number; leave it "
+                "out for the FMUs' own"
+            )
         need_text("the scenario of a Master", self.scenario, "give the name recordings carry")
         need_text("the executor of a Master", self.executor, "take auto, c or python")
         need_table("options of a Master", self.options, 'options={"extrapolation": 1}')
@@ -245,15 +250,18 @@ class Master:
                 table[:, column] = [codes[item] for item in carried[column]]
                 continue
             values = self._numbers(name, signal, times)
-            unit = self.system.unit(name)
+            declared = self.system.declaration(name)
+            unit = declared.symbol
             if signal.unit and unit:
                 try:
-                    declared = self.system.declaration(name)
                     gain, offset = conversion(parse(signal.unit), declared.unit or parse(unit))
                     offset = 0.0 if declared.relative else offset
                 except UnitError as error:
                     raise UnitError(f"input {name} from {signal.text}: unit {error}") from error
                 values = values * gain + offset
+            if isinstance(signal, Constant):  # bounds are in the input's unit
+                where = f"input {name} from {signal.text}"
+                check_values(where, [replace(declared, dimensions=())], float(values[0]))
             bad = np.flatnonzero(~np.isfinite(values))
             if bad.size:
                 raise ValueRangeError(

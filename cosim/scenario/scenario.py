@@ -34,6 +34,8 @@ KEYS = {
 }  # fmt: skip
 _SOURCE_KEYS = {"file", "data", "run", "column", "columns", "time", "unit", "constant", "times",
                 "values", "interpolation"}  # fmt: skip
+_WAYS = ("constant", "times", "file", "data", "circle")
+"""Keys of a source, each of which says where values come from."""
 _CIRCLE_KEYS = {"start", "centre", "rate"}
 
 
@@ -378,6 +380,12 @@ class _Reader:
             values = values + float(origin)
         return times, values, unit, text
 
+    def one_way(self, what: str, entry: Mapping[str, Any]) -> None:
+        """Refuse two sources at once."""
+        ways = [key for key in _WAYS if key in entry]
+        if len(ways) > 1:
+            raise self.fail(f"{what}: has {' and '.join(ways)}; give one source")
+
     def signal(self, name: str, entry: Any) -> Signal | SignalVector:
         """The signal of an input, or those of all elements of a vector input."""
         if isinstance(entry, (int, float, str, list)):
@@ -385,6 +393,7 @@ class _Reader:
         if not isinstance(entry, dict):
             raise self.fail(f"input {name}: {entry!r} is neither a value nor a table")
         _only(self.file.path, entry, _SOURCE_KEYS, f"input {name}")
+        self.one_way(f"input {name}", entry)
         if "constant" in entry:
             value, unit = entry["constant"], str(entry.get("unit", ""))
             rows = value if isinstance(value, list) else [value]
@@ -413,6 +422,7 @@ class _Reader:
             raise self.fail(f"compare {name}: signal is missing")
         keys = _SOURCE_KEYS | {"signal", "signals", "offset", "scale", "circle", "name"}
         _only(self.file.path, entry, keys, f"compare {name}")
+        self.one_way(f"compare {name}", entry)
         signals = tuple(entry.get("signals", [entry.get("signal")]))
         text = str(entry.get("name", ""))
         if "circle" in entry:

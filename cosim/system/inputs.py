@@ -43,8 +43,9 @@ def spread(system: System, inputs: Mapping[str, Driver]) -> dict[str, Signal]:
     """
     signals: dict[str, Signal] = {}
     for name, driver in inputs.items():
-        _, variables = system.variables(name)
-        _check_causality(system, name, variables[0])
+        member, variables = system.variables(name)
+        for variable in variables:
+            _check_causality(system, f"{member.name}.{variable.name}", variable)
         elements = system.elements(name)
         drivers: list[Any] = [driver] * len(elements)
         if isinstance(driver, SignalVector):

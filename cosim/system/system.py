@@ -25,6 +25,7 @@ from ..fmu.values import TYPES, boolean, check_values, plain
 from ..spec.units import conversion
 from . import feedthrough
 from .provider import Provider, locate
+from .roles import need_end, need_settable
 
 
 @dataclass(frozen=True)
@@ -151,18 +152,7 @@ class System:
             name = self.first_name(name)
             member, variables = self.variables(name)
         first = variables[0]
-        calculated = first.causality in ("output", "independent", "calculatedParameter")
-        if calculated and first.initial not in ("exact", "approx"):
-            raise GraphError(
-                f"{self.name}: {name} is an {variables[0].causality} and cannot be given a value"
-            )
-        if variables[0].variability == "constant":
-            raise GraphError(f"{self.name}: {name} is constant and cannot be given a value")
-        if first.causality == "structuralParameter":
-            raise GraphError(
-                f"{self.name}: {name} is a structural parameter; arrays have the sizes that its "
-                f"start value {first.start[:1]} gives, so it cannot be set"
-            )
+        need_settable(self.name, member.name, variables)
         where = f"{self.name}: {member.name}"
         found = check_values(where, variables, value)
         if first.index is None:
@@ -203,13 +193,8 @@ class System:
         what = f"{self.name}: cannot connect {source} to {target}"
         giver, givers = self.variables(source)
         taker, takers = self.variables(target)
-        for name, variables, wanted in ((source, givers, "output"), (target, takers, "input")):
-            if variables[0].causality != wanted:
-                raise ConnectError(
-                    f"{what}: {name} is {_article(variables[0].causality)} of "
-                    f"{self.members[name.partition('.')[0]].reference}, not an {wanted}; "
-                    "write the output first"
-                )
+        need_end(what, (giver.name, giver.reference), givers, "output")
+        need_end(what, (taker.name, taker.reference), takers, "input")
         outputs = [(v, name) for v in givers for name in v.elements()]
         inputs = [(v, name) for v in takers for name in v.elements()]
         if len(outputs) != len(inputs):
@@ -493,7 +478,3 @@ def _way(out: Variable, into: Variable) -> str:
 def _given(value: Any, found: list[Any]) -> Any:
     """A checked value as it is kept: one for all elements as one, lists as they were given."""
     return found[0] if len(found) == 1 and not isinstance(value, (list, tuple)) else plain(value)
-
-
-def _article(causality: str) -> str:
-    return ("an " if causality[0] in "aeiou" else "a ") + causality

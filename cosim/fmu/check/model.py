@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Literal
 
 from ...reading.markup import Markup
+from ..attributes import initial_of
 from ..description import FMI2_TYPES, FMI3_TYPES
 
 FLOATS = ("Real", "Float64", "Float32")
@@ -18,17 +19,6 @@ RANGES = {
     **{f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
 }  # fmt: skip
 """Smallest and largest value of each whole type (of an enumeration, of FMI 3's)."""
-_DEFAULT_INITIAL = {
-    "constant": {"output": "exact", "local": "exact"},
-    "fixed": {"structuralParameter": "exact", "parameter": "exact",
-              "calculatedParameter": "calculated", "local": "calculated"},
-    "tunable": {"structuralParameter": "exact", "parameter": "exact",
-                "calculatedParameter": "calculated", "local": "calculated"},
-    "discrete": {"input": "exact", "output": "calculated", "local": "calculated"},
-    "continuous": {"input": "exact", "output": "calculated", "local": "calculated",
-                   "independent": ""},
-}  # fmt: skip
-"""Initial by variability and causality where it is not given; both tables of FMI agree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +70,7 @@ class Declared:
     @cached_property
     def initial(self) -> str:
         """With FMI's default filled in; "" where there is none."""
-        given = self.outer.get("initial")
-        return given or _DEFAULT_INITIAL.get(self.variability, {}).get(self.causality, "")
+        return initial_of(self.outer.get("initial"), self.causality, self.variability)
 
     @property
     def start(self) -> str | None:
