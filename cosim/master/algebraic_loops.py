@@ -17,6 +17,7 @@ import numpy as np
 from ..system import feedthrough
 from ..system.system import System
 from .extrapolation import smooth
+from .newton import single
 from .plan import Layout, Loop, Op, exchange, operations
 
 Rows = list[tuple[int, ...]]
@@ -76,7 +77,12 @@ def _cut(system: System, layout: Layout, members: set[str], path: list[str]) -> 
     rows: Rows = []
     for name in order:
         rows += [*exchange(layout, position[name]), (Op.GET, position[name])]
-    return Loop(np.array(sources, dtype=np.int64), operations(rows), system.explain_loop(path))
+    return Loop(
+        np.array(sources, dtype=np.int64),
+        operations(rows),
+        system.explain_loop(path),
+        single(system, members),
+    )
 
 
 def consistent(

@@ -15,12 +15,12 @@ SWEEPS = 100
 """Exchanges during initialization before a loop is said not to settle."""
 SETTLED = 1e-12
 """Relative change at which an algebraic loop counts as settled during initialization."""
-LOOPED = 1e-9
-"""The same where loops are solved: they are to 1e-10, and other outputs follow from them."""
+LOOPED = 10.0
+"""The same where loops are solved, in what they are solved to: other outputs follow from them."""
 PATIENCE = 25
 """Exchanges before algebraic loops are solved by Newton's method during initialization."""
 RUNAWAY = 1e12
-"""Size of a value from which on exchanges are given up."""
+"""Size of a loop's value from which on plain exchange is given up for Newton's method."""
 
 
 def initialize(run: Interpreter) -> None:
@@ -42,7 +42,8 @@ def initialize(run: Interpreter) -> None:
         run.values[:] = begin
         _exchange(run, sweep, 1, SETTLED)
         # outputs without feedthrough may follow inputs here, too: their initial states do
-        settled, change = _exchange(run, sweep + decoded(run.plan.solving), SWEEPS, LOOPED)
+        looped = LOOPED * max(newton.tolerance for newton in run.newtons)
+        settled, change = _exchange(run, sweep + decoded(run.plan.solving), SWEEPS, looped)
         for index in range(len(run.instances)):
             run.do(Op.COPY, *run.layout.copies[index].tolist())
             run.do(Op.SET, index, 0)
@@ -58,31 +59,43 @@ def initialize(run: Interpreter) -> None:
 def _exchange(
     run: Interpreter, sweep: list[tuple[Op, int, int]], sweeps: int, tolerance: float
 ) -> tuple[bool, Vector]:
-    """Exchange connected values until nothing changes: whether they settled, last change."""
-    before, floors = np.full_like(run.values, np.nan), floor(run.system, run.layout.names)
-    change, size = before, np.ones_like(before)
-    for _ in range(sweeps):
+    """Exchange connected values until nothing changes: whether they settled, last change.
+
+    Other values, such as those that are recorded alone, have no part in it: nothing follows from
+    them. Their changes are 0.
+    """
+    layout = run.layout
+    exchanged = np.unique(np.concatenate([layout.copy_source, layout.copy_target]))
+    looped = np.isin(exchanged, [slot for loop in run.plan.loops for slot in loop.sources])
+    floors = floor(run.system, (layout.names[slot] for slot in exchanged))
+    changes, before = np.zeros_like(run.values), np.full(exchanged.size, np.nan)
+    for number in range(sweeps):
         for op, a, b in sweep:
             run.do(op, a, b)
-        if np.array_equal(before, run.values):
-            return True, change
-        change, size = np.abs(run.values - before), np.maximum(np.abs(run.values), floors)
-        before = run.values.copy()
-        if tolerance > SETTLED and bool(np.all(change <= tolerance * size)):
-            return True, change
-        if run.newtons and np.any(size > RUNAWAY):
-            return False, change
-    return bool(np.all(change <= tolerance * size)), change
+        now = run.values[exchanged]
+        same = (now == before) | (np.isnan(now) & np.isnan(before))
+        with np.errstate(invalid="ignore"):
+            change = np.where(same, 0.0, np.abs(now - before))
+        size, before = np.maximum(np.abs(now), floors), now
+        changes[exchanged] = change
+        close = same if tolerance <= SETTLED else same | (change <= tolerance * size)
+        if number and bool(np.all(close)):
+            return True, changes
+        if run.newtons and tolerance <= SETTLED and np.any(size[looped] > RUNAWAY):
+            return False, changes
+    return bool(np.all(same | (change <= tolerance * size))), changes
 
 
 def _unsettled(run: Interpreter, change: Vector) -> str:
     system = run.system
-    worst = int(np.nanargmax(change)) if np.any(np.isfinite(change)) else 0
+    odd = np.flatnonzero(~np.isfinite(change))
+    worst = int(odd[0]) if odd.size else int(np.argmax(change))
+    name, value = run.layout.names[worst], run.values[worst]
     loops = system.algebraic_loops()
     text = (
         f"{system.name}: initial values do not settle in {SWEEPS} exchanges at "
-        f"t = {run.times[0]:.9g} s; {run.layout.names[worst]} still changes by "
-        f"{change[worst]:.3g}"
+        f"t = {run.times[0]:.9g} s; {name} "
+        + (f"is {value}" if odd.size else f"still changes by {change[worst]:.3g}")
     )
     for loop in loops:
         text += "\nalgebraic loop:\n" + system.explain_loop(loop)

@@ -116,7 +116,7 @@ class Interpreter:
         self.bond_turnover = np.zeros(len(self.layout.bonds))
         self.previous: list[float] = [0.0] * len(self.layout.bond_output)
         floors = floor(self.system, self.layout.names)
-        self.newtons = [Newton(floors[loop.sources]) for loop in self.plan.loops]
+        self.newtons = [Newton(floors[loop.sources], loop.single) for loop in self.plan.loops]
         self.history = np.zeros((4, len(self.plan.means)))
         self.past = np.zeros(1, dtype=np.int64)
         self.derivatives = InputDerivatives(self.plan, self.instances, self.values)

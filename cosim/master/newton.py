@@ -25,6 +25,14 @@ CONTRACTION = 0.25
 """The Jacobian is renewed when a Newton step is longer than this times the one before."""
 INCREMENT = 1e-6
 """Of differences, relative to max(floor, |z|)."""
+SETTLED_SINGLE, INCREMENT_SINGLE = 1e-6, 1e-3
+"""The same two where a value is a Float32, which carries 6e-8: more than ten times that, for what a
+loop makes of its rounding, and differences that are large beside it."""
+
+
+def single(system: System, names: Iterable[str]) -> bool:
+    """Whether one of these variables is a Float32."""
+    return any(system.declaration(name).type == "Float32" for name in names)
 
 
 def floor(system: System, names: Iterable[str]) -> Vector:
@@ -37,15 +45,18 @@ class Newton:
 
     Args:
         floor: size of each unknown below which errors are not relative: see `floor`.
-        tolerance: relative error.
+        single: whether a value is a Float32.
+        tolerance: relative error; of what is `single` not less than its resolution allows.
 
     Attributes:
         inverse: n x n.
         valid: one number, whether `inverse` is good for anything.
     """
 
-    def __init__(self, floor: Vector, tolerance: float = SETTLED) -> None:
-        self.n, self.floor, self.tolerance = floor.size, floor, tolerance
+    def __init__(self, floor: Vector, single: bool, tolerance: float = SETTLED) -> None:
+        self.n, self.floor = floor.size, floor
+        self.tolerance = max(tolerance, SETTLED_SINGLE) if single else tolerance
+        self.increment = INCREMENT_SINGLE if single else INCREMENT
         self.inverse = np.zeros((self.n, self.n))
         self.valid = np.zeros(1, dtype=np.int64)
 
@@ -109,7 +120,7 @@ class Newton:
         matrix = [[0.0] * n for _ in range(n)]
         for j in range(n):
             moved = list(z)
-            increment = INCREMENT * max(float(self.floor[j]), abs(z[j]))
+            increment = self.increment * max(float(self.floor[j]), abs(z[j]))
             moved[j] += increment
             there = function(moved)
             for i in range(n):

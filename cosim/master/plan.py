@@ -98,11 +98,13 @@ class Loop:
         sources: slots of the outputs at which it is cut, the unknowns.
         sweep: operations that pass on their values once around the loop and fetch them again.
         text: the loop port by port.
+        single: whether a value of it is a Float32.
     """
 
     sources: Integers
     sweep: Integers
     text: str
+    single: bool
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ step, then has no slip from half of the step's change of velocity, and its own s
 The first guess is that values change as in the step before.
 
 Options:
-    tolerance: relative change of exchanged values at which a step counts as settled.
+    tolerance: relative change of exchanged values at which a step counts as settled; 1e-6 at least
+        where one of them is a Float32.
     interpolation: 0: inputs are held at their mean; 1: they move from begin to end where they can.
 
 Source: Kübler and Schiehlen, Two methods of simulator coupling, 2000 (iteration); Busch, Continuous
@@ -36,7 +37,7 @@ from ..algebraic_loops import consistent, find_loops
 from ..extrapolation import means, set_derivatives, smooth
 from ..interpreter import Interpreter
 from ..kernel.programs import Programs
-from ..newton import Newton, floor
+from ..newton import Newton, floor, single
 from ..options import positive, refuse_without_states
 from ..plan import Op, Plan, final_operations, initial_sweep, lay_out, operations
 from ..rollback import Checkpoint
@@ -98,10 +99,12 @@ class Iterated:
     looks_ahead = False
 
     def __init__(self, run: Interpreter, tolerance: float, smooth: NDArray[np.bool_]) -> None:
-        self.run, self.tolerance = run, tolerance
+        self.run = run
         self.sources = np.unique(run.layout.copy_source[smooth])
         names = [run.layout.names[slot] for slot in self.sources]
-        self.newton = Newton(floor(run.system, names), tolerance)
+        both = [*names, *(run.layout.names[slot] for slot in run.layout.copy_target[smooth])]
+        self.newton = Newton(floor(run.system, names), single(run.system, both), tolerance)
+        self.tolerance = self.newton.tolerance
         everyone = range(len(run.instances))
         ends = operations([(op, index) for op in (Op.SET, Op.GET) for index in everyone])
         self.programs = Programs(run, run.plan.solving, run.plan.step, ends)

@@ -239,6 +239,8 @@ class Kernel:
                     self._array(newton.valid),
                     self._array(newton.floor),
                     self._array(np.zeros(5 * newton.n + 2 * newton.n**2)),
+                    newton.tolerance,
+                    newton.increment,
                     newton.n,
                     first,
                     len(instructions),

@@ -1,12 +1,10 @@
-/* Solves algebraic loops by Newton's method, like `Newton` in cosim/master/algebraic_loops.py.
+/* Solves algebraic loops by Newton's method, like `Newton` in cosim/master/newton.py.
 
    A part of kernel.c, which includes it: a sweep around a loop executes instructions, and one of
    the instructions solves a loop. */
 
-enum { ITERATIONS = 60 }; /* these four as in cosim/master/algebraic_loops.py */
-#define SETTLED 1e-10
+enum { ITERATIONS = 60 }; /* these two as in cosim/master/newton.py */
 #define CONTRACTION 0.25
-#define INCREMENT 1e-6
 
 static int execute(Run *run, int64_t first, int64_t last);
 
@@ -49,7 +47,7 @@ static int difference(Run *run, const Loop *loop, const double *z, const double 
                       double *rows) {
   const int64_t n = loop->n;
   for (int64_t j = 0; j < n; j++) {
-    const double increment = INCREMENT * larger(loop->floor[j], fabs(z[j]));
+    const double increment = loop->increment * larger(loop->floor[j], fabs(z[j]));
     for (int64_t i = 0; i < n; i++) moved[i] = z[i];
     moved[j] += increment;
     const int status = sweep(run, loop, moved, there);
@@ -93,7 +91,7 @@ static int solve(Run *run, const Loop *loop) {
     const int renewed = !*loop->valid;
     if (renewed && (status = difference(run, loop, z, value, moved, there, rows)) > 1) return status;
     double size = newton_step(loop, z, value, change);
-    if (size <= SETTLED && !renewed) {
+    if (size <= loop->tolerance && !renewed) {
       for (int64_t i = 0; i < n; i++) run->values[loop->sources[i]] = z[i];
       return 0;
     }

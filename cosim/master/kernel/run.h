@@ -86,6 +86,8 @@ typedef struct {
   int64_t *valid;            /* whether it is good for anything */
   const double *floor;       /* size of each unknown below which errors are not relative */
   double *work;              /* 5 n + 2 n n numbers */
+  double tolerance;          /* relative change of z at which it counts as solved */
+  double increment;          /* of differences, relative, too */
   int64_t n, first, last;    /* instructions of a sweep */
 } Loop;
 

@@ -56,7 +56,7 @@ class Loop(ct.Structure):
 
     _fields_ = (
         ("sources", P), ("inverse", P), ("valid", P), ("floor", P), ("work", P),
-        ("n", I64), ("first", I64), ("last", I64),
+        ("tolerance", D), ("increment", D), ("n", I64), ("first", I64), ("last", I64),
     )  # fmt: skip
 
 
