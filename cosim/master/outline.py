@@ -179,7 +179,7 @@ class Outline:
                     "file": member.fmu.path.name,
                     "sha256": member.fmu.digest,
                     "tool": member.description.tool,
-                    "parameters": dict(member.parameters),
+                    "parameters": {k: _plain(v) for k, v in member.parameters.items()},
                 }
                 for member in self.system.members.values()
             },
@@ -195,4 +195,9 @@ def _column(type_: str, items: Sequence[Any]) -> NDArray[Any]:
 
 
 def _plain(value: Any) -> Any:
+    """A value as files of recordings take it: bytes as hexadecimal digits."""
+    if isinstance(value, bytes):
+        return value.hex()
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
     return dict(value) if isinstance(value, Mapping) else value

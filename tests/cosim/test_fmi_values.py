@@ -278,6 +278,11 @@ def test_bytes(tmp_path: Path) -> None:
     assert "00ff00" in recording.write_csv(tmp_path / "r.csv").read_text()
     with pytest.raises(ValueRangeError, match="neither bytes nor a string of hexadecimal digits"):
         short(system, inputs={"a.u": "xyz"})
+    system.set("a.u", "0a0b")  # a parameter or start value goes into the file's provenance
+    empty = short(system, record=[])
+    for path in (empty.write_npz(tmp_path / "r.npz"), empty.write_parquet(tmp_path / "r.parquet")):
+        found = read_recording(path).provenance["instances"]["a"]
+        assert found["parameters"] == {"u": "0a0b"}
 
 
 def mode(folder: Path, fmi: int) -> Path:
