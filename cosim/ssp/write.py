@@ -261,21 +261,22 @@ class _Writer:
         yield "      </ssd:Component>"
 
     def exposed(self, member: Member) -> list[Variable]:
-        """Outputs and connected inputs.
+        """Outputs and connected inputs; of texts and bytes connected outputs only.
 
         Open inputs are no connectors: FMPy wires an unconnected one to whatever came before it.
         """
-        found = []
+        found, sources = [], {wire.source for wire in self.system.connections}
         for variable in member.description.variables.values():
-            carried = variable.type in TYPES and variable.type not in ("String", "Binary")
-            if not carried or variable.causality not in ("input", "output"):
+            if variable.type not in TYPES or variable.causality not in ("input", "output"):
                 continue
             full = [f"{member.name}.{element}" for element in variable.elements()]
             wired = any(self.system.driver(name) is not None for name in full)
-            if variable.causality == "input" and not wired:
+            taken = not sources.isdisjoint(full)
+            text = variable.type in ("String", "Binary")
+            if (variable.causality == "input" and not wired) or (text and not (wired or taken)):
                 continue
             if variable.dimensions and self.version == "1.0":
-                if wired or any(c.source in full for c in self.system.connections):
+                if wired or taken:
                     raise GraphError(
                         f"{member.name}.{variable.name} is an array, which SSP 1.0 cannot connect; "
                         "write version 2.0"

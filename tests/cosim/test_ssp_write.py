@@ -15,6 +15,7 @@ from cosim import Constant, Function, Master, System, Table, ssp
 from cosim.errors import GraphError, InputError, ScenarioError, UnitError
 from tests.cosim_fmus import rewrite
 from tests.fmus import fmu
+from tests.tiny_fmus import V, tiny
 
 STEP = 1e-3
 
@@ -89,6 +90,30 @@ def test_files_are_valid(tmp_path: Path, version: str, fmi: int) -> None:
                 assert checker.validate(etree.fromstring(archive.read(name))), checker.error_log
         kinds = {Path(name).suffix for name in archive.namelist()}
     assert kinds == {".ssd", ".ssv", ".fmu"}
+
+
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_connected_texts_and_bytes_have_connectors(tmp_path: Path, version: str) -> None:
+    ends = [V("s", "String", "output"), V("b", "Binary", "output"), V("t", "String", "output")]
+    giver = tiny(tmp_path, ends, 'strcpy(v->s[0], "hi"); v->s[1][0] = 7; v->length[1] = 1;')
+    takes = [
+        V("s", "String", "input", ""),
+        V("b", "Binary", "input", ""),
+        V("y", "Float64", "output"),
+    ]
+    taker = tiny(tmp_path, takes, "v->r[2][0] = v->s[0][1] + v->s[1][0];", name="n")
+    system = System("texts")
+    system.add("a", str(giver))
+    system.add("b", str(taker))
+    system.connect("a.s", "b.s")
+    system.connect("a.b", "b.b")
+    path = ssp.write(system, tmp_path / "texts.ssp", version=version)
+    with zipfile.ZipFile(path) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    assert schema(version, "Description").validate(root)
+    declared = [item.get("name") for item in root.iterfind(".//{*}Connector")]
+    assert declared == ["s", "b", "s", "b", "y"]  # a.t feeds nothing
+    assert Master(ssp.read(path), step=0.1).run(0.1)["b.y"][-1] == ord("i") + 7
 
 
 def test_a_wrong_file_is_not_valid(tmp_path: Path) -> None:
