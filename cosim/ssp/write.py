@@ -261,19 +261,22 @@ class _Writer:
         yield "      </ssd:Component>"
 
     def exposed(self, member: Member) -> list[Variable]:
-        """Outputs and connected inputs; of texts and bytes connected outputs only.
+        """Outputs and connected inputs; calculated parameters, texts and bytes if connected.
 
         Open inputs are no connectors: FMPy wires an unconnected one to whatever came before it.
         """
         found, sources = [], {wire.source for wire in self.system.connections}
         for variable in member.description.variables.values():
-            if variable.type not in TYPES or variable.causality not in ("input", "output"):
+            causality = variable.causality
+            if variable.type not in TYPES or causality not in (
+                "input", "output", "calculatedParameter",
+            ):  # fmt: skip
                 continue
             full = [f"{member.name}.{element}" for element in variable.elements()]
             wired = any(self.system.driver(name) is not None for name in full)
             taken = not sources.isdisjoint(full)
-            text = variable.type in ("String", "Binary")
-            if (variable.causality == "input" and not wired) or (text and not (wired or taken)):
+            always = causality == "output" and variable.type not in ("String", "Binary")
+            if not (always or wired or taken):
                 continue
             if variable.dimensions and self.version == "1.0":
                 if wired or taken:

@@ -42,6 +42,8 @@ def need_settable(where: str, instance: str, variables: Iterable[Variable]) -> N
 def need_end(what: str, owner: tuple[str, str], variables: Iterable[Variable], wanted: str) -> None:
     """Refuse variables that cannot be the end `wanted` (`output` or `input`) of a connection.
 
+    A calculated parameter is an output, too, which changes with what it is calculated from.
+
     Args:
         what: is refused, for the error text.
         owner: name and reference of the instance.
@@ -52,7 +54,8 @@ def need_end(what: str, owner: tuple[str, str], variables: Iterable[Variable], w
         ConnectError: an element is something else.
     """
     for variable in variables:
-        if variable.causality != wanted:
+        calculated = wanted == "output" and variable.causality == "calculatedParameter"
+        if variable.causality != wanted and not calculated:
             raise ConnectError(
                 f"{what}: {owner[0]}.{variable.name} is {_article(variable.causality)} of "
                 f"{owner[1]}, not an {wanted}; write the output first"

@@ -116,6 +116,25 @@ def test_connected_texts_and_bytes_have_connectors(tmp_path: Path, version: str)
     assert Master(ssp.read(path), step=0.1).run(0.1)["b.y"][-1] == ord("i") + 7
 
 
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_calculated_parameters_are_connected(tmp_path: Path, version: str) -> None:
+    ends = [V("k", "Float64", "parameter", "1"), V("c", "Float64", "calculatedParameter"),
+            V("d", "Float64", "calculatedParameter")]  # fmt: skip
+    system = System("calculated")
+    system.add("a", str(tiny(tmp_path, ends, "v->r[1][0] = 2 * v->r[0][0];")), {"k": 3.0})
+    ends = [V("u", "Float64", "input", "0"), V("y", "Float64", "output")]
+    system.add("b", str(tiny(tmp_path, ends, "v->r[1][0] = v->r[0][0];", name="n")))
+    system.connect("a.c", "b.u")
+    path = ssp.write(system, tmp_path / "calculated.ssp", version=version)
+    with zipfile.ZipFile(path) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    assert schema(version, "Description").validate(root)
+    declared = [(item.get("name"), item.get("kind")) for item in root.iterfind(".//{*}Connector")]
+    assert declared == [("c", "calculatedParameter"), ("u", "input"), ("y", "output")]
+    for each in (system, ssp.read(path)):
+        assert Master(each, step=0.1).run(0.1)["b.y"].tolist() == [6.0, 6.0]
+
+
 def test_a_wrong_file_is_not_valid(tmp_path: Path) -> None:
     path = ssp.write(bench(), tmp_path / "bench.ssp")
     with zipfile.ZipFile(path) as archive:
