@@ -109,6 +109,11 @@ def convert_reference(recording: Recording, reference: Reference) -> Vector:
     return reference.values * gain + offset
 
 
+def _span(times: Vector) -> str:
+    known = times[np.isfinite(times)]
+    return f"; they are at {known.min():.12g} s to {known.max():.12g} s" if known.size else ""
+
+
 def compare(recording: Recording, reference: Reference) -> Comparison:
     """Compare a signal, or a path, with a reference.
 
@@ -131,7 +136,7 @@ def compare(recording: Recording, reference: Reference) -> Comparison:
     if not times.size:
         raise ValueRangeError(
             f"{reference.text}: no sample lies within the recording of {reference.name} "
-            f"({recording.time[0]:g} s to {recording.time[-1]:g} s)"
+            f"({recording.time[0]:g} s to {recording.time[-1]:g} s){_span(reference.times)}"
         )
     apart = [
         np.interp(times, recording.time, recording[name]) - values[inside, column]

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ScenarioError, UnknownNameError, listing, within
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import is_file, read_toml
+from ..spec.units import conversion, parse
 from .arrays import matlab_table, npz_table, parquet_table
 from .cells import Gaps
 from .text import text_table
@@ -85,6 +86,22 @@ class Log:
     def time(self) -> Vector:
         """Sample times [s]."""
         return self["time"]
+
+    def seconds(self, clock: str) -> Vector:
+        """A clock of the log as it was read [s]: its unit and origin are taken in.
+
+        Raises:
+            UnitError: its unit is no time.
+        """
+        values, unit = self[clock], self.units.get(clock, "")
+        try:
+            gain, _ = conversion(parse(unit or "s"), parse("s"))
+        except UnitError as error:
+            raise UnitError(
+                f"{self.name}: clock {clock!r} is in {unit!r}, which is no time ({error}); name "
+                "another column with time"
+            ) from None
+        return values * gain + self.origins.get(clock, 0) * gain
 
 
 READERS = {

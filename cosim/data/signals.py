@@ -189,8 +189,9 @@ class Table:
                 after += max(usual, float(intervals[-1]))
             if times[0] < first - before or times[-1] > last + after:
                 raise ValueRangeError(
-                    f"{self.text}: covers {first:.9g} s to {last:.9g} s, but the run needs "
-                    f"{times[0]:.9g} s to {times[-1]:.9g} s; shorten the run or extend the table"
+                    f"{self.text}: covers {first:.12g} s to {last:.12g} s, but the run needs "
+                    f"{times[0]:.12g} s to {times[-1]:.12g} s; shorten the run, start it where the "
+                    "table starts, or extend the table"
                 )
         return clock
 

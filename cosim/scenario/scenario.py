@@ -372,7 +372,7 @@ class _Reader:
         log = self.log(entry)
         unit = entry.get("unit", log.units.get(column, ""))
         text = f"{log.name}:{column}"
-        times = log[str(entry.get("time", "time"))]
+        times = log.seconds(str(entry.get("time", "time")))
         if exact and column in log.exact:
             return times, log.exact[column], unit, text
         values = log[column]

@@ -1,0 +1,87 @@
+"""Where scenarios take inputs and references from: clocks, holds, units, kinds of values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.errors import InputError
+from cosim.running.runner import RunResult, run
+from tests.tiny_fmus import V, tiny
+
+PASS = [V("u", "Float64", "input", "0"), V("y", "Float64", "output")]
+"""Its output is its input."""
+
+
+def ran(folder: Path, text: str, base: str = "duration = 1.0\nstep = 0.1\n") -> RunResult:
+    """Run a scenario of one instance `a` of the FMU `m`."""
+    (folder / "s.toml").write_text('[instances]\na = "m.fmu"\n')
+    (folder / "c.toml").write_text(f'system = "s.toml"\n{base}{text}')
+    return next(iter(run(str(folder / "c.toml")).runs.values()))
+
+
+@pytest.fixture
+def passing(tmp_path: Path) -> Path:
+    tiny(tmp_path, PASS, "v->r[1][0] = v->r[0][0];")
+    return tmp_path
+
+
+# -- clocks --------------------------------------------------------------------------------------
+
+FROM_LOG = """
+record = { signals = ["a.u"] }
+inputs."a.u" = { file = "FILE", column = "u", interpolation = "linear" }
+compare.c = { signal = "a.u", file = "FILE", column = "u" }
+"""
+
+
+def log(folder: Path, kind: str) -> str:
+    """A log of u = t over one second, whose clock does not count seconds; its name."""
+    u, tenths = 0.1 * np.arange(11), np.arange(11)
+    if kind.startswith("time"):
+        one = {"ms": 100.0, "us": 1e5, "min": 1 / 600}[kind[6:-1]]
+        rows = "".join(f"{one * i!r},{0.1 * i!r}\n" for i in range(11))
+        (folder / "log.csv").write_text(f"{kind},u\n{rows}")
+        return "log.csv"
+    if kind == "npz":
+        np.savez(folder / "log.npz", time=(100 * tenths).astype("timedelta64[ms]"), u=u)
+        return "log.npz"
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    times = pa.array((100_000_000 * tenths).astype("int64"), pa.duration("ns"))
+    pq.write_table(pa.table({"time": times, "u": u}), folder / "log.parquet")
+    return "log.parquet"
+
+
+@pytest.mark.parametrize("kind", ["time [ms]", "time [us]", "time [min]", "npz", "parquet"])
+def test_the_unit_of_a_clock_is_taken_in(kind: str, passing: Path) -> None:
+    result = ran(passing, FROM_LOG.replace("FILE", log(passing, kind)))
+    recording: Recording = result.recording
+    assert recording["a.u"] == pytest.approx(recording.time, abs=1e-12)  # roundings of ten steps
+    assert result.comparisons["c"].count == 11
+    assert result.comparisons["c"].max == pytest.approx(0.0, abs=1e-12)
+
+
+def test_stamps_since_1970_keep_their_origin(passing: Path) -> None:
+    begin = 1_700_000_000
+    rows = "".join(f"{(begin * 10 + i) * 100_000_000},{0.1 * i!r}\n" for i in range(11))
+    (passing / "log.csv").write_text(f"time [ns],u\n{rows}")
+    text = FROM_LOG.replace("FILE", "log.csv")
+    with pytest.raises(InputError, match=r"covers 1700000000 s to 1700000001 s, .* start it where"):
+        ran(passing, text)
+    with pytest.raises(InputError, match=r"no sample lies .*they are at 1700000000 s"):
+        ran(passing, text[text.index("compare") :])
+    result = ran(passing, f"start = {begin}\n{text}")
+    late = result.recording["a.u"] - (result.recording.time - begin)
+    assert abs(late).max() < 1e-6  # a double of 1.7e9 s has steps of 2.4e-7 s
+    assert result.comparisons["c"].count == 11
+
+
+def test_a_clock_that_is_no_time_is_refused(passing: Path) -> None:
+    (passing / "log.csv").write_text("time [m],u\n0,0\n1,1\n")
+    with pytest.raises(InputError, match="clock 'time' is in 'm', which is no time"):
+        ran(passing, FROM_LOG.replace("FILE", "log.csv"))
