@@ -15,9 +15,12 @@ from ..errors import ValueRangeError
 
 Vector = NDArray[np.float64]
 CLOCK = 1e-3
-"""Fraction of a sample interval within which two times are the same: logs keep sample times
-rounded (often to 32 bits), so a sample may seem to come just after the communication point that it
-belongs to."""
+"""Fraction of the shorter of the intervals beside a sample within which two times are the same:
+logs keep sample times rounded (often to 32 bits), so a sample may seem to come just after the
+communication point that it belongs to."""
+EARLY = 0.1
+"""Nor is it more than this part of a communication step: commands that are logged when they change
+may stand for minutes. What is taken early by so little is nearer to its time than a step later."""
 EXACT = 1e-9
 """The same for tables that are held beyond their ends [s]: they are written, not logged, and may
 have long intervals; only communication points carry rounding."""
@@ -156,11 +159,11 @@ class Table:
         Raises:
             ValueRangeError: outside the table (without `extend`).
         """
-        clock = self._check(times)
+        self._check(times)
         found: Vector = (
             np.interp(times, self.times, self.values)
             if self.interpolation == "linear"
-            else self.values[self._held(times, clock)]
+            else self.values[self._held(times)]
         )
         return found
 
@@ -168,32 +171,35 @@ class Table:
         """Values at these times, exact integers and texts as they are; none if doubles do."""
         if not self._objects:
             return []
-        return [self._objects[i] for i in self._held(times, self._check(times)).tolist()]
+        self._check(times)
+        return [self._objects[i] for i in self._held(times).tolist()]
 
-    def _held(self, times: Vector, clock: float) -> NDArray[np.intp]:
-        index = np.searchsorted(self.times, times + clock, side="right") - 1
+    def _held(self, times: Vector) -> NDArray[np.intp]:
+        intervals = np.append(np.append(np.inf, np.diff(self.times)), np.inf)
+        most = EXACT if self.extend else np.inf
+        if times.size > 1:
+            most = min(most, EARLY * float(np.min(np.diff(times))))
+        early = np.minimum(CLOCK * np.minimum(intervals[:-1], intervals[1:]), most)
+        early[~np.isfinite(early)] = 0.0  # a single sample
+        index = np.searchsorted(self.times - early, times, side="right") - 1
         return np.maximum(index, 0)
 
-    def _check(self, times: Vector) -> float:
-        """Refuse times outside; the distance within which two times are the same [s]."""
-        intervals = np.diff(self.times)
-        clock = CLOCK * float(np.median(intervals)) if intervals.size else 0.0
-        if self.extend:
-            clock = min(clock, EXACT)
+    def _check(self, times: Vector) -> None:
+        """Refuse times outside."""
         if not self.extend and times.size:
             first, last = self.times[0], self.times[-1]
-            before = after = clock
+            intervals = np.diff(self.times)
+            before = after = 0.0
             if intervals.size:
                 usual = min(float(np.max(intervals)), PAUSE * float(np.median(intervals)))
-                before += max(usual, float(intervals[0]))
-                after += max(usual, float(intervals[-1]))
+                before = (1.0 + CLOCK) * max(usual, float(intervals[0]))
+                after = (1.0 + CLOCK) * max(usual, float(intervals[-1]))
             if times[0] < first - before or times[-1] > last + after:
                 raise ValueRangeError(
                     f"{self.text}: covers {first:.12g} s to {last:.12g} s, but the run needs "
                     f"{times[0]:.12g} s to {times[-1]:.12g} s; shorten the run, start it where the "
                     "table starts, or extend the table"
                 )
-        return clock
 
 
 class Shifted:

@@ -85,3 +85,17 @@ def test_a_clock_that_is_no_time_is_refused(passing: Path) -> None:
     (passing / "log.csv").write_text("time [m],u\n0,0\n1,1\n")
     with pytest.raises(InputError, match="clock 'time' is in 'm', which is no time"):
         ran(passing, FROM_LOG.replace("FILE", "log.csv"))
+
+
+# -- what is held --------------------------------------------------------------------------------
+
+
+def test_commands_that_are_logged_when_they_change_do_not_come_early(passing: Path) -> None:
+    times = [0.0, 10.0, 20.0, 20.004, 20.008, 30.0, 40.0]
+    values = [0.0, 1.0, 0.0, 5.0, 0.0, 1.0, 0.0]
+    rows = "".join(f"{t},{v}\n" for t, v in zip(times, values, strict=True))
+    (passing / "log.csv").write_text(f"time,u\n{rows}")
+    text = 'inputs."a.u" = { file = "log.csv", column = "u" }\nrecord = { signals = ["a.u"] }\n'
+    recording = ran(passing, text, "duration = 40.0\nstep = 1e-3\n").recording
+    changes = np.flatnonzero(np.diff(recording["a.u"])) + 1
+    assert changes.tolist() == [10_000, 20_000, 20_004, 20_008, 30_000, 40_000]
