@@ -13,6 +13,9 @@ from ..spec.units import conversion, parse
 from .recording import Recording
 
 Vector = NDArray[np.float64]
+ROUNDING = 1e-9
+"""[s] Sample times, ends of windows and k * h differ by so much, or by four units in the last place
+of large times: a product and a sum on either side."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,12 @@ def convert_reference(recording: Recording, reference: Reference) -> Vector:
     return reference.values * gain + offset
 
 
+def within(times: Vector, first: float, last: float) -> NDArray[np.bool_]:
+    """Which times lie between two, both of them taken in."""
+    margin = ROUNDING + 4.0 * np.spacing(np.abs(times))
+    return np.asarray((times >= first - margin) & (times <= last + margin))
+
+
 def _span(times: Vector) -> str:
     known = times[np.isfinite(times)]
     return f"; they are at {known.min():.12g} s to {known.max():.12g} s" if known.size else ""
@@ -126,12 +135,8 @@ def compare(recording: Recording, reference: Reference) -> Comparison:
         ValueRangeError: no sample of the reference lies within the recording.
     """
     values = convert_reference(recording, reference)
-    margin = 1e-9  # sample times and k * h differ by rounding
-    inside = (
-        np.isfinite(values).all(axis=1)
-        & (reference.times >= recording.time[0] - margin)
-        & (reference.times <= recording.time[-1] + margin)
-    )
+    covered = within(reference.times, recording.time[0], recording.time[-1])
+    inside = np.isfinite(values).all(axis=1) & covered
     times = reference.times[inside]
     if not times.size:
         raise ValueRangeError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.comparison import Comparison, Reference, convert_reference
+from ..data.comparison import Comparison, Reference, convert_reference, within
 from ..data.recording import Recording
 from ..display.literal import literal
 from ..errors import UnknownNameError
@@ -124,7 +124,7 @@ def _label(text: str, unit: str) -> str:
 
 
 def _window(item: Axes, times: Vector) -> NDArray[np.bool_]:
-    return (times >= item.after) & (times <= item.before)
+    return within(times, item.after, item.before)
 
 
 def _reference(references: Sequence[Reference], signals: tuple[str, ...]) -> Reference | None:

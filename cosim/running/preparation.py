@@ -7,7 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ..arguments import need_texts
+from ..data.comparison import within
 from ..errors import UnknownNameError, ValueRangeError
 from ..files import overlay
 from ..scenario.scenario import Scenario
@@ -67,7 +70,7 @@ def left_out(system: System, changed: set[str]) -> list[str]:
 def recorded_signals(
     scenario: Scenario, system: System, changed: set[str]
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Signals to record, and notes on what a changed variant does not have."""
+    """Signals to record, and notes on what is not: a changed variant has none, or the end."""
     needed = [name for item in scenario.references.values() for name in item.signals]
     drawn = [*scenario.plots, *(axes for figure in scenario.figures for axes in figure.plots)]
     shown = [*(scenario.plot or ()), *(name for axes in drawn for name in axes.needs)]
@@ -88,13 +91,20 @@ def recorded_signals(
 
     kept = list(filter(has, (*everything, *scenario.also, *shown)))
     checked = filter(has, (name for check in scenario.checks for name in check.needs))
+    every = recording_interval(scenario)
+    if beyond := round(scenario.duration / scenario.step) % every if scenario.step > 0.0 else 0:
+        last = scenario.start + scenario.duration - beyond * scenario.step
+        notes.append(
+            f"the last recorded point is at {last:.9g} s: {scenario.duration:.9g} s is not a whole "
+            f"number of record periods of {every * scenario.step:.9g} s"
+        )
     return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
 
 
 def shortened(scenario: Scenario, duration: float) -> Scenario:
     """A shorter run keeps the checks whose time window it reaches; others need the whole run."""
-    end = scenario.start + duration
-    kept = tuple(check for check in scenario.checks if check.before <= end)
+    end = np.array([scenario.start + duration])
+    kept = tuple(check for check in scenario.checks if within(end, check.before, np.inf).all())
     return replace(scenario, duration=duration, checks=kept)
 
 
@@ -114,7 +124,7 @@ def adjusted(
     Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
     does not reach.
     """
-    for what, value in (("step", step), ("duration", duration), ("record period", record_period)):
+    for what, value in (("step", step), ("record period", record_period)):
         if value is not None and not 0.0 < value < math.inf:
             raise ValueRangeError(f"{item.name}: {what} {value:g} s: must be a positive number")
     need_texts("signals to record", record, 'record=["motor.i"]')

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.comparison import Comparison, Reference
+from ..data.comparison import Comparison, Reference, within
 from ..data.recording import Recording
 from ..errors import ValueRangeError
 from ..system.variants import change
@@ -225,14 +225,14 @@ def _measure(
 ) -> tuple[float, str]:
     if check.comparison:
         comparison = comparisons[check.comparison]
-        inside = (comparison.times >= check.after) & (comparison.times <= check.before)
+        inside = within(comparison.times, check.after, check.before)
         _some(check, inside)
         differences = comparison.differences[inside]
         value = np.sqrt(np.mean(differences**2)) if check.of == "rms" else np.max(abs(differences))
         return float(value), comparison.unit
     if check.of == "energy_residual":
         return abs(recording.energy_residual), "J"
-    inside = (recording.time >= check.after) & (recording.time <= check.before)
+    inside = within(recording.time, check.after, check.before)
     _some(check, inside)
     columns = [_exact(recording[name][inside]) for name in check.signals]
     if check.minus:

@@ -99,3 +99,32 @@ def test_commands_that_are_logged_when_they_change_do_not_come_early(passing: Pa
     recording = ran(passing, text, "duration = 40.0\nstep = 1e-3\n").recording
     changes = np.flatnonzero(np.diff(recording["a.u"])) + 1
     assert changes.tolist() == [10_000, 20_000, 20_004, 20_008, 30_000, 40_000]
+
+
+# -- windows -------------------------------------------------------------------------------------
+
+WINDOW = """
+[[checks]]
+name = "NAME"
+signal = "a.u"
+of = "NAME"
+limit = [0.29, 0.31]
+"""
+RAMP = 'inputs."a.u" = { times = [0.0, 1.0], values = [0.0, 1.0], interpolation = "linear" }\n'
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_windows_take_their_ends_in(start: float, passing: Path) -> None:
+    # 3 * 0.1 is 0.30000000000000004; at 1.7e9 s a double has steps of 2.4e-7 s
+    ramp = RAMP.replace("[0.0, 1.0], values", f"[{start}, {start + 1.0}], values")
+    window = WINDOW.replace("NAME", "final") + f"before = {start + 0.3}\n"
+    window += WINDOW.replace("NAME", "initial") + f"after = {start + 0.3}\n"
+    result = ran(passing, ramp + window, f"start = {start}\nduration = 0.9\nstep = 0.1\n")
+    assert [check.measured for check in result.checks] == pytest.approx([0.3, 0.3], abs=1e-6)
+    assert all(check.ok for check in result.checks)
+
+
+@pytest.mark.parametrize(("period", "said"), [(0.3, True), (0.5, False)])
+def test_an_end_that_is_not_recorded_is_noted(period: float, said: bool, passing: Path) -> None:
+    result = ran(passing, RAMP + f"record = {{ period = {period} }}\n")
+    assert any("the last recorded point is at 0.9 s" in note for note in result.notes) == said
