@@ -27,10 +27,11 @@ from ..errors import ScenarioError, listing
 from ..files import is_file
 from ..reading.limits import TEXT
 from ..reading.schema import keyed
-from .shape import TABLE
+from .shape import TABLE, TEXTS
 
 PLACE = re.compile(r"\{(\w+)\}")
 _KEYS = {"file", "name", "join", "columns"}
+_NAMED = ("parameters", "options")
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -74,7 +75,7 @@ def table_runs(path: Path, entry: Any) -> dict[str, Row]:
         if not {"file", "on"} <= set(entry["join"]):
             raise ScenarioError(f"{path}: [table] join needs file and on, the column to join by")
         file, on = path.parent / entry["join"]["file"], entry["join"]["on"]
-        others = {row[on]: row for row in _rows(file) if on in row}
+        others = _named(_rows(file), lambda row: row.get(on) or None, f"{file}: {on} =")
         lacking = [row.get(on) for row in rows if row.get(on) not in others]
         if lacking:
             raise ScenarioError(f"{file}: has no row with {on} = {lacking[0]}")
@@ -83,7 +84,36 @@ def table_runs(path: Path, entry: Any) -> dict[str, Row]:
         values = [evaluate(f"{path}: column {name}", str(text), row, rows) for row in rows]
         for row, value in zip(rows, values, strict=True):
             row[name] = repr(value)
-    return {str(fill(str(path), entry["name"], row)): row for row in rows}
+    names = _named(
+        rows,
+        lambda row: str(fill(str(path), entry["name"], row, textual=True)),
+        f"{path.parent / entry['file']}: name = {entry['name']!r} gives",
+    )
+    if not names:
+        raise ScenarioError(f"{path.parent / entry['file']}: has no rows, so there are no runs")
+    return names
+
+
+def _named(rows: Sequence[Row], name: Callable[[Row], str | None], what: str) -> dict[str, Row]:
+    """Rows by names of their own.
+
+    Raises:
+        ScenarioError: two have one name, or one has an empty one.
+    """
+    found: dict[str, int] = {}
+    for number, row in enumerate(rows, 1):
+        called = name(row)
+        if called is None:
+            continue
+        if not called:
+            raise ScenarioError(f"{what} nothing in row {number}; fill the cell")
+        if called in found:
+            raise ScenarioError(
+                f"{what} {called!r} in rows {found[called]} and {number}; make them differ (by "
+                "another column, say) or leave one out"
+            )
+        found[called] = number
+    return {called: rows[number - 1] for called, number in found.items()}
 
 
 def _rows(file: Path) -> list[Row]:
@@ -109,23 +139,48 @@ def _rows(file: Path) -> list[Row]:
 # -- places ----------------------------------------------------------------------------------------
 
 
+def _number(text: Any) -> float:
+    """What a cell says; `1_5` is a name, though Python reads it as 15.
+
+    Raises:
+        ValueError: it is no number.
+    """
+    if "_" in str(text):
+        raise ValueError(f"{text!r} is no number")
+    return float(text)
+
+
 def _value(text: str) -> Any:
     try:
-        return float(text)
+        return _number(text)
     except ValueError:
         return text
 
 
-def fill(where: str, item: Any, row: Mapping[str, str]) -> Any:
+def fill(where: str, item: Any, row: Mapping[str, str], *, textual: bool = False) -> Any:
     """A scenario's content with the row's values in the places of `{column}`.
+
+    A place that is a whole text becomes a number if it is one, except where texts are expected.
+    Names of parameters and options are not the scenario's keys.
+
+    Args:
+        where: of the content, for error texts.
+        item: the content.
+        row: column -> value.
+        textual: numbers stay texts.
 
     Raises:
         ScenarioError: the row has no such column.
     """
     if isinstance(item, list):
-        return [fill(where, entry, row) for entry in item]
+        return [fill(where, entry, row, textual=textual) for entry in item]
     if isinstance(item, dict):
-        return {key: fill(where, entry, row) for key, entry in item.items()}
+        return {
+            key: _fill_names(where, entry, row)
+            if key in _NAMED
+            else fill(where, entry, row, textual=key in TEXTS and not isinstance(entry, dict))
+            for key, entry in item.items()
+        }
     if not isinstance(item, str):
         return item
 
@@ -135,7 +190,14 @@ def fill(where: str, item: Any, row: Mapping[str, str]) -> Any:
         return row[match[1]]
 
     filled = PLACE.sub(of, item)
-    return _value(filled) if PLACE.fullmatch(item) else filled
+    return _value(filled) if PLACE.fullmatch(item) and not textual else filled
+
+
+def _fill_names(where: str, item: Any, row: Mapping[str, str]) -> Any:
+    """The same of a table whose keys are names of others."""
+    if isinstance(item, dict):
+        return {key: _fill_names(where, entry, row) for key, entry in item.items()}
+    return fill(where, item, row)
 
 
 # -- added columns ---------------------------------------------------------------------------------
@@ -160,7 +222,7 @@ def evaluate(
         if name not in of:
             raise ScenarioError(f"{what}: nothing is called {name!r}; {listing(of, name)}")
         try:
-            return float(of[name])
+            return _number(of[name])
         except ValueError:
             raise ScenarioError(f"{what}: {name} is {of[name]!r}, not a number") from None
 

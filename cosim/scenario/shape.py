@@ -78,6 +78,15 @@ TABLE: dict[str, Check] = {
     "columns": table_of(said),
 }  # fmt: skip
 """Of `[table]`."""
+_TEXTUAL = (text, path, said, texts)
+TEXTS = frozenset(
+    key
+    for kinds in (_SOURCE, _COMPARED, _CHECK, _AXES, _FIGURE, INSIDE)
+    for key, kind in kinds.items()
+    if kind in _TEXTUAL
+) - {"offset", "expected"} | {"columns", "names"}
+"""Keys whose values are texts, also where they look like numbers: the column `1`, the run `007`. An
+offset is either."""
 check_source = keyed(_SOURCE)
 check_compared = keyed(_COMPARED)
 

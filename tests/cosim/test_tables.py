@@ -99,6 +99,48 @@ def test_tables_of_runs(tmp_path: Path, table: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "table", "join", "message"),
+    [
+        ("SET{a}", "a,b\n1,1\n1,2\n", "", "'SET{a}' gives 'SET1' in rows 1 and 2; make"),
+        ("{a}", "a,b\n,1\n", "", "gives nothing in row 1; fill the cell"),
+        ("{a}", "a,b\n", "", "table.csv: has no rows, so there are no runs"),
+        ("{a}", "a,b\n1,1\n", "a,c\n1,5\n2,5\n1,6\n", "join.csv: a = '1' in rows 1 and 3; make"),
+        ("{a}", "a,b\n1,1\n", "a,c\n01,5\n", "join.csv: has no row with a = 1"),
+    ],
+)
+def test_no_row_of_a_table_is_lost(
+    tmp_path: Path, name: str, table: str, join: str, message: str
+) -> None:
+    (tmp_path / "table.csv").write_text(table)
+    (tmp_path / "join.csv").write_text(join)
+    path = tmp_path / "x.toml"
+    joined = 'join = { file = "join.csv", on = "a" }\n' if join else ""
+    path.write_text(SCENARIO + f'[table]\nfile = "table.csv"\nname = "{name}"\n{joined}')
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(path)
+    assert message in str(caught.value)
+
+
+def test_names_that_look_like_numbers_stay_names(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    (tmp_path / "log.csv").write_text("time,1,01\n0,5,7\n1,5,7\n")
+    (tmp_path / "table.csv").write_text("a,k\n1,10\n01,20\n1e0,1_5\n")
+    path = tmp_path / "x.toml"
+    path.write_text(
+        SCENARIO + 'parameters.a.time = "{k}"\n[table]\nfile = "table.csv"\nname = "{a}"\n'
+        '[compare.x]\nsignal = "a.y"\nfile = "log.csv"\ncolumn = "{a}"\nscale = "{k}"\n'
+    )
+    file = read_scenario(path)
+    assert list(file.runs) == ["1", "01", "1e0"]
+    for run, value, k in (("1", 5.0, 10.0), ("01", 7.0, 20.0)):
+        read = file.scenario(run)
+        assert read.parameters == {"a.time": k}  # a parameter's name, no key of a scenario
+        assert read.references["x"].values[0, 0] == k * value
+    with pytest.raises(ScenarioError, match="scale must be a number, not '1_5'"):
+        file.scenario("1e0")
+
+
+@pytest.mark.parametrize(
     ("content", "message"),
     [
         ("name = 5", "name must be a text in quotes, not 5"),
