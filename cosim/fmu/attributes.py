@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
-from ..spec.units import BASE, Unit
+from ..data.text import spelled
+from ..spec.units import BASE, Unit, parse
 
 Start = float | bool | str | bytes | None
 INTEGERS = (
@@ -105,5 +107,12 @@ def _named(elements: Iterable[ET.Element]) -> Iterator[tuple[str, ET.Element]]:
 
 
 def unit_of(name: str | None, units: Mapping[str, Unit]) -> Unit | None:
-    """The unit of a name, None where there is none."""
-    return units.get(name) if name else None
+    """The unit of a name as its owner defines it, or as it is commonly read where he does not.
+
+    None where there is none, or one of an unknown name: a definition without BaseUnit is legal, and
+    says nothing but the name.
+    """
+    if not name or name in units:
+        return units.get(name or "")
+    known = parse(spelled(name)) if spelled(name) else None
+    return None if known is None else replace(known, symbol=name)

@@ -161,8 +161,19 @@ class Outline:
             bond_turnover=dict(turnover),
             error=error,
             objects=carried,
-            notes=tuple(dict.fromkeys([*notes, *invented(bond_energy, turnover)])),
+            notes=tuple(
+                dict.fromkeys([*notes, *self._unchecked(), *invented(bond_energy, turnover)])
+            ),
         )
+
+    def _unchecked(self) -> list[str]:
+        """Notes on inputs that are driven in a unit where the FMU declares none."""
+        return [
+            f"input {name} takes {signal.text} as it is: it is in {signal.unit!r}, and the FMU "
+            "declares no unit that could be converted into"
+            for name, signal in self.signals.items()
+            if signal.unit not in ("", "1", "-", "any") and not self.system.unit(name)
+        ]
 
     def _provenance(self) -> dict[str, Any]:
         return {

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim import Constant, Master, System
 from cosim.data.recording import Recording
 from cosim.errors import InputError
+from cosim.fmu.check import check
 from cosim.running.runner import RunResult, run
 from tests.tiny_fmus import V, tiny
 
@@ -128,3 +130,50 @@ def test_windows_take_their_ends_in(start: float, passing: Path) -> None:
 def test_an_end_that_is_not_recorded_is_noted(period: float, said: bool, passing: Path) -> None:
     result = ran(passing, RAMP + f"record = {{ period = {period} }}\n")
     assert any("the last recorded point is at 0.9 s" in note for note in result.notes) == said
+
+
+# -- units ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("unit", ['<Unit name="RPM"/>', ""])
+def test_a_unit_that_is_only_named_is_read_by_its_name(unit: str, fmi: int, tmp_path: Path) -> None:
+    definition = f"<UnitDefinitions>{unit}</UnitDefinitions>"
+    named = 'unit="RPM"'
+    giver = [V("y", "Float64", "output", inner=named), V("u", "Float64", "input", "0", inner=named)]
+    taker = [V("u", "Float64", "input", "0", inner='unit="rad/s"'), V("y", "Float64", "output")]
+    definitions = (
+        '<UnitDefinitions><Unit name="rad/s"><BaseUnit rad="1" s="-1"/></Unit></UnitDefinitions>'
+    )
+    system = System("two")
+    for name, variables, law, said in (
+        ("a", giver, "v->r[0][0] = 600 + 0 * v->r[1][0];", definition),
+        ("b", taker, "v->r[1][0] = v->r[0][0];", definitions),
+    ):
+        path = tiny(tmp_path, variables, law, fmi=fmi, name=name, definitions=said)
+        system.add(name, str(path))
+    system.connect("a.y", "b.u")
+    recording = Master(system, step=0.1).run(
+        0.5, inputs={"a.u": Constant(10.0, "rad/s")}, record=["b.u", "a.u"]
+    )
+    assert recording["b.u"][-1] == pytest.approx(600 * np.pi / 30, rel=1e-12)
+    assert recording["a.u"][-1] == pytest.approx(10 * 30 / np.pi, rel=1e-12)
+    assert recording.units["a.u"] == "RPM"
+
+
+def test_a_unit_that_nobody_can_convert_is_noted(passing: Path) -> None:
+    result = ran(passing, 'inputs."a.u" = { constant = 10.0, unit = "rpm" }\n')
+    assert any(
+        "a.u takes 10 rpm as it is: it is in 'rpm', and the FMU declares no unit" in note
+        for note in result.notes
+    )
+    assert not ran(passing, 'inputs."a.u" = { constant = 10.0 }\n').notes
+
+
+@pytest.mark.parametrize(("unit", "said"), [("furlong", True), ("rpm", False)])
+def test_a_unit_whose_name_says_nothing_is_found(unit: str, said: bool, tmp_path: Path) -> None:
+    defined = f'<UnitDefinitions><Unit name="{unit}"/></UnitDefinitions>'
+    inner = f'unit="{unit}"'
+    path = tiny(tmp_path, [V("y", "Float64", "output", inner=inner)], definitions=defined)
+    found = [item for item in check(path) if "no BaseUnit" in item.text]
+    assert bool(found) == said

@@ -6,6 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 
+from ..attributes import unit_of
 from ..description import FMI3_TYPES
 from .finding import Findings
 from .model import RANGES, Model
@@ -92,6 +93,11 @@ def _units(model: Model, findings: Findings) -> dict[str, set[str]]:
         if name in found:
             findings.error(f"unit {name!r} is defined twice", "define it once", line)
         display = found.setdefault(name, set())
+        if unit.find("BaseUnit") is None and unit_of(name, {}) is None:
+            findings.warning(
+                f"unit {name!r} has no BaseUnit, and its name says nothing: values in it are not "
+                "converted", "say what it is in SI units", line,
+            )  # fmt: skip
         for item in unit.iterfind("DisplayUnit"):
             if item.get("name", "") in display:
                 findings.error(
