@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnitError, ValueRangeError
-from ..spec.units import conversion, parse
+from ..spec.units import Unit, change
 from .recording import Recording
 
 Vector = NDArray[np.float64]
@@ -53,6 +53,7 @@ class Comparison:
         count: number of samples compared.
         reference: where the reference comes from.
         times, differences: the differences themselves; of a path the distances.
+        definition: of the unit, None where there is none or nobody knows it.
     """
 
     signals: tuple[str, ...]
@@ -63,6 +64,7 @@ class Comparison:
     reference: str
     times: Vector
     differences: Vector
+    definition: Unit | None = None
 
     def _repr_html_(self) -> str:
         from ..display.chart import Line, lines
@@ -105,11 +107,16 @@ def convert_reference(recording: Recording, reference: Reference) -> Vector:
     unit = _unit(recording, reference)
     if not reference.unit or not unit:
         return reference.values
-    try:
-        gain, offset = conversion(parse(reference.unit), parse(unit))
-    except UnitError as error:
-        raise UnitError(f"cannot compare {reference.name} with {reference.text}: {error}") from None
-    return reference.values * gain + offset
+    found = []
+    for name, values in zip(reference.signals, reference.values.T, strict=True):
+        own = recording.unit(name)
+        assert own is not None  # all have the same one
+        try:
+            gain, offset = change(reference.unit, own, difference=name in recording.relative)
+        except UnitError as error:
+            raise UnitError(f"cannot compare {name} with {reference.text}: {error}") from None
+        found.append(values * gain + offset)
+    return np.column_stack(found)
 
 
 def within(times: Vector, first: float, last: float) -> NDArray[np.bool_]:
@@ -121,6 +128,13 @@ def within(times: Vector, first: float, last: float) -> NDArray[np.bool_]:
 def _span(times: Vector) -> str:
     known = times[np.isfinite(times)]
     return f"; they are at {known.min():.12g} s to {known.max():.12g} s" if known.size else ""
+
+
+def _known(recording: Recording, name: str) -> Unit | None:
+    try:
+        return recording.unit(name)
+    except UnitError:  # of a recording of somebody else
+        return None
 
 
 def compare(recording: Recording, reference: Reference) -> Comparison:
@@ -157,4 +171,5 @@ def compare(recording: Recording, reference: Reference) -> Comparison:
         reference=reference.text,
         times=times,
         differences=differences,
+        definition=_known(recording, reference.signals[0]),
     )

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ..arguments import need_text
 from ..display.literal import literal
-from ..errors import ScenarioError, UnknownNameError, listing
+from ..errors import ScenarioError, UnitError, UnknownNameError, listing
 from ..files import atomic
 from ..spec.distribution import has, needed
+from ..spec.units import Unit, conversion, parse
 from .npz import read_npz
 from .parquet import read_table
 
@@ -59,6 +60,8 @@ class Recording:
         objects: columns that doubles do not carry: integers of 64 bits, strings, binaries. The
             first are in `values`, too, as the nearest double; the others are nan there.
         notes: what else is to be known: an end that an FMU asked for, warnings.
+        definitions: by name, what a unit is where the FMU means another one by it than we.
+        relative: signals that are differences, so that the offset of their unit does not count.
     """
 
     time: Vector
@@ -71,6 +74,8 @@ class Recording:
     error: str = ""
     objects: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    definitions: Mapping[str, Unit] = field(default_factory=dict)
+    relative: frozenset[str] = frozenset()
 
     @property
     def energy_residual(self) -> float:
@@ -114,6 +119,31 @@ class Recording:
     def __iter__(self) -> Iterator[str]:
         """Names of the signals, as of a data frame; `len` counts times."""
         return iter(self.names)
+
+    def unit(self, name: str) -> Unit | None:
+        """The unit of a signal as its FMU defines it; None where it declares none.
+
+        Raises:
+            UnitError: the recording does not say what is meant by its name.
+        """
+        symbol = self.units.get(name, "")
+        return self.definitions.get(name) or (parse(symbol) if symbol else None)
+
+    def like(self, name: str, other: str) -> NDArray[np.float64]:
+        """A signal in the unit of another one, as far as both have one.
+
+        Raises:
+            UnitError: they measure different things.
+        """
+        own, wanted = self.unit(name), self.unit(other)
+        if own is None or wanted is None:
+            return self[name]
+        try:
+            gain, offset = conversion(own, wanted)
+        except UnitError as error:
+            raise UnitError(f"{name} cannot be set against {other}: unit {error}") from None
+        difference = not self.relative.isdisjoint((name, other))
+        return self[name] * gain + (0.0 if difference else offset)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -170,6 +200,11 @@ class Recording:
             "bond_turnover_J": dict(self.bond_turnover),
             "error": self.error,
             "notes": list(self.notes),
+            "definitions": {
+                name: [list(unit.exponents), unit.factor, unit.offset]
+                for name, unit in self.definitions.items()
+            },
+            "relative": sorted(self.relative),
         }
 
     def _columns(self) -> list[NDArray[Any]]:
@@ -343,7 +378,22 @@ def read_recording(path: Path | str) -> Recording:
         error=meta["error"],
         objects=objects,
         notes=tuple(meta.get("notes", ())),
+        definitions=_definitions(path, meta),
+        relative=frozenset(map(str, meta.get("relative", ()))),
     )
+
+
+def _definitions(path: Path, meta: Mapping[str, Any]) -> dict[str, Unit]:
+    """Units that are meant otherwise; older recordings tell of none."""
+    try:
+        return {
+            name: Unit(meta["units"][name], tuple(map(int, powers)), float(factor), float(offset))
+            for name, (powers, factor, offset) in dict(meta.get("definitions", {})).items()
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        raise ScenarioError(
+            f"{path}: a unit that it defines cannot be read ({error!r}); record it again"
+        ) from error
 
 
 def _read_npz(path: Path) -> tuple[dict[str, NDArray[Any]], bytes | None]:

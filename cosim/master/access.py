@@ -16,7 +16,7 @@ from ..errors import GraphError, UnitError, UnknownNameError, ValueRangeError, l
 from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.values import check_values
-from ..spec.units import conversion, parse
+from ..spec.units import change
 from ..system.inputs import Driver
 from .driven import DrivenInputs
 from .interpreter import Interpreter
@@ -206,11 +206,10 @@ class Access:
         if declared.unit is None:
             raise UnitError(f"{name} declares no unit, so {unit!r} does not convert")
         try:
-            ends = (parse(unit), declared.unit) if into else (declared.unit, parse(unit))
-            gain, offset = conversion(*ends)
+            gain, offset = change(unit, declared.unit, back=not into, difference=declared.relative)
         except UnitError as error:
-            raise UnitError(f"{name} in {unit!r}: unit {error}") from error
-        shifted = np.asarray(value) * gain + (0.0 if declared.relative else offset)
+            raise UnitError(f"{name} in {unit!r}: {error}") from error
+        shifted = np.asarray(value) * gain + offset
         return float(shifted) if shifted.ndim == 0 else shifted
 
 

@@ -31,7 +31,7 @@ from ..data.signals import Constant, Signal, objects
 from ..errors import GraphError, UnitError, ValueRangeError
 from ..fmu.values import OBJECTS, TYPES, check_values
 from ..reading.limits import DATA
-from ..spec.units import conversion, parse
+from ..spec.units import change
 from ..system.inputs import Driver, spread
 from ..system.system import System
 from .algorithms import compile_plan, names
@@ -251,13 +251,11 @@ class Master:
                 continue
             values = self._numbers(name, signal, times)
             declared = self.system.declaration(name)
-            unit = declared.symbol
-            if signal.unit and unit:
+            if signal.unit and declared.unit is not None:
                 try:
-                    gain, offset = conversion(parse(signal.unit), declared.unit or parse(unit))
-                    offset = 0.0 if declared.relative else offset
+                    gain, offset = change(signal.unit, declared.unit, difference=declared.relative)
                 except UnitError as error:
-                    raise UnitError(f"input {name} from {signal.text}: unit {error}") from error
+                    raise UnitError(f"input {name} from {signal.text}: {error}") from error
                 values = values * gain + offset
             if isinstance(signal, Constant):  # bounds are in the input's unit
                 where = f"input {name} from {signal.text}"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..data.recording import Recording
 from ..data.signals import Signal
 from ..spec import distribution
+from ..spec.units import usual
 from ..system.system import System
 from .invented import invented
 from .plan import Plan
@@ -143,6 +144,7 @@ class Outline:
             name: _column(self.system.declaration(name).type, items[: len(rows)])
             for name, items in (objects or {}).items()
         }
+        declared = {name: self.system.declaration(name) for name in self.observed}
         values = rows.copy()
         for name, column in carried.items():
             text = column.dtype == object
@@ -151,7 +153,13 @@ class Outline:
             time=self.recorded_times(len(rows), beside),
             values=values,
             names=self.observed,
-            units={name: self.system.unit(name) for name in self.observed},
+            units={name: variable.symbol for name, variable in declared.items()},
+            definitions={
+                name: variable.unit
+                for name, variable in declared.items()
+                if variable.unit is not None and not usual(variable.unit)
+            },
+            relative=frozenset(name for name, variable in declared.items() if variable.relative),
             provenance={
                 **self._provenance(),
                 "inputs": {name: signal.text for name, signal in self.signals.items()},

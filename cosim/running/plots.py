@@ -16,7 +16,7 @@ from ..display.literal import literal
 from ..errors import UnknownNameError
 from ..files import atomic
 from ..scenario.axes import Axes
-from ..spec.units import conversion, parse
+from ..spec.units import Unit, change
 from .comparison_table import ComparedQuantity
 
 if TYPE_CHECKING:
@@ -107,16 +107,23 @@ def save(figure: Figure, path: Path | str | None, dots: int = 120) -> None:
 
 
 class _Scale:
-    """Into the unit that an axes shows."""
+    """Into the unit that an axes shows; of differences, which have no offset."""
 
-    def __init__(self, own: str, shown: str) -> None:
-        self.unit = shown or own
+    def __init__(self, own: Unit | None, shown: str, difference: bool) -> None:
         self.gain, self.offset = (
-            conversion(parse(own), parse(shown)) if own and shown else (1.0, 0.0)
+            change(shown, own, back=True, difference=difference)
+            if own is not None and shown
+            else (1.0, 0.0)
         )
 
     def __call__(self, values: Vector) -> Vector:
         return values * self.gain + self.offset
+
+
+def _scale(recording: Recording, item: Axes, name: str) -> _Scale:
+    """The one of a signal of axes."""
+    difference = bool(item.minus) or name in recording.relative
+    return _Scale(recording.unit(name) if item.unit else None, item.unit, difference)
 
 
 def _label(text: str, unit: str) -> str:
@@ -164,15 +171,15 @@ def draw_paths(
     for pair in item.paths:
         reference = _reference(references, pair)
         if reference is not None and reference.text not in seen:
-            scale = _Scale(recording.units.get(pair[0], ""), item.unit)
+            scale = _scale(recording, item, pair[0])
             seen.add(reference.text)
             points = scale(convert_reference(recording, reference))[_window(item, reference.times)]
             text = reference.text if reference.text not in _labels(axis) else None
             axis.plot(points[:, 0], points[:, 1], label=text, **MEASURED)  # type: ignore[arg-type]
             axis.plot(points[-1:, 0], points[-1:, 1], "o", color="black", markersize=6)
     for number, pair in enumerate(item.paths):
-        scale = _Scale(recording.units.get(pair[0], ""), item.unit)
-        unit = scale.unit
+        scale = _scale(recording, item, pair[0])
+        unit = item.unit or recording.units.get(pair[0], "")
         x, y = (scale(recording[name])[inside] for name in pair)
         name = item.names[number] if item.names else ", ".join(pair)
         name = f"{run} {name}".strip() if len(item.paths) > 1 or not run else run
@@ -203,8 +210,8 @@ def draw_courses(
         except UnknownNameError:
             continue
         for element in names:
-            scale = _Scale(recording.units.get(element, ""), item.unit)
-            unit = scale.unit
+            scale = _scale(recording, item, element)
+            unit = item.unit or recording.units.get(element, "")
             reference = _reference(references, (element,))
             if reference is not None and not item.minus:
                 drawn = _window(item, reference.times)
@@ -213,7 +220,9 @@ def draw_courses(
                 axis.plot(
                     reference.times[drawn], values[drawn], label=text, **MEASURED  # type: ignore[arg-type]
                 )  # fmt: skip
-            course = recording[element] - (recording[item.minus] if item.minus else 0.0)
+            course = recording[element]
+            if item.minus:
+                course = course - recording.like(item.minus, element)
             name = item.names[number] if item.names else signal
             name += element[len(signal) :] if len(names) > 1 else ""
             name = f"{run} {name}".strip()
@@ -237,8 +246,8 @@ def draw_comparisons(
     unit = item.unit
     for number, name in enumerate(item.comparisons):
         found = comparisons[name]
-        scale = _Scale(found.unit, item.unit)
-        unit = scale.unit
+        scale = _Scale(found.definition, item.unit, True)
+        unit = item.unit or found.unit
         inside = _window(item, found.times)
         axis.plot(
             found.times[inside],

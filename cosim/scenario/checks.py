@@ -236,7 +236,7 @@ def _measure(
     _some(check, inside)
     columns = [_exact(recording[name][inside]) for name in check.signals]
     if check.minus:
-        columns[0] = columns[0] - _exact(recording[check.minus][inside])
+        columns[0] = columns[0] - _exact(recording.like(check.minus, check.signals[0])[inside])
     unit = recording.units.get(check.signals[0], "")
     if len(columns) == 1:
         return _SIGNAL[check.of](columns[0]), unit

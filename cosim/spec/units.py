@@ -144,3 +144,35 @@ def conversion(source: Unit, target: Unit) -> tuple[float, float]:
     if (source.factor, source.offset) == (target.factor, target.offset):
         return 1.0, 0.0
     return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def usual(unit: Unit) -> bool:
+    """Whether a unit is what its name means here."""
+    try:
+        return parse(unit.symbol) == unit
+    except UnitError:
+        return False
+
+
+def change(
+    symbol: str, own: Unit, *, back: bool = False, difference: bool = False
+) -> tuple[float, float]:
+    """Gain and offset from a unit, given by its name, into one that somebody defines.
+
+    The owner's name for the unit means what he defines, whatever it means elsewhere.
+
+    Args:
+        symbol: of the unit.
+        own: the other one.
+        back: from `own` into the named one instead.
+        difference: of differences, which have no offset.
+
+    Raises:
+        UnitError: an unknown name, or the two measure different things.
+    """
+    named = own if symbol == own.symbol else parse(symbol)
+    try:
+        gain, offset = conversion(own, named) if back else conversion(named, own)
+    except UnitError as error:
+        raise UnitError(f"unit {error}") from None
+    return gain, 0.0 if difference else offset

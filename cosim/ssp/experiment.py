@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..data.signals import Signal, SignalVector, as_signal, objects
 from ..errors import ScenarioError, UnitError, UnknownNameError, listing
 from ..scenario.scenario import Scenario
-from ..spec.units import conversion, parse
+from ..spec.units import change
 from ..system.provider import Provider
 from ..system.variants import apply
 from .read import Experiment, Package, Terminal, read_package
@@ -134,10 +134,10 @@ def _inside(name: str, signal: Signal, terminal: Terminal) -> Signal:
         return signal
     if signal.unit and terminal.unit is not None:
         try:
-            gain, shift = conversion(parse(signal.unit), terminal.unit)
+            gain, shift = change(signal.unit, terminal.unit, difference=terminal.relative)
         except UnitError as error:
-            raise UnitError(f"input {name} from {signal.text}: unit {error}") from error
-        offset += 0.0 if terminal.relative else factor * shift
+            raise UnitError(f"input {name} from {signal.text}: {error}") from error
+        offset += factor * shift
         factor *= gain
     return _Scaled(signal, factor, offset)
 

@@ -21,7 +21,7 @@ from ..files import atomic
 from ..fmu.archive import Fmu
 from ..fmu.description import Variable
 from ..fmu.values import TYPES, check_values
-from ..spec.units import conversion, parse
+from ..spec.units import change, usual
 from ..system.inputs import Driver, spread
 from ..system.system import Connection, Member, System
 from .document import FMU, SSC, SSD, SSV
@@ -150,10 +150,9 @@ class _Writer:
         if not signal.unit or declared.unit is None:
             return 1.0, 0.0
         try:
-            gain, offset = conversion(parse(signal.unit), declared.unit)
-            return gain, 0.0 if declared.relative else offset
+            return change(signal.unit, declared.unit, difference=declared.relative)
         except UnitError as error:
-            raise UnitError(f"input {element} from {signal.text}: unit {error}") from error
+            raise UnitError(f"input {element} from {signal.text}: {error}") from error
 
     # -- files -------------------------------------------------------------------------------------
 
@@ -231,12 +230,8 @@ class _Writer:
 
     def symbol(self, name: str) -> str:
         """The unit of an input if it is read as what the FMU means by it, else ""."""
-        declared = self.system.declaration(name)
-        try:
-            known = declared.unit is None or parse(declared.symbol) == declared.unit
-        except UnitError:
-            known = False
-        return declared.symbol if known else ""
+        unit = self.system.declaration(name).unit
+        return unit.symbol if unit is not None and usual(unit) else ""
 
     # -- elements ----------------------------------------------------------------------------------
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import Constant, Master, System
+from cosim import Constant, Master, System, read_recording
+from cosim.data.comparison import compare
 from cosim.data.recording import Recording
 from cosim.errors import InputError
 from cosim.fmu.check import check
@@ -177,3 +178,75 @@ def test_a_unit_whose_name_says_nothing_is_found(unit: str, said: bool, tmp_path
     path = tiny(tmp_path, [V("y", "Float64", "output", inner=inner)], definitions=defined)
     found = [item for item in check(path) if "no BaseUnit" in item.text]
     assert bool(found) == said
+
+
+FOREIGN = [
+    # unit of the FMU, its definition, its value; the same in a unit of ours
+    ("degC", 'K="1" offset="273.15"', 5.0, 5.0, "K", 'relativeQuantity="true"'),
+    ("Nm", 'kg="1" m="2" s="-2"', 5.0, 5.0, "N.m", ""),
+    ("Nm", 'kg="1" m="2" s="-2"', 5.0, 5.0, "Nm", ""),
+    ("rev/min", 's="-1" factor="0.016666666666666666"', 600.0, 10.0, "Hz", ""),
+    ("C", 'K="1" offset="273.15"', 26.85, 300.0, "K", ""),
+    ("t", 'kg="1" factor="907.18474"', 1.0, 907.18474, "kg", ""),  # the short ton
+    ("t", 'kg="1" factor="907.18474"', 1.0, 1.0, "t", ""),
+]
+COMPARED = """
+inputs."a.u" = { constant = VALUE, unit = "UNIT" }
+compare.c = { signal = "a.y", constant = VALUE, unit = "UNIT" }
+compare.d = { signal = "a.u", constant = VALUE, unit = "UNIT" }
+plots = [{ label = "y", signals = ["a.y"], unit = "UNIT" },
+         { label = "difference", comparisons = ["c"], unit = "UNIT" }]
+"""
+
+
+@pytest.mark.parametrize(("unit", "base", "own", "value", "given", "more"), FOREIGN)
+def test_comparisons_take_a_unit_as_the_fmu_defines_it(
+    unit: str, base: str, own: float, value: float, given: str, more: str, tmp_path: Path
+) -> None:
+    inner = f'unit="{unit}" {more}'
+    defined = f'<Unit name="{unit}"><BaseUnit {base}/></Unit>'
+    tiny(
+        tmp_path,
+        [V("u", "Float64", "input", "0", inner=inner), V("y", "Float64", "output", inner=inner)],
+        f"v->r[1][0] = {own};",
+        definitions=f"<UnitDefinitions>{defined}</UnitDefinitions>",
+    )
+    text = COMPARED.replace("VALUE", str(value)).replace("UNIT", given)
+    result = ran(tmp_path, text + 'record = { signals = ["a.u", "a.y"] }\n')
+    kept = read_recording(result.recording.keep(tmp_path / "kept"))
+    for recording in (result.recording, kept):  # the sum with 273.15 rounds
+        for item in ("c", "d"):
+            found = compare(recording, result.scenario.references[item])
+            assert found.max == pytest.approx(0.0, abs=1e-12), item
+            assert found.count == 11
+    shown, apart = (axis.lines[0].get_ydata() for axis in result.plot().axes)
+    assert shown == pytest.approx(np.full(11, value), rel=1e-12)
+    assert apart == pytest.approx(np.zeros(11), abs=1e-12)
+
+
+def test_what_is_subtracted_comes_in_the_unit_of_the_signal(tmp_path: Path) -> None:
+    units = "".join(
+        f'<Unit name="{name}"><BaseUnit m="1" factor="{factor}"/></Unit>'
+        for name, factor in (("m", 1), ("mm", 1e-3))
+    )
+    tiny(
+        tmp_path,
+        [
+            V("a", "Float64", "output", inner='unit="m"'),
+            V("b", "Float64", "output", inner='unit="mm"'),
+        ],
+        "v->r[0][0] = 2.0; v->r[1][0] = 500.0;",
+        definitions=f"<UnitDefinitions>{units}</UnitDefinitions>",
+    )
+    text = """
+    plots = [{ label = "apart", signals = ["a.a"], minus = "a.b" }]
+    [[checks]]
+    name = "apart"
+    signal = "a.a"
+    minus = "a.b"
+    of = "final"
+    limit = [1.499, 1.501]
+    """
+    result = ran(tmp_path, text)
+    assert result.checks[0].measured == pytest.approx(1.5, rel=1e-12)
+    assert result.plot().axes[0].lines[0].get_ydata() == pytest.approx(np.full(11, 1.5))
