@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from numbers import Real
+from typing import Any, Literal, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import wrong
 from ..errors import ValueRangeError
+from ..reading.schema import is_finite
 
 Vector = NDArray[np.float64]
 CLOCK = 1e-3
@@ -57,7 +58,7 @@ class Constant:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.value, (str, bytes)) and not math.isfinite(self.value):
+        if not isinstance(self.value, (str, bytes)) and not is_finite(self.value):
             raise ValueRangeError(f"constant input {self.value} is not finite")
 
     @property
@@ -85,16 +86,29 @@ class Constant:
 
 @dataclass(frozen=True)
 class Function:
-    """A function of time that takes and returns arrays (or numbers)."""
+    """A function of time that takes an array and returns one, or a number."""
 
     function: Callable[[Vector], ArrayLike]
     unit: str = ""
     text: str = "function of time"
 
     def at(self, times: Vector) -> Vector:
-        """Values at these times."""
-        values = np.asarray(self.function(times), dtype=np.float64)
-        return np.broadcast_to(values, times.shape)
+        """Values at these times.
+
+        Raises:
+            ValueRangeError: the function gives something else.
+        """
+        try:
+            values = np.asarray(self.function(times))
+            if np.iscomplexobj(values):
+                raise TypeError("it returns complex numbers")
+            return np.broadcast_to(values.astype(np.float64), times.shape)
+        except (TypeError, ValueError) as error:
+            raise ValueRangeError(
+                f"{self.text} {self.function!r} does not give one number per time ({error}); it is "
+                "given an array of times: take numpy's functions (np.sin for math.sin), or "
+                "np.vectorize(function)"
+            ) from error
 
 
 class Table:
@@ -110,7 +124,7 @@ class Table:
             sample interval is an error (the longest one, but for pauses: `PAUSE`).
 
     Raises:
-        ValueRangeError: times that do not increase, or values that are not finite.
+        ValueRangeError: times that do not increase, or values of several kinds, or not finite.
     """
 
     def __init__(
@@ -123,13 +137,19 @@ class Table:
         text: str = "table",
         extend: bool = False,
     ) -> None:
-        self.times = np.asarray(times, dtype=np.float64)
-        self._objects = _exact(values)
-        self.values = (
-            np.full(self.times.shape, np.nan)
-            if self._objects and isinstance(self._objects[0], (str, bytes))
-            else np.asarray(values, dtype=np.float64)
-        )
+        try:  # copies: who shares a table relies on it
+            self.times = np.array(times, dtype=np.float64)
+            self._objects = _exact(values)
+            self.values = (
+                np.full(self.times.shape, np.nan)
+                if self._objects and isinstance(self._objects[0], (str, bytes))
+                else np.array(values, dtype=np.float64)
+            )
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueRangeError(
+                f"{text}: its times are not all numbers, or its values neither all numbers nor all "
+                f"texts ({error})"
+            ) from None
         self.unit, self.interpolation, self.text, self.extend = unit, interpolation, text, extend
         if self.times.ndim != 1 or self.times.shape != self.values.shape or not self.times.size:
             raise ValueRangeError(
@@ -266,12 +286,21 @@ def objects(signal: Signal, times: Vector) -> list[Any]:
     return list(exact(times)) if exact is not None else []
 
 
+def is_signal(value: Any) -> TypeGuard[Signal]:
+    """Whether something is a signal; functions of numpy and series of pandas have an `at`, too."""
+    return all(hasattr(value, name) for name in ("at", "unit", "text"))
+
+
 def as_signal(value: Signal | float | str | bytes | Callable[[Vector], ArrayLike]) -> Signal:
     """A signal from a number, a text or a function of time."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and not value.ndim):
+        value = value.item()
     if isinstance(value, (int, float, str, bytes)):
         return Constant(value)
-    if hasattr(value, "at"):
-        return value  # type: ignore[return-value]
+    if isinstance(value, Real):  # a fraction
+        return Constant(float(value))
+    if is_signal(value):
+        return value
     if not callable(value):
         raise wrong("what drives an input", value, "a signal, a number, a text or a function")
     return Function(value)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.signals import is_signal
 from .interpreter import Interpreter
 from .master import Master
 
@@ -37,7 +38,7 @@ class DrivenInputs:
 
     def set(self, column: int, value: Any) -> None:
         """Overrule a column by a value or a signal."""
-        exact = column in self._objects or hasattr(value, "at")
+        exact = column in self._objects or is_signal(value)
         self.given[column] = value if exact else float(value)
         self._held = None
 
@@ -76,7 +77,7 @@ class DrivenInputs:
     def _put_objects(self, column: int, first: int, behind: int) -> None:
         """The same for a column whose values travel as objects."""
         value, times = self.given[column], self._run.times[first:behind]
-        if hasattr(value, "at"):
+        if is_signal(value):
             (items,) = self._master.carried({self._names[column]: value}, times).values()
         else:
             items = [value] * times.size

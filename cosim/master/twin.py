@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..arguments import need_number, wrong
 from ..data.recording import Recording
+from ..data.signals import is_signal
 from ..errors import (
     AlgebraicLoopError,
     EndRequest,
@@ -169,7 +170,7 @@ class Twin:
         """
         self._check_open()
         target = self._access.target(name)
-        if hasattr(value, "at"):
+        if is_signal(value):
             if target.columns is None or len(target.columns) != 1:
                 raise GraphError(
                     f"{name} takes no signal: the twin was not opened with something that drives "

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..arguments import need_texts
 from ..data.comparison import within
-from ..errors import UnknownNameError, ValueRangeError
+from ..errors import ScenarioError, UnknownNameError, ValueRangeError
 from ..files import overlay
+from ..scenario.axes import Axes
 from ..scenario.scenario import Scenario
 from ..system.provider import Provider, get_ready
 from ..system.system import System
@@ -91,6 +92,7 @@ def recorded_signals(
 
     kept = list(filter(has, (*everything, *scenario.also, *shown)))
     checked = filter(has, (name for check in scenario.checks for name in check.needs))
+    _need_numbers(scenario, system, drawn)
     every = recording_interval(scenario)
     if beyond := round(scenario.duration / scenario.step) % every if scenario.step > 0.0 else 0:
         last = scenario.start + scenario.duration - beyond * scenario.step
@@ -99,6 +101,30 @@ def recorded_signals(
             f"number of record periods of {every * scenario.step:.9g} s"
         )
     return tuple(dict.fromkeys([*kept, *needed, *checked])), list(dict.fromkeys(notes))
+
+
+def _need_numbers(scenario: Scenario, system: System, drawn: list[Axes]) -> None:
+    """Refuse texts where numbers are measured, compared or drawn.
+
+    Raises:
+        ScenarioError: with what takes which signal.
+    """
+    uses = [
+        *((f"check {check.name!r}", check.needs) for check in scenario.checks),
+        *((f"compare {name}", item.signals) for name, item in scenario.references.items()),
+        *((f"plot {axes.label!r}", axes.needs) for axes in drawn),
+    ]
+    for what, signals in uses:
+        for signal in signals:
+            try:
+                type_ = system.variables(signal)[1][0].type
+            except UnknownNameError:
+                continue  # a changed variant has none
+            if type_ in ("String", "Binary"):
+                raise ScenarioError(
+                    f"{scenario.name}: {what} takes {signal}, which is of type {type_} and no "
+                    "number; take another signal"
+                )
 
 
 def shortened(scenario: Scenario, duration: float) -> Scenario:

@@ -406,6 +406,9 @@ class _Reader:
         hold = entry.get("interpolation", "hold")
         columns = entry.get("columns")
         if columns is None:
+            if {"file", "data"} & set(entry) and not {"column", "times"} & set(entry):
+                known = listing(self.log(entry).columns, name.rpartition(".")[2])
+                raise self.fail(f"input {name}: column is missing; {known}")
             return self.table_signal(f"input {name}", entry, str(entry.get("column")), hold)
         return SignalVector(
             tuple(self.table_signal(f"input {name}", entry, column, hold) for column in columns)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cosim import Constant, Master, System, read_recording
+from cosim import Constant, Master, System, Table, read_recording
 from cosim.data.comparison import compare
 from cosim.data.recording import Recording
 from cosim.errors import InputError
@@ -250,3 +253,87 @@ def test_what_is_subtracted_comes_in_the_unit_of_the_signal(tmp_path: Path) -> N
     result = ran(tmp_path, text)
     assert result.checks[0].measured == pytest.approx(1.5, rel=1e-12)
     assert result.plot().axes[0].lines[0].get_ydata() == pytest.approx(np.full(11, 1.5))
+
+
+# -- kinds of values -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("driver", "end"),
+    [
+        (np.sin, np.sin(1.0)), (np.int64(3), 3.0), (np.float32(3.5), 3.5), (np.array(3.0), 3.0),
+        (np.bool_(True), 1.0), (Fraction(1, 2), 0.5), (lambda t: 2, 2.0),
+    ],
+)  # fmt: skip
+def test_numbers_and_functions_of_numpy_drive_inputs(driver, end: float, passing: Path) -> None:
+    system = System("one")
+    system.add("a", str(passing / "m.fmu"))
+    recording = Master(system, step=0.1).run(1.0, inputs={"a.u": driver}, record=["a.u"])
+    assert recording["a.u"][-1] == pytest.approx(end, rel=1e-12)
+
+
+class Series:
+    """As one of pandas: its `at` is no function."""
+
+    at = ()
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        (math.sin, r"built-in function sin> does not give .* take numpy's functions \(np\.sin"),
+        (lambda t: np.ones((t.size, 1)), "does not give one number per time"),
+        (lambda t: 1j * t, "it returns complex numbers"),
+        (lambda t: "x", "does not give one number per time"),
+        (Series(), "what drives an input must be a signal, a number, a text or a function"),
+        pytest.param(2**2000, "is not finite", id="large"),
+        (3j, "what drives an input must be"),
+    ],
+)  # fmt: skip
+def test_what_drives_no_input_is_named(driver, message: str, passing: Path) -> None:
+    system = System("one")
+    system.add("a", str(passing / "m.fmu"))
+    with pytest.raises(InputError, match=message):
+        Master(system, step=0.1).run(1.0, inputs={"a.u": driver})
+
+
+@pytest.mark.parametrize(
+    "values", [["a", 1], [1.5, "on"], [2**2000, 1]], ids=["text first", "text last", "large"]
+)
+def test_a_table_is_of_one_kind(values: list[Any]) -> None:
+    with pytest.raises(InputError, match="neither all numbers nor all texts"):
+        Table([0.0, 1.0], values)
+
+
+def test_a_table_keeps_its_values() -> None:
+    times, values = np.array([0.0, 1.0]), np.array([1.0, 2.0])
+    table = Table(times, values)
+    times[:], values[:] = 7.0, 99.0
+    assert table.at(np.array([0.0, 1.0])).tolist() == [1.0, 2.0]
+
+
+def test_a_file_without_a_column_lists_its_own(passing: Path) -> None:
+    (passing / "log.csv").write_text("time,v\n0,0\n1,1\n")
+    with pytest.raises(InputError, match=r"input a.u: column is missing; there is time, v"):
+        ran(passing, 'inputs."a.u" = { file = "log.csv" }\n')
+
+
+CHECK = 'checks = [{ name = "c", signal = "SIGNAL", of = "final", limit = 1.0 MORE }]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (CHECK.replace("SIGNAL", "a.s").replace("MORE", ""), "check 'c'"),
+        (CHECK.replace("SIGNAL", "a.y").replace("MORE", ', minus = "a.s"'), "check 'c'"),
+        ('compare.x = { signal = "a.s", constant = 1.0 }\n', "compare x"),
+        ('plots = [{ label = "p", signals = ["a.s"] }]\n', "plot 'p'"),
+        ('plots = [{ label = "p", signals = ["a.y"], minus = "a.s" }]\n', "plot 'p'"),
+    ],
+)
+def test_texts_are_neither_measured_nor_drawn(text: str, what: str, tmp_path: Path) -> None:
+    variables = [V("s", "String", "output"), V("y", "Float64", "output")]
+    tiny(tmp_path, variables, 'strcpy(v->s[0], "hi"); v->r[1][0] = v->t;')
+    with pytest.raises(InputError, match=f"{what} takes a.s, which is of type String"):
+        ran(tmp_path, text)
+    assert ran(tmp_path, 'plot = ["a.y", "a.s"]\n').plot() is not None  # it is left out
