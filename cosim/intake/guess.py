@@ -157,10 +157,11 @@ def _by_size(said: Sequence[str], raw: set[str], good: Vector) -> Guess:
         return Guess("", "an acceleration: in m/s2 or in units of gravity")
     if "speed" in said:
         return Guess("", f"a speed, and {size}: rad/s, rpm, m/s?")
-    if said and said[-1] in ("x", "y", "z"):
+    turns = any(word in raw for word in ANGLES)
+    if said and said[-1] in ("x", "y", "z") and not turns:
         unit = "m" if largest <= POSITION else "mm"
         return Guess(unit, f"a position, and {size}")
-    if "angle" in said and not any(word in raw for word in ANGLES):
+    if "angle" in said and not turns:
         return Guess("", f"a position, and {size}: of an angle or of a place?")
     if any(word in said for word in ANGLES):
         if largest <= 1.02 * np.pi:

@@ -244,6 +244,66 @@ def test_what_comes_twice_or_out_of_order_is_put_right_and_said(tmp_path: Path) 
     assert "1 out of order" in report.topic.notes[-1]
 
 
+def test_vectors_in_fields_that_only_wrap_keep_what_tells_them_apart(tmp_path: Path) -> None:
+    from rosbags.typesys import get_types_from_msg
+
+    vector = "geometry_msgs/Vector3"
+    text = f"{vector} position\n{vector} orientation\ngeometry_msgs/Twist twist\n"
+    STORE.register(get_types_from_msg(text + "geometry_msgs/Accel accel\n", "own/msg/State"))
+    sent = [
+        (t, "/state", T["own/msg/State"](
+            Vector3(10.0 + i, 0.0, 0.0), Vector3(0.01 * i, 0.2, 0.3), twist(2.0, 0.0),
+            accel(3.0, 0.0)
+        )) for i, t in enumerate(TIMES)
+    ]  # fmt: skip
+    (report,) = inspect(write(tmp_path / "bag", sent)).topics
+    log, units = report.topic.log, {c.name: c.unit for c in report.columns}
+    assert np.array_equal(log["position_x"], 10.0 + np.arange(60.0))
+    assert log["orientation_x"] == pytest.approx(0.01 * np.arange(60.0), abs=0.0)
+    assert (units["position_x"].unit, units["position_x"].sure) == ("m", True)
+    assert (units["orientation_x"].unit, units["orientation_x"].sure) == ("rad", False)
+    assert (log["twist_linear_x"][0], log["accel_linear_x"][0]) == (2.0, 3.0)
+    assert (units["twist_linear_x"].unit, units["accel_linear_x"].unit) == ("m/s", "m/s2")
+
+
+def test_poses_in_two_frames_are_two_topics(tmp_path: Path) -> None:
+    kind = T["geometry_msgs/msg/PoseStamped"]
+    sent = [(t, "/pose", kind(header(t, "odom" if i % 3 else "map"), pose(i % 3, 0.0, 0.0)))
+            for i, t in enumerate(TIMES)]  # fmt: skip
+    found = topics(write(tmp_path / "bag", sent), "/pose")
+    assert {name: (t.frames, t.log["x"].size) for name, t in found.items()} == {
+        "/pose map": ("map", 20), "/pose odom": ("odom", 40),
+    }  # fmt: skip
+    assert not found["/pose map"].log["x"].any() and found["/pose odom"].log["x"].all()
+    assert any("20 of 60 messages" in note for note in found["/pose map"].notes)
+
+
+def test_a_frame_that_is_none_of_place_leaves_a_topic_whole(tmp_path: Path) -> None:
+    kind = T["geometry_msgs/msg/PoseStamped"]
+    sent = [(t, "/pose", kind(header(t, f"shot_{i}"), pose(i, 0.0, 0.0)))
+            for i, t in enumerate(TIMES)]  # fmt: skip
+    found = topics(write(tmp_path / "bag", sent))
+    assert list(found) == ["/pose"] and found["/pose"].log["x"].size == 60
+    assert any("name 60 frames, 'shot_0' first" in note for note in found["/pose"].notes)
+
+
+def test_joints_of_two_publishers_with_one_stamp_are_put_together(tmp_path: Path) -> None:
+    kind = T["sensor_msgs/msg/JointState"]
+    none = np.zeros(0)
+    sent: list[Message] = []
+    for i, time in enumerate(TIMES):
+        for j, name in enumerate(("arm", "gripper")):
+            state = kind(header(time), [name], np.array([i + 100.0 * j]), none, none)
+            sent.append((time + j, "/joints", state))
+    again = kind(header(TIMES[-1]), ["arm"], np.ones(1), none, none)
+    sent.append((TIMES[-1] + 9, "/joints", again))
+    found = topics(write(tmp_path / "bag", sent))["/joints"]
+    assert np.array_equal(found.log["position.arm"], np.arange(60.0))
+    assert np.array_equal(found.log["position.gripper"], 100.0 + np.arange(60.0))
+    assert any(note.startswith("60 messages with a stamp that was") for note in found.notes)
+    assert any(note.startswith("1 messages with a stamp that was") for note in found.notes)
+
+
 def test_what_holds_no_signals_is_left_out_and_named(tmp_path: Path) -> None:
     text = T["std_msgs/msg/String"]("hello")
     empty = T["std_msgs/msg/Empty"]()

@@ -20,6 +20,8 @@ from . import messages
 Vector = NDArray[np.float64]
 STAMPED = 0.9
 """Share of headers that must have a time for these to count: simulated time begins at 0."""
+FRAMES = 8
+"""Frames that are a topic each; a field with more of them is used for something else."""
 ENDS = (".bag", ".mcap", ".db3")
 
 
@@ -28,11 +30,28 @@ class _Collected:
     """Rows of a topic."""
 
     kind: str
-    frames: str = ""
     received: list[int] = field(default_factory=list)
     stamps: list[int] = field(default_factory=list)
+    frames: list[str] = field(default_factory=list)
     rows: list[messages.Row] = field(default_factory=list)
-    units: dict[str, str] = field(default_factory=dict)
+    units: dict[messages.Path, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def within(self, frames: str) -> _Collected:
+        """The rows in some frames."""
+        mine = [place for place, named in enumerate(self.frames) if named == frames]
+
+        def only(items: list[Any]) -> list[Any]:
+            return [items[place] for place in mine]
+
+        note = (
+            f"{len(mine)} of {len(self.rows)} messages of this topic are in "
+            f"{frames or 'no frame'}; those in other frames are a topic of their own"
+        )
+        return _Collected(
+            self.kind, only(self.received), only(self.stamps), only(self.frames), only(self.rows),
+            self.units, [note],
+        )  # fmt: skip
 
 
 def is_bag(path: Path) -> bool:
@@ -66,7 +85,8 @@ def read(path: Path, topics: tuple[str, ...], recorded: bool = False) -> Source:
     try:
         for name, kind, received, message in _messages(path, topics, left):
             for tail, part in messages.parts(message, kind):
-                own = found.setdefault(name + tail, _Collected(kind, messages.frames(part)))
+                own = found.setdefault(name + tail, _Collected(kind))
+                own.frames.append(messages.frames(part))
                 own.received.append(received)
                 own.stamps.append(messages.stamp(part))
                 own.rows.append(messages.numbers(part, kind, own.units))
@@ -80,15 +100,14 @@ def read(path: Path, topics: tuple[str, ...], recorded: bool = False) -> Source:
             "record it again"
         ) from error
     made = []
-    for name, own in found.items():
+    for name, own in _by_frames(found):
         if strange := [t for t in own.received if not isinstance(t, int)]:
             raise ScenarioError(
                 f"{path}: a message of {name} was recorded at {strange[0]!r}, which is no time; "
                 "record the bag again"
             )
-        columns, notes = _columns(own)
-        if columns:
-            made.append(_topic(name, own, columns, notes, recorded))
+        if any(own.rows):
+            made.append(_topic(name, own, recorded))
         else:
             left[name] = f"{own.kind} holds no numbers"
     return Source(path, "ROS bag", tuple(made), plain=False, left=left)
@@ -132,34 +151,67 @@ def _check_size(path: Path, found: dict[str, _Collected]) -> None:
         raise ScenarioError(f"{path}: {excess}; or read fewer topics with --topic")
 
 
-def _columns(own: _Collected) -> tuple[dict[str, Vector], list[str]]:
-    names = list(dict.fromkeys(name for row in own.rows for name in row))
+def _by_frames(found: dict[str, _Collected]) -> Iterator[tuple[str, _Collected]]:
+    """Topics by name; one whose messages are in several frames is several."""
+    for name, own in found.items():
+        frames = dict.fromkeys(own.frames)
+        if len(frames) == 1:
+            yield name, own
+        elif len(frames) > FRAMES:
+            own.notes.append(f"its messages name {len(frames)} frames, {own.frames[0]!r} first")
+            own.frames = [""]
+            yield name, own
+        else:
+            for one in frames:
+                yield f"{name} {one}".strip(), own.within(one)
+
+
+def _columns(own: _Collected) -> tuple[dict[str, Vector], dict[str, str]]:
+    """Columns and their units by name."""
+    names = messages.names(path for row in own.rows for path in row)
     table = {
-        name: np.array([row.get(name, np.nan) for row in own.rows], dtype=np.float64)
-        for name in names
+        name: np.array([row.get(path, np.nan) for row in own.rows], dtype=np.float64)
+        for path, name in names.items()
     }
-    return messages.turned(table, own.units)
+    return table, {names[path]: unit for path, unit in own.units.items() if path in names}
 
 
 def _ordered(
     times: list[int], columns: dict[str, Vector], notes: list[str]
 ) -> tuple[list[int], dict[str, Vector]]:
-    """Rows in the order of their times, the first of several at one time."""
+    """Rows in the order of their times; of several at one time, the first value of each column."""
     stamps = np.array(times, dtype=np.int64)
-    _, first = np.unique(stamps, return_index=True)
+    known, first, places = np.unique(stamps, return_index=True, return_inverse=True)
     again = stamps.size - first.size
     mixed = int(np.count_nonzero(np.diff(stamps) < 0))
+    if not again:
+        ordered = {name: values[first] for name, values in columns.items()}
+    else:
+        ordered, used = {}, np.zeros(stamps.size, dtype=bool)
+        for name, values in columns.items():
+            good = np.flatnonzero(np.isfinite(values))
+            own, place = np.unique(places[good], return_index=True)
+            ordered[name] = np.full(known.size, np.nan)
+            ordered[name][own] = values[good[place]]
+            used[good[place]] = True
+        used[first] = False
+        joined = int(np.count_nonzero(used))
+        again -= joined
+        if joined:
+            notes.append(
+                f"{joined} messages with a stamp that was there already hold columns that the "
+                "first did not, and are put together with it"
+            )
     if again or mixed:
         notes.append(
             f"{again} messages with a stamp that was there already are left out, {mixed} out of "
             "order are put where they belong"
         )
-    return stamps[first].tolist(), {name: values[first] for name, values in columns.items()}
+    return known.tolist(), ordered
 
 
-def _topic(
-    name: str, own: _Collected, columns: dict[str, Vector], notes: list[str], recorded: bool
-) -> Topic:
+def _topic(name: str, own: _Collected, recorded: bool) -> Topic:
+    (columns, units), notes = _columns(own), own.notes
     stamps, received = np.array(own.stamps, dtype=np.int64), np.array(own.received, dtype=np.int64)
     if recorded:
         times = own.received
@@ -176,11 +228,13 @@ def _topic(
         what = "has no header" if np.all(stamps < 0) else "has headers without a time"
         notes.append(f"{what}: times are those at which messages were recorded")
     times, columns = _ordered(times, columns, notes)
-    columns, said = messages.beside_clock(columns, own.units)
+    columns, off = messages.turned(columns, units)
+    columns, said = messages.beside_clock(columns, units)
     clock, origin = integers(times)
     log = Log(
         name, {"time": clock, **columns},
-        units={"time": "ns", **{n: u for n, u in own.units.items() if n in columns}},
+        units={"time": "ns", **{n: u for n, u in units.items() if n in columns}},
         origins={"time": origin} if origin else {},
     )  # fmt: skip
-    return Topic(name, own.kind, log, clock="time", frames=own.frames, notes=(*notes, *said))
+    told = (*notes, *off, *said)
+    return Topic(name, own.kind, log, clock="time", frames=own.frames[0], notes=told)

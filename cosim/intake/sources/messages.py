@@ -8,7 +8,8 @@ lists of more than `LONGEST` numbers (images, scans, clouds).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,9 @@ CLOCK, FIELD = "time", "time_field"
 """Name of the clock of a topic, and of a field of its messages that is called so."""
 PARTS = ("qx", "qy", "qz", "qw")
 TURNS = ("roll", "pitch", "yaw")
-Row = dict[str, float]
+Path = tuple[str, ...]
+"""Fields from a message down to a number."""
+Row = dict[Path, float]
 
 
 def stamp(message: Any) -> int:
@@ -77,42 +80,40 @@ def parts(message: Any, kind: str) -> Iterator[tuple[str, Any]]:
         yield "", message
 
 
-def numbers(message: Any, kind: str, units: dict[str, str]) -> Row:
-    """The numbers of a message by name; what their units are is put into `units`."""
+def numbers(message: Any, kind: str, units: dict[Path, str]) -> Row:
+    """The numbers of a message by path; what their units are is put into `units`."""
     row: Row = {}
     if kind == JOINTS:
         for field, unit in _LISTS.items():
             for name, value in zip(message.name, getattr(message, field), strict=False):
-                row[f"{field}.{name}"] = float(value)
-                units[f"{field}.{name}"] = unit
+                row[(f"{field}.{name}",)] = float(value)
+                units[(f"{field}.{name}",)] = unit
         return row
     _take(message, (), row, units)
     return row
 
 
 def _take(
-    value: Any, path: tuple[str, ...], row: Row, units: dict[str, str],
+    value: Any, path: Path, row: Row, units: dict[Path, str],
     usual: Mapping[str, str] = _UNITS,
 ) -> None:  # fmt: skip
     kind = getattr(value, "__msgtype__", "")
     usual = _OF_RATES if kind == ACCEL else usual
     if kind in TIMES:
-        name = _name(path)
-        row[name], units[name] = nanoseconds(value) * 1e-9, "s"
+        row[path], units[path] = nanoseconds(value) * 1e-9, "s"
     elif kind == QUATERNION:
         if any((value.x, value.y, value.z, value.w)):
             for part, number in zip(PARTS, (value.x, value.y, value.z, value.w), strict=True):
-                row[_name((*path, part))] = float(number)
+                row[(*path, part)] = float(number)
     elif kind:
         for field in value.__dataclass_fields__:
             if field in _NO_SIGNALS or "covariance" in field:
                 continue
             _take(getattr(value, field), (*path, field), row, units, usual)
     elif isinstance(value, (bool, int, float, np.generic)) and not isinstance(value, np.str_):
-        name = _name(path)
-        row[name] = float(value)
+        row[path] = float(value)
         if unit := _unit(path, usual):
-            units[name] = unit
+            units[path] = unit
     elif _is_list(value) and len(value) <= LONGEST:
         for index, item in enumerate(value, 1):
             _take(item, (*path[:-1], f"{path[-1]}_{index}"), row, units, usual)
@@ -122,13 +123,33 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, (str, bytes))
 
 
-def _name(path: tuple[str, ...]) -> str:
-    """Name of a field: without what only wraps, unless nothing is left."""
-    kept = [field for field in path if field not in _PLAIN]
-    return "_".join(kept or path)
+def names(paths: Iterable[Path]) -> dict[Path, str]:
+    """A name for each number of a topic's messages.
+
+    Words that only wrap are no part of it, but as many of the last ones as tell two numbers apart:
+    `position_x` and `orientation_x` where both are vectors.
+    """
+    kept = dict.fromkeys(paths, 0)
+    while True:
+        found = {path: _name(path, count) for path, count in kept.items()}
+        times = Counter(found.values())
+        alike = [path for path, name in found.items() if times[name] > 1]
+        if not alike:
+            return found
+        for path in alike:
+            kept[path] += 1
 
 
-def _unit(path: tuple[str, ...], usual: Mapping[str, str]) -> str:
+def _name(path: Path, wrapping: int) -> str:
+    """Name of a field, with some of the words that only wrap, or all if nothing else is left."""
+    plain = [place for place, field in enumerate(path) if field in _PLAIN]
+    if wrapping > len(plain):  # `a_b` beside a `b` in an `a`
+        return ".".join(path)
+    dropped = plain[: len(plain) - wrapping]
+    return "_".join([f for place, f in enumerate(path) if place not in dropped] or path)
+
+
+def _unit(path: Path, usual: Mapping[str, str]) -> str:
     """Unit of the element of a vector, by the field that holds it."""
     if path[-1] not in ("x", "y", "z") or len(path) < 2:
         # a pose in the plane, or a point alone
