@@ -20,10 +20,12 @@ DAY = 10**15
 _COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 _GROUPS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
 """What may be 1234 as well as 1.234."""
 _SPACES = " '\u2019\u00a0\u2009\u202f"
 _GROUPED = re.compile(
-    r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:[" + _SPACES + r"]\d{3})+(?:[.,]\d*)?)"
+    r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,}"
+    r"|(?:[" + _SPACES + r"]\d{3})+(?:[.,]\d*)?)"
 )
 """Numbers whose thousands are separated."""
 _MEASURED = re.compile(
@@ -125,6 +127,12 @@ def decimal_comma(cells: Sequence[str]) -> tuple[bool, str]:
     commas = [text for cell in cells if _COMMA.fullmatch(text := cell.strip().strip('"').strip())]
     sure = any(not _GROUPS.fullmatch(text) for text in commas)
     return sure, commas[0] if commas and not sure else ""
+
+
+def thousands(cells: Sequence[str]) -> str:
+    """A cell whose point may separate thousands, "" if a point among the cells may not."""
+    points = [text for cell in cells if "." in (text := cell.strip().strip('"').strip())]
+    return points[0] if points and all(map(_POINTS.fullmatch, points)) else ""
 
 
 def _number(text: str, comma: bool) -> float | None:

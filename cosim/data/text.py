@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..errors import ScenarioError, UnitError
 from ..reading.limits import DATA
 from ..spec.units import parse
-from .cells import EXACT, Gaps, ambiguity, decimal_comma, numbers
+from .cells import EXACT, Gaps, ambiguity, decimal_comma, numbers, thousands
 
 Vector = NDArray[np.float64]
 SEPARATORS = (";", "\t", ",", "|")
@@ -184,6 +184,13 @@ def text_table(path: Path) -> Table:
                     "thousands, or with a decimal point"
                 )
             gaps = replace(gaps, fault=fault)
+        elif sure and (unclear := thousands(cells)):
+            fault = (
+                f"has the cell {unclear!r}, which may mean {unclear.replace('.', '')} or, beside "
+                f"the decimal commas of other columns, {unclear.replace('.', ',')}; write numbers "
+                "without separators of thousands, and all with one decimal mark"
+            )
+            gaps = replace(gaps, fault=fault)
         table.units[name] = unit
         table.add(name, values, gaps, origin, exact_of(cells, gaps))
     return table
@@ -223,27 +230,49 @@ def _decoded(path: Path, table: Table) -> str:
 
 
 def _separator(lines: list[str]) -> str:
-    """What separates the columns: what is in the head as often as in most rows."""
+    """What separates the columns: what is in the head as often as in most rows.
+
+    One more may end the head, or the rows.
+    """
     some = lines[:1] + lines[1:50]
     for mark in SEPARATORS:
-        counts = [line.count(mark) for line in some]
-        same = sum(count == counts[0] for count in counts)
-        if counts[0] and same > 0.5 * len(counts):
+        counts = [{line.count(mark), line.removesuffix(mark).count(mark)} for line in some]
+        same = sum(not count.isdisjoint(counts[0]) for count in counts)
+        if mark in lines[0] and same > 0.5 * len(counts):
             return mark
     if "," in lines[0]:
         return ","
-    counts = [len(line.split()) for line in some]
-    if counts[0] > 1 and counts.count(counts[0]) == len(counts):
+    blanks = [len(line.split()) for line in some]
+    if blanks[0] > 1 and blanks.count(blanks[0]) == len(blanks):
         return " "
     return ","
 
 
 def _split(lines: list[str], separator: str, path: Path) -> Iterator[list[str]]:
+    """Rows of lines.
+
+    Raises:
+        ScenarioError: they are none of a table, or a quotation mark makes one of several rows.
+    """
     if separator == " ":
         yield from (line.split() for line in lines)
         return
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    begin, least = 0, 0
     try:
-        yield from csv.reader(lines, delimiter=separator, skipinitialspace=True)
+        for row in reader:
+            end = reader.line_num
+            # a cell may go over several lines, but one that holds the marks of a row is none
+            least = least or 2 * (len(row) - 1)
+            over = lines[begin:end] if end > begin + 1 else []
+            if over and sum(line.count(separator) for line in over) >= least > 0:
+                raise ScenarioError(
+                    f"{path}: the quotation mark in {lines[begin][-60:]!r} is not closed in its "
+                    f"line and takes in the {end - begin - 1} rows after it; close it or take it "
+                    "away"
+                )
+            begin = end
+            yield row
     except csv.Error as error:
         raise ScenarioError(
             f"{path}: is not a table of text ({error}); save it as CSV in UTF-8"
@@ -257,15 +286,22 @@ def _numeric(row: list[str]) -> bool:
 
 
 def _units(rows: list[list[str]], names: list[tuple[str, str]]) -> list[str]:
-    """Units of the columns; a first row that holds nothing but units is taken away."""
+    """Units of the columns; a first row that holds units is taken away.
+
+    It holds no number but `1`, half of the rest are known units or the first is one of time, and
+    below these stand numbers. Other units stay as they are written, as those in heads do.
+    """
     units = [unit for _, unit in names]
     if len(rows) < 2 or len(rows[0]) != len(names) or any(units):
         return units
     cells = [cell.strip().strip("[]()") for cell in rows[0]]
-    said = [cell for cell in cells if cell and cell != "-"]
-    if not said or _numeric(cells) or not all(spelled(cell) for cell in said):
+    said = [cell for cell in cells if cell not in ("", "-", "1")]
+    known = [index for index, cell in enumerate(cells) if cell in said and spelled(cell)]
+    if any(numbers([cell])[1].strange == 0 for cell in said):
         return units
-    if not _numeric(rows[1]) or any(numbers([cell])[1].strange == 0 for cell in said):
+    timed = known[:1] == [0] and parse(spelled(cells[0])).exponents == parse("s").exponents
+    below = [rows[1][index] for index in known if index < len(rows[1])]
+    if not (timed or 2 * len(known) >= len(said)) or not _numeric(below):
         return units
     rows.pop(0)
-    return [spelled(cell) if cell else "" for cell in cells]
+    return [spelled(cell) or cell for cell in cells]

@@ -164,6 +164,8 @@ def cells_of(*cells: str, separator: str = ";", time: Callable[[int], str] = str
         (cells_of("998,5", "1\u202f002,5"), r"has the cell '1\u202f002,5'; write numbers without"),
         (cells_of("998", "999", "1.02 rad/s"), "'w' has the cell '1.02 rad/s' among numbers; "),
         (cells_of("998", "999", "1.02", time=lambda k: f"{1000 + 10 * k:,}"), "'1,000', which"),
+        (cells_of("998", "1.234", time=lambda k: f"0,{k:02}"), "may mean 1234 or, beside the"),
+        (cells_of("998", "999", "1.234.567"), "'w' has the cell '1.234.567'; write numbers"),
     ],
 )
 def test_numbers_that_may_mean_others(tmp_path: Path, log: str, message: str) -> None:
@@ -180,6 +182,15 @@ def test_numbers_that_can_mean_one_thing_only(tmp_path: Path, cells: tuple[str, 
     found = read_log(tmp_path / "log.csv")["w"][:2]
     assert [w for w, f in zip(wanted, found, strict=True) if np.isfinite(f)] == [
         f for f in found if np.isfinite(f)]  # fmt: skip
+
+
+@pytest.mark.parametrize("cells", [("0.998", "1.234"), ("998.5", "1.234"), ("1.2345", "1.234")])
+def test_points_beside_decimal_commas_that_separate_no_thousands(
+    tmp_path: Path, cells: tuple[str, ...]
+) -> None:
+    log = cells_of(*cells, time=lambda k: f"0,{k:02}")
+    (tmp_path / "log.csv").write_text(log, encoding="utf-8")
+    assert read_log(tmp_path / "log.csv")["w"][:2].tolist() == [float(cell) for cell in cells]
 
 
 def test_an_unclear_column_that_nobody_uses(tmp_path: Path) -> None:

@@ -48,6 +48,59 @@ def test_the_first_line_of_spreadsheets_says_what_separates(tmp_path: Path, mark
 
 
 @pytest.mark.parametrize(
+    ("row", "units"),
+    [
+        ("ms;rpm;ticks", ["ms", "rpm", "ticks"]), ("ms;rpm;1", ["ms", "rpm", "1"]),
+        ("[ms];-;[ticks]", ["ms", "-", "ticks"]), ("ms;raw;raw", ["ms", "raw", "raw"]),
+        ("begin;rpm;on", None), ("1;1;1", None), ("ms;rpm;7", None),
+    ],
+)  # fmt: skip
+def test_a_row_of_units_may_hold_some_that_are_not_known(
+    tmp_path: Path, row: str, units: list[str] | None
+) -> None:
+    rows = "".join(f"{k};{2 * k};{3 * k}\n" for k in range(9))
+    found = read_log(log(tmp_path, f"time;speed;enc\n{row}\n{rows}"))
+    assert list(found.units.values()) == (units or ["", "", ""])
+    assert found["time"].size == (9 if units else 10)
+
+
+def test_a_row_of_units_above_a_text_is_one(tmp_path: Path) -> None:
+    found = read_log(log(tmp_path, "time;speed;note\nms;rpm;\n1;2;ok\n2;3;ok\n"))
+    assert found.units == {"time": "ms", "speed": "rpm", "note": ""}
+    found = read_log(log(tmp_path, "time;speed;mode\n;;A\n1;2;B\n2;3;B\n"))  # no ampere
+    assert found["time"].size == 3 and not any(found.units.values())
+
+
+@pytest.mark.parametrize("head", ["time;note;u", "note;time;u", "time;u;note"])
+def test_a_quotation_mark_that_is_not_closed_takes_in_no_rows(tmp_path: Path, head: str) -> None:
+    rows = [{"time": str(k), "u": "1", "note": "ok"} for k in range(40)]
+    rows[20]["note"] = '"begin'
+    text = "\n".join([head, *(";".join(row[name] for name in head.split(";")) for row in rows)])
+    with pytest.raises(ScenarioError, match=r"\"begin.* takes in the 19 rows after it; close it"):
+        read_log(log(tmp_path, text))
+    rows[22]["note"] = 'end"'
+    text = "\n".join([head, *(";".join(row[name] for name in head.split(";")) for row in rows)])
+    with pytest.raises(ScenarioError, match=r"takes in the 2 rows after it; close it"):
+        read_log(log(tmp_path, text))
+
+
+def test_cells_and_heads_may_go_over_lines(tmp_path: Path) -> None:
+    text = 'sep=;\n"time\n[ms]";"speed\n[rpm]";note\n0;1;"seen;\nand gone"\n1;2;\n'
+    found = read_log(log(tmp_path, text))
+    assert (found.units["time"], found.units["speed"]) == ("ms", "rpm")
+    assert found["speed"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("mark", [";", "\t", "|", ","])
+@pytest.mark.parametrize("ends", [("", "X"), ("X", "X"), ("X", "")])
+def test_a_separator_may_end_head_or_rows(tmp_path: Path, mark: str, ends: tuple[str, str]) -> None:
+    head, row = (end.replace("X", mark) for end in ends)
+    lines = [f"time{mark}u{mark}y{head}", *(mark.join("123") + row for _ in range(9))]
+    found = read_log(log(tmp_path, "\n".join(lines)))
+    assert [found[name][0] for name in ("time", "u", "y")] == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
     ("text", "name", "unit"),
     [
         ("rate [1/s]", "rate", "1/s"), ("bend [1/m]", "bend", "1/m"),
