@@ -16,11 +16,12 @@ import numpy as np
 
 from ..data.segments import relative_pose
 from ..data.signals import Signal
-from ..errors import FmuCallError
+from ..errors import FmuCallError, ValueRangeError
 from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
 from ..master.session import Session
+from ..reading.limits import DATA
 from .budget import Budget
 from .parts import CLOCK, COINCIDENT, MeasuredRun, Sampler, Vector
 from .pool import Key, Ran, SessionPool
@@ -113,6 +114,12 @@ class Simulator:
         first = float(run.times[0]) - run.lead
         last = float(run.times[-1]) + max(channel.shift for channel in problem.channels)
         count = math.ceil((last - first) / size - COINCIDENT)
+        if excess := DATA.excess(8 * count * every * (1 + len(run.inputs))):
+            raise ValueRangeError(
+                f"run {run.name}: its samples are {run.interval:.4g} s apart, so it takes "
+                f"{count * every} steps of {problem.step:g} s ({excess}); if its clock is not in "
+                "seconds, say so in [columns], time = { source = '...', from = 'ms' }"
+            )
         return (
             master,
             count * size,

@@ -13,14 +13,23 @@ from ..spec.units import parse
 from .scales import known
 
 Vector = NDArray[np.float64]
-EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
-"""Times since 1970 from the first on are in the unit of the second [s]: what counts seconds reaches
-1e11 in the year 5138, and what counts milliseconds was there in 1973."""
+FACTORS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""[s] of the units of clocks."""
+EPOCH = (6.3e8, 4.1e9)
+"""[s] from 1970 to 1990 and to 2100: a number is a time since 1970 in the unit in which it lies
+between them. What counts since a computer began is there after weeks in the next finer unit only,
+but after minutes in those below."""
 SINCE = 1e9
 """[s] from 1970 to 2001: where one clock counts from 1970, another that is beyond this in seconds
 does so, too."""
 LONG = 20.0
 """A clock that spans more than so many times its samples at its usual interval has jumped."""
+
+
+def since_1970(size: float) -> str:
+    """The unit in which a number is a time since 1970, "" if there is none."""
+    units = (unit for unit, factor in FACTORS.items() if EPOCH[0] <= size * factor <= EPOCH[1])
+    return next(units, "")
 
 
 class Clocks:
@@ -65,8 +74,8 @@ class Clocks:
                     "which is no time; name another column with time"
                 )
             return found.factor
-        size = self._size(name)
-        return next((factor for least, factor in EPOCHS if size >= least), None)
+        epoch = since_1970(self._size(name))
+        return FACTORS[epoch] if epoch not in ("", "s") else None
 
     def _size(self, name: str) -> float:
         """How far a clock is from 0, in its unit."""

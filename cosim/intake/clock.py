@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.checks.times import interval
+from ..calibrate.stamps import EPOCH
 from ..errors import UnitError
 from ..spec.units import parse
-from .guess import EPOCHS, Guess, guess_time
+from .guess import Guess, guess_time
 from .topic import Topic
 from .words import TIME, words
 
@@ -98,7 +99,7 @@ def find_clock(topic: Topic) -> Clock:
         return Clock(column, unit, np.zeros(0))
     first = times[good][0]
     since = first + origin * factor
-    epoch = any(name == unit.unit and since / factor >= least for name, least, _ in EPOCHS)
+    epoch = EPOCH[0] <= since <= EPOCH[1]
     times = times - first
     steps = np.diff(times[good])
     if not steps.size:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.stamps import EPOCHS
+from ..calibrate.stamps import since_1970
 from ..files import atomic, make_folder, writing
 from ..spec.distribution import has
 from ..spec.units import parse
@@ -32,7 +32,7 @@ def known_clock(part: Part) -> bool:
     if log.units.get(clock.column):
         return True
     size = abs(float(np.nanmedian(log[clock.column]))) + log.origins.get(clock.column, 0)
-    return any(size >= least for least, _ in EPOCHS)
+    return since_1970(size) == clock.unit.unit != "s"
 
 
 def readable(parts: Sequence[Part]) -> bool:

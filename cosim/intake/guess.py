@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.stamps import FACTORS, since_1970
 from ..errors import UnitError
 from ..spec.units import parse
 from .words import pieces, words
@@ -31,8 +32,9 @@ _LETTERS = {"m": "m", "s": "s", "V": "V", "A": "A", "N": "N", "W": "W", "Nm": "N
 _OVER = {"rad": "rad", "deg": "deg", "m": "m", "mm": "mm", "cm": "cm", "km": "km", "rev": "rev"}
 """What stands before `_s`, `_per_s` or `_s2`."""
 _UNDER = {"s": "s", "sec": "s", "s2": "s2", "h": "h"}
-EPOCHS = (("ns", 1e17, 1e-9), ("us", 1e14, 1e-6), ("ms", 1e11, 1e-3), ("s", 1e8, 1.0))
-"""Units of times since 1970, the size from which a number is one (1973), and the unit in s."""
+SLOW = 60.0
+"""[s] Interval beyond which what may be a time since 1970 is none, if it is usual in a finer unit:
+20 ms of a counter of microseconds are 20 000 s there."""
 PERIODS = (1e-4, 2.0)
 """Usual intervals of logs [s], between which that of a clock without a unit should be."""
 TURNS = (("rad", 2.0 * np.pi), ("deg", 360.0))
@@ -187,17 +189,19 @@ def guess_time(name: str, values: Vector, said: str = "", origin: int = 0) -> Gu
         return Guess(said, "stated in the log", sure=True)
     good = values[np.isfinite(values)]
     size = abs(float(np.median(good))) + origin if good.size else 0.0
-    for unit, least, _ in EPOCHS:
-        if size >= least and (unit != "s" or size < 1e10):
-            named = unit_in_name(name)
-            if named and named != unit:
-                break
-            return Guess(unit, f"{size:.4g} is a time since 1970", sure=unit != "s")
-    if unit := unit_in_name(name):
-        return Guess(unit, "its name ends with it", sure=True)
     steps = np.diff(good)
     usual = float(np.median(steps)) if steps.size else 0.0
-    for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-        if PERIODS[0] <= usual * factor <= PERIODS[1]:
-            return Guess(unit, f"an interval of {usual:.4g} is then {usual * factor:.4g} s")
+    epoch, named = since_1970(size), unit_in_name(name)
+    by_interval = next(
+        (unit for unit, factor in FACTORS.items()
+         if PERIODS[0] <= usual * factor <= PERIODS[1]), "")  # fmt: skip
+    if epoch and named in ("", epoch):
+        finer = by_interval and FACTORS[by_interval] < FACTORS[epoch]
+        if usual * FACTORS[epoch] <= SLOW or not finer:
+            return Guess(epoch, f"{size:.4g} is a time since 1970", sure=epoch != "s")
+    if named:
+        return Guess(named, "its name ends with it", sure=True)
+    if by_interval:
+        interval = usual * FACTORS[by_interval]
+        return Guess(by_interval, f"an interval of {usual:.4g} is then {interval:.4g} s")
     return Guess("", f"an interval of {usual:.4g} is of no usual size")

@@ -14,7 +14,7 @@ from cosim.calibrate import Problem, read_problem
 from cosim.calibrate.checks.examine import examine
 from cosim.calibrate.checks.finding import Finding
 from cosim.data.logs import read_log
-from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError
+from cosim.errors import InputError, ScenarioError, UnitError, UnknownNameError, ValueRangeError
 from tests.problems import simulator
 
 STEP, SIZE, J, B = 0.01, 300, 0.5, 1.0
@@ -133,6 +133,14 @@ def test_nanoseconds_since_1970_are_exact(tmp_path: Path) -> None:
     run = read(tmp_path, log).run("one")
     # 15 digits are left of 1e15 ns, a tenth of a nanosecond
     np.testing.assert_allclose(run.times, TIMES, rtol=0, atol=1e-9)
+
+
+def test_a_clock_in_a_unit_that_nothing_tells_takes_no_memory(tmp_path: Path) -> None:
+    """Nanoseconds since a computer began, taken as seconds: 3e11 steps."""
+    log = written("time,tau,w", ",", 1e9 * TIMES, TORQUE, SPEED)
+    problem = read(tmp_path, log)
+    with pytest.raises(ValueRangeError, match=r"one: its samples are 1e\+07 s apart, so it takes"):
+        simulator(problem).simulate(problem.nominal, "one")
 
 
 def test_cells_without_a_number_are_gaps_and_counted(tmp_path: Path) -> None:

@@ -71,6 +71,28 @@ def test_unit_of_a_clock(name: str, first: float, step: float, unit: str) -> Non
     assert guess_time(name, first + step * np.arange(100)).unit == unit
 
 
+@pytest.mark.parametrize(
+    ("name", "first", "step", "unit"),
+    [
+        ("t", 1.8e13, 2e7, "ns"), ("micros", 1.5e8, 2e4, "us"), ("micros", 2e9, 2e4, "us"),
+        ("millis", 1.08e8, 20.0, "ms"), ("t", 9e8, 2e7, "ns"), ("t", 2e12, 2e7, "ns"),
+        ("stamp_ns", 5e12, 2e7, "ns"), ("stamp_ns", 2e12, 2e7, "ns"),
+    ],
+)  # fmt: skip
+def test_what_counts_since_boot_is_no_time_since_1970(
+    name: str, first: float, step: float, unit: str
+) -> None:
+    clock = find_clock(_topic(**{name: first + step * np.arange(1000)}))
+    assert (clock.unit.unit, clock.began()) == (unit, "")
+    # factor of the unit times the step, in doubles
+    assert clock.interval == pytest.approx(step * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}[unit])
+
+
+@pytest.mark.parametrize(("first", "step"), [(1.7e9, 10.0), (1.7e12, 6e4), (1.7e18, 3.6e12)])
+def test_slow_logs_have_times_since_1970(first: float, step: float) -> None:
+    assert find_clock(_topic(t=first + step * np.arange(100))).began().startswith("2023-11")
+
+
 def _topic(**columns: np.ndarray) -> Topic:
     return Topic("x", "CSV", Log("x", columns))
 

@@ -120,6 +120,22 @@ def test_clocks_in_units_that_a_mapping_cannot_know_are_converted(
     assert np.diff(run.inputs["base.w_l"].times)[:-1] == pytest.approx(0.02, abs=1e-9)  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("begin", [5 * 10**12, 2 * 10**12])
+def test_nanoseconds_since_boot_are_told_to_the_mapping(tmp_path: Path, begin: int) -> None:
+    """2e12 is a time since 1970 in ms, and the mapping knows sizes only."""
+    run = drive(0)
+    rows = np.column_stack([np.rint(run.stamped * 1e9) + begin, run.pose,
+                            np.interp(run.stamped, run.commanded, run.left),
+                            np.interp(run.stamped, run.commanded, run.right)])  # fmt: skip
+    np.savetxt(tmp_path / "a_log.csv", rows, delimiter=",", comments="", fmt="%.17g",
+               header="stamp_ns,x,y,heading_rad,left_rpm,right_rpm")  # fmt: skip
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    imported(tmp_path, tmp_path / "set")
+    times = read_problem(tmp_path / "set").runs[0].times
+    # nanoseconds are whole
+    assert np.diff(times) == pytest.approx(np.diff(run.stamped), abs=2e-9)
+
+
 def test_a_merged_table_with_two_clocks_is_taken_apart(tmp_path: Path) -> None:
     run = drive(1, late=0.1)
     lines = ["c_t,c_left_rpm,c_right_rpm,p_t,p_x_m,p_y_m,p_yaw_rad"]
