@@ -64,7 +64,7 @@ def inspect_command(
 
     Example: `cosim data inspect log.csv --plot log.png`
     """
-    from ..intake.inspect import inspect
+    from ..intake.inspect import check_clock, inspect
     from ..intake.picture import draw
 
     if plot is not None and plot.suffix.lower() not in PICTURES:
@@ -74,6 +74,7 @@ def inspect_command(
         for path in files:
             told(f"reading {path}")
             reports.append(inspect(path, topics or (), clock, received))
+    check_clock(reports, clock)
     made = []
     if plot is not None:
         path, left = draw(reports, plot)

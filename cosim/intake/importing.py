@@ -24,7 +24,7 @@ from .drafting import columns_of, draft_of, layout
 from .files import place
 from .given import take
 from .guess import Guess
-from .inspect import FileReport, inspect
+from .inspect import FileReport, check_clock, inspect
 from .matching import Column, Match, Matches, Place, candidates, guess, places_of
 from .refine import add_parameters, add_starts, choose_steps, short
 from .runs import Run, check_alike, parts_of
@@ -153,6 +153,7 @@ def import_logs(
 
     Raises:
         InputError: what is missing or does not fit, with the flag to give.
+        UnknownNameError: no file has the clock that is wished.
     """
     if (folder / NAME).exists():
         raise InputError(
@@ -165,6 +166,7 @@ def import_logs(
         Run(name, purposes[name], parts_of(name, [inspected(path) for path in paths]))
         for name, paths in files.items()
     ]
+    check_clock([inspected(path) for paths in files.values() for path in paths], wishes.clock)
     check_alike(runs)
     variables = places_of(system)
     columns = columns_of(runs)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..calibrate.checks.finding import Finding
 from ..calibrate.checks.smooth import ENOUGH, ORDER, roughness
+from ..errors import UnknownNameError, listing
 from .clock import Clock, find_clock
 from .guess import Guess, guess_unit
 from .rules import cells, copies, limits, spiking, still, times, turning
@@ -116,6 +117,23 @@ def inspect(
         timed = [replace(t, clock=clock) if clock in t.log.columns else t for t in source.topics]
         source = replace(source, topics=tuple(timed))
     return FileReport(source, tuple(inspect_topic(topic) for topic in source.topics))
+
+
+def check_clock(reports: Iterable[FileReport], clock: str) -> None:
+    """Refuse a clock that none of the files has; "" is none that was asked for.
+
+    Raises:
+        UnknownNameError: with the columns that there are.
+        ScenarioError: it holds text.
+    """
+    logs = [topic.topic.log for report in reports for topic in report.topics]
+    if not clock or any(clock in log.columns for log in logs):
+        return
+    for log in logs:
+        if clock in log.texts:
+            log[clock]  # says what it holds
+    names = dict.fromkeys(name for log in logs for name in log.columns)
+    raise UnknownNameError(f"--clock {clock}: no log has such a column; {listing(names, clock)}")
 
 
 def inspect_topic(topic: Topic) -> TopicReport:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from cosim.cli.app import app
 from cosim.data.logs import read_log
 from cosim.data.text import head
-from cosim.errors import InputError, ScenarioError
+from cosim.errors import InputError, ScenarioError, UnknownNameError
 from cosim.installation.builder import default_provider
 from cosim.intake.example import SYSTEM
 from cosim.intake.importing import Wishes, import_logs
@@ -139,6 +139,35 @@ def test_inspect_takes_the_clock_that_it_asks_for(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["data", "inspect", str(path), "--clock", "instant", "--json"])
     (file,) = json.loads(done.stdout)["files"]
     assert file["topics"][0]["clock"]["column"] == "instant"
+
+
+def test_a_clock_that_no_file_has_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("stamp;u\n" + ROWS)
+    files = [log(tmp_path, "stamp;instant;w\n" + ROWS.replace("\n", ";1\n")), tmp_path / "b.csv"]
+    texts = [str(path) for path in files]
+    # one that one of several files has is not
+    done = CliRunner().invoke(app, ["data", "inspect", *texts, "--clock", "instant"])
+    assert done.exit_code == 0
+    done = CliRunner().invoke(app, ["data", "inspect", *texts, "--clock", "instnt"])
+    assert done.exit_code and isinstance(done.exception, UnknownNameError)
+    assert "did you mean 'instant'?" in str(done.exception)
+    (tmp_path / "robot.toml").write_text(SYSTEM)
+    wishes = Wishes(str(tmp_path / "robot.toml"), clock="instnt")
+    with pytest.raises(UnknownNameError, match="--clock instnt: no log has such a column; did you"):
+        import_logs({"a": files}, {"a": "identification"}, wishes, tmp_path / "set",
+                    default_provider())  # fmt: skip
+
+
+def test_what_has_no_clock_of_its_length_is_left_out_of_several(tmp_path: Path) -> None:
+    slow, fast = 0.05 * np.arange(40.0), 0.02 * np.arange(100.0)
+    np.savez(tmp_path / "a.npz", start=np.ones(3), t_cmd=fast, u_cmd=fast, t_pose=slow,
+             x_pose=slow, other=np.append(slow, 9.0)[1:], noise_cmd=np.ones(2))  # fmt: skip
+    report = inspect(tmp_path / "a.npz")
+    assert {t.topic.name: [c.name for c in t.columns] for t in report.topics} == {
+        "cmd": ["u_cmd"], "pose": ["x_pose", "other"],
+    }  # fmt: skip
+    why = "values, as many as no clock has"
+    assert report.source.left == {"start": f"3 {why}", "noise_cmd": f"2 {why}"}
 
 
 def test_dates_of_an_npz_file_are_a_column(tmp_path: Path) -> None:

@@ -37,7 +37,12 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
               notes=(f"the table has {len(shares)} clocks; these columns are on {clock}",))
         for clock, names in shares.items()
     ]  # fmt: skip
-    return Source(path, kind, tuple(made), plain=False)
+    taken = {name for clock, names in shares.items() for name in (clock, *names)}
+    left = {
+        name: f"{values.size} values, as many as no clock has"
+        for name, values in log.columns.items() if name not in taken
+    }  # fmt: skip
+    return Source(path, kind, tuple(made), plain=False, left=left)
 
 
 def _name(path: Path, clock: str) -> str:
@@ -56,7 +61,7 @@ def _named_alike(clock: str, column: str) -> bool:
 
 
 def _shares(log: Log) -> dict[str, list[str]]:
-    """Columns by clock, one entry if there is one clock only."""
+    """Columns by clock that has as many values, one entry if there is one clock only."""
     named = [n for n, v in log.columns.items() if TIME in words(n) and rises(v)]
     masks = {name: np.isfinite(values) for name, values in log.columns.items()}
     clocks: list[str] = []
@@ -69,9 +74,11 @@ def _shares(log: Log) -> dict[str, list[str]]:
     for name in log.columns:
         if name in clocks:
             continue
-        own = [c for c in clocks if _named_alike(c, name)]
-        own = own or [c for c in clocks if _same(masks[c], masks[name])]
-        shares[(own or clocks)[0]].append(name)
+        as_long = [c for c in clocks if log[c].shape == log[name].shape]
+        own = [c for c in as_long if _named_alike(c, name)]
+        own = own or [c for c in as_long if _same(masks[c], masks[name])] or as_long
+        if own:
+            shares[own[0]].append(name)
     return {clock: names for clock, names in shares.items() if names}
 
 
