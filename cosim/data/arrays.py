@@ -129,12 +129,15 @@ def _add_times(table: Table, name: str, values: NDArray[Any]) -> None:
 
 
 def matlab_table(path: Path) -> Table:
-    """Read a MATLAB file; a matrix becomes a column each, `name_1`, `name_2`.
+    """Read a MATLAB file; a matrix becomes columns `name_1`, `name_2`, a structure `name.field`.
 
     Raises:
         ScenarioError: it is none, damaged or too large.
     """
-    table = Table()
-    for name, values in read_matlab(path).items():
+    table, left = Table(), dict[str, str]()
+    for name, values in read_matlab(path, left).items():
         _add(table, path, name, values)
+    if left:
+        what = ", ".join(f"{name!r} ({kind})" for name, kind in left.items())
+        table.notes.append(f"{what}: holds no columns of numbers and is left out")
     return table

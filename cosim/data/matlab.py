@@ -2,7 +2,8 @@
 
 SciPy's reader is compiled and trusts the sizes that a file states; a damaged file can end the
 process. Columns of numbers need little of the format (MAT-File Format, MathWorks, R2023b): full
-real arrays of version 4, 6 and 7. Other variables (cells, structures, text, sparse) are left out.
+real arrays of version 4, 6 and 7, and single structures of these, as columns `NAME.FIELD`. Other
+variables (cells, arrays of structures, text, tables, sparse and complex arrays) are left out.
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError
 from ..reading.limits import DATA
-from .matlab73 import read_matlab73
+from .matlab73 import DEPTH, read_matlab73
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
           13: "u8"}  # fmt: skip
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8",
             15: "u8"}  # fmt: skip
+_STRUCTURE = 2
+_OTHERS = {1: "a cell", 3: "an object", 4: "text", 5: "sparse", 16: "a function", 17: "an object"}
+"""Other classes; tables, too, are objects."""
 _COMPLEX = 0x0800
 _OLD = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
 """Types of version 4."""
@@ -34,12 +38,20 @@ _DIMENSIONS = 32
 """Of an array; numpy has no more than 64."""
 
 
+Item = tuple[str, NDArray[Any] | str]
+"""Name and values of a variable, or what it is instead of numbers."""
+
+
 class _Damage(Exception):
     """What does not fit together in a file."""
 
 
-def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
+def read_matlab(path: Path, left: dict[str, str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of numbers by name, without dimensions of one element.
+
+    Args:
+        path: of the file.
+        left: what is left out is put here, by name: what it is.
 
     Raises:
         ScenarioError: it is no MATLAB file, damaged or too large.
@@ -52,7 +64,7 @@ def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
     if _HDF5 in content[:520] or content.startswith(b"MATLAB 7.3"):
-        return read_matlab73(path)
+        return read_matlab73(path, left)
     old = 0 in content[:4]
     try:
         found = dict(_version4(content) if old else _version5(content))
@@ -61,13 +73,15 @@ def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
             f"{path}: is not a whole MATLAB file of version 7 or older ({error}); save it again "
             "with -v7"
         ) from error
-    return found
+    if left is not None:
+        left.update({name: item for name, item in found.items() if isinstance(item, str)})
+    return {name: item for name, item in found.items() if not isinstance(item, str)}
 
 
 # -- version 5 to 7 --------------------------------------------------------------------------------
 
 
-def _version5(content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
+def _version5(content: bytes) -> Iterator[Item]:
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if order is None:
         raise _Damage("its head names no byte order")
@@ -105,25 +119,59 @@ def _element(content: bytes, place: int, order: str) -> tuple[int, bytes, int]:
     return int(kind), data, following
 
 
-def _matrix(data: bytes, order: str) -> Iterator[tuple[str, NDArray[Any]]]:
+def _matrix(data: bytes, order: str, field: str = "", depth: int = DEPTH) -> Iterator[Item]:
+    """A variable, or the field of a structure, whose name is not in it."""
     kind, flags, place = _element(data, 0, order)
     if kind != _UINT32 or len(flags) != 8:
         raise _Damage("a variable without flags")
     flag = int(struct.unpack_from(f"{order}I", flags)[0])
-    if flag & 0xFF not in _CLASSES or flag & _COMPLEX:
-        return
+    own = flag & 0xFF
     kind, sizes, place = _element(data, place, order)
+    if own not in _CLASSES and own != _STRUCTURE:
+        if kind != _INT8:  # objects have no dimensions
+            kind, sizes, place = _element(data, place, order)
+        yield field or sizes.decode("latin-1"), _OTHERS.get(own, f"of class {own}")
+        return
     if kind != _INT32 or not sizes or len(sizes) % 4 or len(sizes) > 4 * _DIMENSIONS:
         raise _Damage("a variable without dimensions")
     shape = struct.unpack(f"{order}{len(sizes) // 4}i", sizes)
     kind, name, place = _element(data, place, order)
     if kind != _INT8:
         raise _Damage("a variable without a name")
-    text = name.decode("latin-1")
+    text = field or name.decode("latin-1")
+    if not text:  # where MATLAB keeps what is in objects
+        return
+    if own == _STRUCTURE:
+        if math.prod(shape) != 1 or not depth:
+            yield text, "an array of structures" if depth else "a structure too deep"
+        else:
+            yield from _fields(data, place, order, text, depth - 1)
+        return
+    if flag & _COMPLEX:
+        yield text, "complex"
+        return
     kind, values, _ = _element(data, place, order)
     if kind not in _TYPES:
         raise _Damage(f"variable {text!r} has values of the unknown type {kind}")
     yield text, _shaped(text, values, f"{order}{_TYPES[kind]}", shape, _CLASSES[flag & 0xFF])
+
+
+def _fields(data: bytes, place: int, order: str, name: str, depth: int) -> Iterator[Item]:
+    """The fields of a single structure."""
+    kind, width, place = _element(data, place, order)
+    if kind != _INT32 or len(width) != 4:
+        raise _Damage(f"structure {name!r} without the length of its names")
+    (length,) = struct.unpack(f"{order}i", width)
+    kind, names, place = _element(data, place, order)
+    if kind != _INT8 or length < 1 or len(names) % length:
+        raise _Damage(f"structure {name!r} without names")
+    for begin in range(0, len(names), length):
+        field = names[begin : begin + length].partition(b"\0")[0].decode("latin-1")
+        kind, item, place = _element(data, place, order)
+        if kind != _MATRIX:
+            raise _Damage(f"structure {name!r} without its field {field!r}")
+        if item:  # nothing was put into it
+            yield from _matrix(item, order, f"{name}.{field}", depth)
 
 
 def _shaped(
@@ -143,7 +191,7 @@ def _shaped(
 # -- version 4 -------------------------------------------------------------------------------------
 
 
-def _version4(content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
+def _version4(content: bytes) -> Iterator[Item]:
     place = 0
     while place < len(content):
         kind, *_ = struct.unpack_from("<i", content, place)
@@ -171,3 +219,5 @@ def _version4(content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
             raise _Damage(f"variable {name!r} is cut short")
         if form == 0 and not imaginary:
             yield name, _shaped(name, values, stored, (rows, columns), _OLD[precision])
+        else:
+            yield name, ("complex", "text", "sparse")[form]

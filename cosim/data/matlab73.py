@@ -21,11 +21,15 @@ from ..reading.limits import DATA
 DEPTH = 8
 """Structures within structures."""
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_LEFT_OUT = (b"char", b"cell", b"function_handle")
+_LEFT_OUT = {b"char": "text", b"cell": "a cell", b"function_handle": "a function"}
 
 
-def read_matlab73(path: Path) -> dict[str, NDArray[Any]]:
+def read_matlab73(path: Path, left: dict[str, str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of numbers by name, without dimensions of one element.
+
+    Args:
+        path: of the file.
+        left: what is left out is put here, by name: what it is.
 
     Raises:
         InputError: the library is not installed.
@@ -41,10 +45,7 @@ def read_matlab73(path: Path) -> dict[str, NDArray[Any]]:
     room = [DATA.value()]
     try:
         with pyfive.File(io.BytesIO(_plain(path.read_bytes()))) as file:
-            return {
-                name: array for name, item in _datasets(file, "", DEPTH)
-                if (array := _array(path, name, item, room)) is not None
-            }  # fmt: skip
+            found = {n: _array(path, n, item, room) for n, item in _datasets(file, "", DEPTH)}
     except ScenarioError:
         raise
     except Exception as error:  # of a parser that does not expect damaged files
@@ -52,6 +53,9 @@ def read_matlab73(path: Path) -> dict[str, NDArray[Any]]:
         raise ScenarioError(
             f"{path}: is no whole MATLAB file of version 7.3 ({text[0][:200]}); save it again"
         ) from error
+    if left is not None:
+        left.update({name: item for name, item in found.items() if isinstance(item, str)})
+    return {name: item for name, item in found.items() if not isinstance(item, str)}
 
 
 def _plain(content: bytes) -> bytes:
@@ -73,13 +77,13 @@ def _datasets(group: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
             yield from _datasets(item, f"{prefix}{name}.", depth - 1)
 
 
-def _array(path: Path, name: str, item: Any, room: list[int]) -> NDArray[Any] | None:
-    """An array as MATLAB has it, None if it holds no real numbers."""
+def _array(path: Path, name: str, item: Any, room: list[int]) -> NDArray[Any] | str:
+    """An array as MATLAB has it; what it is, if it holds no real numbers."""
     kind = item.attrs.get("MATLAB_class", b"double")
     kind = kind if isinstance(kind, bytes) else str(kind).encode()
     dtype = np.dtype(item.dtype)
     if kind in _LEFT_OUT or "MATLAB_empty" in item.attrs or dtype.kind not in "fiub":
-        return None
+        return "empty" if "MATLAB_empty" in item.attrs else _LEFT_OUT.get(kind, f"of type {dtype}")
     size = int(np.prod(item.shape, dtype=object)) * max(dtype.itemsize, 8)
     room[0] -= size
     if room[0] < 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import struct
 import zipfile
@@ -125,6 +126,7 @@ def test_matlab_reads_what_scipy_reads(tmp_path: Path, packed: bool) -> None:
     path = tmp_path / "x.mat"
     savemat(path, MATRIX, do_compression=packed)
     found, theirs = read_matlab(path), loadmat(path, squeeze_me=True)
+    assert found.pop("s.a") == theirs["s"]["a"]
     assert list(found) == [name for name in MATRIX if name not in ("word", "z", "s")]
     for name, values in found.items():
         assert np.array_equal(values, theirs[name]) and values.dtype == theirs[name].dtype
@@ -137,6 +139,33 @@ def test_matlab_version_4(tmp_path: Path) -> None:
     found = read_matlab(path)
     assert np.array_equal(found["time"], TIME) and np.array_equal(found["xy"], MATRIX["xy"])
     assert "t" not in found
+    assert "'t' (text)" in read_log(path).notes[0]
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_matlab_structures_are_columns_and_what_is_left_out_is_named(
+    tmp_path: Path, packed: bool
+) -> None:
+    path = tmp_path / "x.mat"
+    array = np.zeros(2, dtype=[("a", "O")])
+    array["a"] = [1.0, 2.0]
+    log = {"time": TIME, "pose": {"x": TIME**2, "none": np.zeros(0)}, "note": "hello"}
+    content = {"log": log, "runs": array, "who": "me", "c": 1j * TIME,
+               "cell": np.array([1.0, "a"], dtype=object), "u": TIME}  # fmt: skip
+    savemat(path, content, do_compression=packed, oned_as="column")
+    found = read_log(path)
+    assert [name for name, values in found.columns.items() if values.size] == [
+        "log.time", "log.pose.x", "u",
+    ]  # fmt: skip
+    assert np.array_equal(found["log.pose.x"], TIME**2)
+    for said in ("'log.note' (text)", "'runs' (an array of structures)", "'who' (text)",
+                 "'c' (complex)", "'cell' (a cell)"):  # fmt: skip
+        assert said in found.notes[0]
+    whole = path.read_bytes()
+    for place in range(128, len(whole), 5):  # damage of any kind is refused in a sentence
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x35]) + whole[place + 1 :])
+        with contextlib.suppress(ScenarioError):
+            read_log(path)
 
 
 @pytest.mark.parametrize("packed", [False, True])
