@@ -60,7 +60,7 @@ def is_bag(path: Path) -> bool:
 
 
 def read(path: Path, topics: tuple[str, ...], recorded: bool = False) -> Source:
-    """Read a bag; each topic that holds numbers becomes one, transforms one per pair of frames.
+    """Read a bag; each topic that holds numbers becomes one, or one for each of its frames.
 
     Args:
         path: of the file or the folder.
