@@ -31,6 +31,8 @@ class EffectModel:
         own = f"{attachment.balance}.{name}" if attachment.balance else name
         self._prefix = f"{balance.name}.{name}" if grouped else own
         self._strength = f"{own}.{attachment.effect.strength.name}"
+        if attachment.effect.stiff:
+            self._root.stiff.add(self._strength)
         self._model = self._declaring(model, self._prefix)
         self._parameters = self._declaring(model, own)
         self.kind = balance.kind

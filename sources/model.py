@@ -82,6 +82,7 @@ class Model:
             self.losses: list[tuple[str, SX]] = []
             self.inflows: list[SX] = []
             self.baked: set[str] = set()
+            self.stiff: set[str] = set()  # strengths of the effects whose states are stiff
             self._attached: dict[str, str] = {}  # spelling of an attachment -> balance or group
             self._vectors: dict[str, SX] = {}
             self.input_rates: dict[str, SX] = {}

@@ -42,6 +42,7 @@ EFFECT = Effect(
     TAU_C,
     source="Dupont 2002",
     contains=("coulomb",),
+    stiff=True,
 )
 
 

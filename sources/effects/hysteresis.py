@@ -33,6 +33,7 @@ EFFECT = Effect(
     ("compliance",),
     TAU_H,
     source="Dhaouadi 2003",
+    stiff=True,
 )
 
 

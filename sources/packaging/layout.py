@@ -33,6 +33,7 @@ class Entry:
         quantity: declaration (unit, bounds, text).
         start: start value.
         strength: name of the strength of the effect that it belongs to, "" if to none.
+        stiff: whether it is the strength of an effect whose state is stiff.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Entry:
     quantity: Quantity
     start: float = 0.0
     strength: str = ""
+    stiff: bool = False
 
 
 def _derivative_unit(unit: str) -> str:
@@ -86,6 +88,11 @@ def owners(entries: list[Entry]) -> list[int]:
     ]
 
 
+def stiff(entries: list[Entry]) -> list[int]:
+    """Value references of the strengths of effects whose states are stiff."""
+    return [index for index, entry in enumerate(entries) if entry.stiff]
+
+
 def layout(model: Model) -> list[Entry]:
     """All variables: time, states, derivatives, inputs, outputs, parameters, sampled, solver."""
     time = Quantity("time", "s", "simulation time")
@@ -106,6 +113,9 @@ def layout(model: Model) -> list[Entry]:
     ]
     entries += [Entry(v.name, "input", v.quantity, v.start) for v in model.of_role("input")]
     entries += [Entry(v.name, "output", v.quantity) for v in model.of_role("output")]
-    entries += [Entry(v.name, "parameter", v.quantity, v.start) for v in model.of_role("parameter")]
+    entries += [
+        Entry(v.name, "parameter", v.quantity, v.start, stiff=v.name in model.stiff)
+        for v in model.of_role("parameter")
+    ]
     entries += [Entry(v.name, "discrete", v.quantity, v.start) for v in model.of_role("discrete")]
     return entries + solver_entries(model)

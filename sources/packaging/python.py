@@ -21,7 +21,7 @@ from ..function import Functions
 from ..model import Model
 from . import c_functions, runtime
 from .elimination import Block, eliminate
-from .layout import Entry, owners
+from .layout import Entry, owners, stiff
 
 _BINARY = {
     ca.OP_ADD: "{} + {}",
@@ -175,6 +175,7 @@ def equations_source(model: Model, functions: Functions, entries: list[Entry], n
         f"FIXED = {fixed!r}",
         f"NOMINAL = {nominal!r}",
         f"OWNER = {owners(entries)!r}",
+        f"STIFF = {stiff(entries)!r}",
     ]
     factor = ["def f_factor(j, d, w):", *_lines(elimination.factor), "    return"]
     factor = [

@@ -23,6 +23,7 @@ MAXIMUM: Any = None
 FIXED: Any = None
 NOMINAL: Any = None
 OWNER: Any = None
+STIFF: Any = None
 UPDATES: Any = None
 f_outputs: Any = None
 f_derivatives: Any = None
@@ -239,7 +240,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         v = self.v
         if NX:
             method, step = v[self.IS], v[self.IS + 1]
-            if method <= 2:
+            if method <= 2 and not any(v[i] != 0.0 for i in STIFF):
                 t0 = v[0]
                 n = _math.ceil(length / step * (1 - 1e-9)) if length > step else 1
                 h = length / n
@@ -408,7 +409,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         quiet = steady = 1.0
         for _ in range(order):
             quiet, steady = quiet * (SAFETY / GROW), steady * SAFETY
-        method = {3: self._dopri5, 4: self._rodas3, 5: self._rosw3}[code]
+        method = {3: self._dopri5, 5: self._rosw3}.get(code, self._rodas3)
         left = TRIALS + TRIALS_PER_STEP * length / largest
         while t < t1:
             left -= 1

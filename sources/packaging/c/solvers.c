@@ -145,7 +145,16 @@ static void rosw3(Memory *m, double t, double h, double *x, double *e) {
 #define CUBE(a) ((a) * (a) * (a))
 #define FIFTH(a) ((a) * (a) * (a) * (a) * (a))
 
-/* Error-controlled integration over `length` to t1; steps are at most solver.step long. */
+/* Whether an effect is present whose state may be faster than a fixed step: Runge-Kutta's settles at points
+   at which the equations do not rest, Rodas3's runs away where its input jumps. */
+static int stiff(const Memory *m) {
+  for (int i = 0; i < NSTIFF; i++)
+    if (m->v[STIFF[i]] != 0) return 1;
+  return 0;
+}
+
+/* Error-controlled integration over `length` to t1; steps are at most solver.step long. In place of a method
+   of fixed step it is Rodas3. */
 static int adaptive(Instance *c, double t1, double length) {
   double *v = c->m.v, x[NX], e[NX], t = v[0];
   const int implicit = v[METHOD] != DOPRI5, kept = v[METHOD] == ROSW3_ADAPTIVE;

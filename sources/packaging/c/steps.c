@@ -66,7 +66,7 @@ static int integrate(Instance *c, double t1, double length) {
   double *v = c->m.v;
   const double t0 = v[0];
 #if NX
-  if (v[METHOD] == RK4 || v[METHOD] == RODAS3) {
+  if ((v[METHOD] == RK4 || v[METHOD] == RODAS3) && !stiff(&c->m)) {
     int n = 1;
     double h = length, e[NX];
     if (length > v[STEP]) {
