@@ -73,6 +73,7 @@ class Balance:
             (`caster.swivel` of `caster_fl.swivel`), else the balance's own name.
         sensor: output that is the reading of a sensor, if it is one that may be wrong.
         effort: what the attached effects add (scalar or vector SX; 0 without effects).
+        share: part of what they add from now on that the balance gets (None: all).
         lean: what effects add to gravity (3), body axes [m/s2]; only of kind `body`. Its wrench on
             the mass that the balance names, and on what effects add, is part of `effort`.
         mass, first_moment, inertia: additional mass [kg], mass times position (3) [kg.m] and
@@ -86,6 +87,7 @@ class Balance:
     effort: SX
     group: str = ""
     sensor: str = ""
+    share: SX = None
     lean: SX = None
     mass: SX = 0.0
     first_moment: SX = None

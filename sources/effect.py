@@ -155,6 +155,7 @@ class Effect:
         general: effect with the same law for any unit, which need not be tried where this one fits.
         contains: effects that its law becomes for some values of its parameters: a bristle that
             does not give way is Coulomb friction. Data that do not tell the two apart have it.
+        first: whether it acts before the other effects of its balance, which see what it leaves.
         stiff: whether its state may be faster than a solver's fixed step: while it is present, the
             FMU steps by `rodas3_adaptive` in place of `rk4` and `rodas3`.
     """
@@ -172,6 +173,7 @@ class Effect:
     random: bool = False
     alone: bool = False
     contains: tuple[str, ...] = ()
+    first: bool = False
     stiff: bool = False
 
     def __post_init__(self) -> None:

@@ -134,7 +134,13 @@ class EffectModel:
                 f"effect {self._prefix!r} adds {effort.numel()} elements to balance "
                 f"{self._balance.name!r}, which has {self.size}"
             )
-        self._balance.effort = self._balance.effort + effort
+        share = self._balance.share
+        self._balance.effort = self._balance.effort + (effort if share is None else share * effort)
+
+    def pass_on(self, share: SX, **signals: SX) -> None:
+        """Let effects that act after this one see these signals, and add this share of theirs."""
+        self._balance.signals |= signals
+        self._balance.share = share
 
     def lean(self, change: SX) -> None:
         """Add to gravity (3), body axes [m/s2]: it acts on all mass of the body, and is supplied.

@@ -304,7 +304,7 @@ class Model:
         balance.first_moment = ca.SX.zeros(3)
         balance.inertia = ca.SX.zeros(3, 3)
         root.balances[full] = balance
-        for attachment in root.attachments:
+        for attachment in sorted(root.attachments, key=lambda each: not each.effect.first):
             place = root._attached.get(attachment.spelling, "")
             if not place and self._fits(attachment, balance):
                 place = full if attachment.balance == full else balance.group

@@ -5,6 +5,9 @@
     E = k ((x - sat)^2 - x^2) / 2, less than the spring without gap
     P_loss = -(1 - grease) d x'^2 inside, less than the damper without gap
 
+Other effects on the spring act on x - sat, and not at all inside: teeth that do not touch transmit
+nothing.
+
 Not modelled: impact losses beyond those of the damper.
 
 Source: Nordin, Galic, Gutman, New models for backlash and gear play, Int. J. Adaptive Control and
@@ -33,6 +36,7 @@ EFFECT = Effect(
     GAP,
     needs=("stiffness",),
     alone=True,
+    first=True,
     source="Nordin 1997",
 )
 
@@ -43,12 +47,15 @@ def law(e: EffectModel) -> None:
     # strict: without a gap the derivative at rest is the spring's, too
     within = ca.fabs(x) < half
     sat = ca.if_else(within, x, half * ca.sign(x))
+    touching = 1 - within
     e.add(k * sat)
     e.stored_energy(-k * sat * (2 * x - sat) / 2)
-    if not e.offers("damping"):
+    x_dot = e.signal("rate")
+    if e.offers("damping"):
+        grease, d = e.parameter(GREASE), e.signal("damping")
+        idle = within * (1 - grease) * d * x_dot
+        e.add(idle)
+        e.loss(-idle * x_dot)
+    else:
         e.loss(0)
-        return
-    grease, s = e.parameter(GREASE), e.signals(d="damping", x_dot="rate")
-    idle = within * (1 - grease) * s.d * s.x_dot
-    e.add(idle)
-    e.loss(-idle * s.x_dot)
+    e.pass_on(touching, deflection=x - sat, rate=touching * x_dot)

@@ -240,6 +240,29 @@ def test_backlash_leaves_a_gap(twist: float, torque: float) -> None:
     assert out["tau_b"] == pytest.approx(torque, abs=1e-12)  # 6000 N.m/rad beyond 1.5 mrad
 
 
+@pytest.mark.parametrize("name", ["backlash+{}", "{}+backlash"])
+@pytest.mark.parametrize(
+    ("effect", "own"), [("cubic_stiffness", {}), ("hysteresis", {"hysteresis.z": 1.0})]
+)
+def test_teeth_that_do_not_touch_transmit_nothing(
+    name: str, effect: str, own: dict[str, float]
+) -> None:
+    """Beyond the play the spring is as without it, with what else acts on it."""
+    both = oracle_of("gearbox/elastic+" + name.format(effect))
+    alone = oracle_of(f"gearbox/elastic+{effect}")
+
+    def torque(oracle: Oracle, twist: float, **more: float) -> float:
+        return oracle.outputs({"twist": twist, **own, **more})["tau_b"]
+
+    for gap in (3e-3, 20e-3):
+        play = {"backlash.gap": gap}
+        assert torque(both, 0.4 * gap, **play) == 0.0
+        for side in (1, -1):
+            wound = torque(both, side * (gap / 2 + 2e-3), **play)
+            # rounding of the difference of two deflections
+            assert wound == pytest.approx(torque(alone, side * 2e-3), rel=1e-9)
+
+
 def test_spring_that_stiffens() -> None:
     oracle = oracle_of("gearbox/elastic+cubic_stiffness")
     out = oracle.outputs({"twist": 2e-3, "cubic_stiffness.k_3": 1e9, **AT_REST})
