@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from sources.function import Oracle
 from sources.screw_axis import elastic
 from sources.variant import device_values
+from tests.fmus import Slave, fmu
 from tests.support import oracle_of
 
 
@@ -64,13 +66,50 @@ def test_proportional_sets_the_duty(q_ref: float, duty: float) -> None:
     values = {**HOBBY, "q_ref": q_ref, "phi": 0.1, "w": 1.5}
     after = ticked(oracle, values)
     assert after["u_held"] == pytest.approx(7.0 * duty, abs=1e-12)  # rounding of a few volts
-    outputs = oracle.outputs({**values, **after})
-    assert outputs["tau"] == pytest.approx(0.3 * (7.0 * duty - 0.3 * 1.5) / 4.0, abs=1e-12)
+    current = (7.0 * duty - 0.3 * 1.5) / 4.0
+    settled = {**values, **after, "current": current}
+    assert oracle.derivatives(settled)["current"] == pytest.approx(0.0, abs=1e-9)  # over 5e-4 H
+    assert oracle.outputs(settled)["tau"] == pytest.approx(0.3 * current, abs=1e-12)
+
+
+R_A = 4.0
+WINDING = {
+    # effect: its values, voltage that a current takes at 7 V of command, shaft at rest
+    "winding_heating": (
+        {"r_th": 1.0, "p": 250.0, "t_th": 1e6, "alpha": 0.004},
+        lambda i: 2.0 * R_A * i,
+    ),
+    "brush_drop": ({"u_b": 0.5, "i_0": 0.02}, lambda i: R_A * i + 0.5 * math.tanh(i / 0.02)),
+    "battery_sag": ({"r_b": 3.0, "u_0": 7.0}, lambda i: (R_A + 3.0) * i),
+    "pwm_dead_zone": ({"u_dz": 0.5}, lambda i: R_A * i + 0.5),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", WINDING)
+@pytest.mark.parametrize("u", [0.2, 7.0])
+def test_effects_on_the_winding_act_with_the_current_that_flows(effect: str, u: float) -> None:
+    own, taken = WINDING[effect]
+    values = {**HOBBY, "R_a": R_A, "u_held": u, "T_loop": 1.0, "k_d": u / 7.0, "q_ref": 1.0}
+    values |= {f"{effect}.{name}": value for name, value in own.items()}
+    with Slave(fmu(f"position_servo/proportional+{effect}"), values) as slave:
+        slave.step(0.0, 5e-3)  # 50 time constants of the winding
+        i, tau, loss = slave.get(["i", "tau", "P_loss"])
+    if effect == "pwm_dead_zone" and u < 0.5:
+        expected = 0.0
+    elif effect == "battery_sag":
+        expected = u / (R_A + 3.0 * (u / 7.0) ** 2)
+    else:
+        expected = brentq(lambda i: taken(i) - u, 0.0, 10.0)
+    # the solver's tolerance of 1e-5, and a winding that warms by 2e-7 of its 250 K
+    assert i == pytest.approx(expected, rel=1e-4, abs=1e-5)
+    assert tau == pytest.approx(0.3 * i)
+    assert loss >= 0.0
 
 
 def test_open_bridge_gives_no_torque() -> None:
     oracle = oracle_of("position_servo/proportional+brush_drop")
-    values = {**HOBBY, "u_held": 5.0, "w": 2.0, "brush_drop.u_b": 0.5}
+    values = {**HOBBY, "u_held": 5.0, "w": 2.0, "current": 1.0, "brush_drop.u_b": 0.5}
     assert oracle.outputs({**values, "enable": 0.0})["tau"] == 0.0
     assert oracle.outputs({**values, "enable": 1.0})["tau"] != 0.0
 
