@@ -82,6 +82,7 @@ class Model:
             self.losses: list[tuple[str, SX]] = []
             self.inflows: list[SX] = []
             self.baked: set[str] = set()
+            self.asked: set[str] = set()  # values of the device that were asked for by name
             self.stiff: set[str] = set()  # strengths of the effects whose states are stiff
             self._attached: dict[str, str] = {}  # spelling of an attachment -> balance or group
             self._vectors: dict[str, SX] = {}
@@ -148,7 +149,12 @@ class Model:
                 f"{self.component.name}/{self.fidelity}: the device file has no value {name!r}"
             )
         self._root.baked.add(name)
-        return self.values[name]
+        return self.given(name)
+
+    def given(self, name: str, default: Any = None) -> Any:
+        """A value of the device file as it stands there, `default` without one."""
+        self._root.asked.add(name)
+        return self.values.get(name, default)
 
     def input(self, quantity: Quantity) -> SX:
         """Declare an input, held by the master over a communication step."""

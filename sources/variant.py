@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isnan
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -196,14 +197,24 @@ def _read_device(component: str, path: Path, text: str) -> dict[str, Origin]:
     table = tomllib.loads(text)
     # a device of several components has what only one of them means in [component.name]
     for each in table.pop("components", ()):
-        table |= table.pop(each, {}) if each == component else {each: None}
+        own = table.pop(each, {})
+        if each == component:
+            table |= own
     values = {}
     for name, entry in table.items():
         if not isinstance(entry, dict):
-            continue
+            raise ValueError(
+                f"{path}: {name} = {entry!r} stands alone; "
+                f"write [{name}] with value, unit and origin"
+            )
         missing = {"value", "unit", "origin"} - set(entry)
         if missing:
             raise ValueError(f"{path.name}: {name!r} lacks {', '.join(sorted(missing))}")
+        if not _numbers(entry["value"]):
+            raise ValueError(
+                f"{path}: the value of {name!r} is {entry['value']!r}; write a number without "
+                "quotes, or a list of numbers"
+            )
         unit = tuple(entry["unit"]) if isinstance(entry["unit"], list) else entry["unit"]
         for each in (unit,) if isinstance(unit, str) else unit:
             coherent(each)
@@ -215,6 +226,43 @@ def _read_device(component: str, path: Path, text: str) -> dict[str, Origin]:
             entry.get("uncertainty"),
         )
     return values
+
+
+def _numbers(value: Any) -> bool:
+    """Whether this is a number (infinite where there is no limit), or a list of what is."""
+    if isinstance(value, list):
+        return all(_numbers(each) for each in value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and not isnan(value)
+
+
+def _check_names(model: Model, device: str, origins: Mapping[str, Origin]) -> None:
+    """Refuse values of a user's device that no fidelity of its components has a place for."""
+    component, known = model.component.name, _places(model) | {*own_devices.TOLD}
+    path = own_devices.find(component, device)
+    if path is None or set(origins) <= known:
+        return
+    listed = tomllib.loads(path.read_text(encoding="utf-8"))["components"]
+    for each in sorted(components().keys() & listed, key=lambda name: (name != component, name)):
+        for name in fidelities(each):
+            if set(origins) <= known:
+                return
+            try:
+                other, _ = _collected(Name(each, name, device))
+            except ValueError:  # the device lacks what this one needs: it cannot be asked
+                return
+            known |= _places(other)
+    for key in origins:
+        if key not in known:
+            raise ValueError(
+                f"{path}: no fidelity of {', '.join(listed)} has a quantity {key!r}; "
+                f"{listing(sorted(known), key)}"
+            )
+
+
+def _places(model: Model) -> set[str]:
+    """Names under which a device may give this model a value."""
+    given = {n.partition("[")[0] for n, v in model.variables.items() if v.role != "output"}
+    return given | model.asked
 
 
 def _choose(kind: str, wanted: str, available: Mapping[str, Any]) -> Any:
@@ -236,9 +284,19 @@ def build_model(name: Name | str) -> Model:
     Raises:
         UnknownVariantError: unknown component, device, fidelity, slot or effect.
         ModelError: an effect that fits no balance of the component.
+        ValueError: a device file whose names, units or values do not fit.
     """
     if isinstance(name, str):
         name = parse_name(name)
+    model, origins = _collected(name)
+    for key, origin in origins.items():
+        _check_units(model, model.device, key, origin)
+    _check_names(model, model.device, origins)
+    return model
+
+
+def _collected(name: Name) -> tuple[Model, Mapping[str, Origin]]:
+    """A variant's model, and what its device gives."""
     component, equations = fidelity(name.component, name.fidelity)
     own: Fidelity = fidelities(name.component)[name.fidelity].FIDELITY
     for slot, _ in name.slots:
@@ -263,9 +321,7 @@ def build_model(name: Name | str) -> Model:
     model.solver = own.solver
     equations(model)
     model.finish()
-    for key, origin in origins.items():
-        _check_units(model, name.device or component.device, key, origin)
-    return model
+    return model, origins
 
 
 def _check_units(model: Model, device: str, key: str, origin: Origin) -> None:

@@ -17,6 +17,8 @@ from ..errors import VariantError
 
 FOLDER = "devices"
 VARIABLE = "COSIM_DEVICES"
+TOLD = ("q_min", "q_max", "speed_max")
+"""Values that no equation takes: limits of an imported arm, for what is made of its file."""
 
 
 _also: list[Path] = []
@@ -42,7 +44,7 @@ def own(component: str) -> dict[str, Path]:
     """The user's device files for a component, by the device's name.
 
     Raises:
-        VariantError: a device file that is no TOML.
+        VariantError: a device file that is no TOML, or whose `components` are no list.
     """
     found: dict[str, Path] = {}
     for folder in folders():
@@ -57,7 +59,11 @@ def _components(path: Path) -> list[str]:
         listed = tomllib.loads(path.read_text(encoding="utf-8")).get("components", [])
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise VariantError(f"{path}: is no TOML ({error}); correct it or move it away") from error
-    return listed if isinstance(listed, list) else []
+    if not isinstance(listed, list):
+        raise VariantError(
+            f'{path}: components = {listed!r} is no list; write components = ["{listed}"]'
+        )
+    return listed
 
 
 def find(component: str, device: str) -> Path | None:

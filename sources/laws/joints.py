@@ -42,7 +42,7 @@ class Joints:
     @classmethod
     def of_device(cls, m: Model) -> Joints:
         """Those that the device file's `prismatic` tells; six revolute ones without it."""
-        return cls(tuple(bool(flag) for flag in m.values.get("prismatic", _SIX)))
+        return cls(tuple(bool(flag) for flag in m.given("prismatic", _SIX)))
 
     def __len__(self) -> int:
         return len(self.prismatic)
