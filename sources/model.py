@@ -108,6 +108,11 @@ class Model:
         if full in root._vectors:
             raise ModelError(f"{root.component.name}/{root.fidelity}: {full!r} is declared twice")
         names = [self._full(name) for name in quantity.names()]
+        if full == "time":
+            raise ModelError(
+                f"{root.component.name}/{root.fidelity}: every FMU has its own {full!r}; give the "
+                "quantity another name, and read the time by m.t"
+            )
         if symbol is None:
             symbol = ca.vertcat(*[ca.SX.sym(name) for name in names])
         else:
@@ -238,8 +243,16 @@ class Model:
     def update(self, clock: Clock, discrete: SX, expression: SX) -> None:
         """At each tick of `clock`, replace the discrete variable by the expression."""
         expression = ca.SX(expression)
+        if expression.numel() != discrete.numel():
+            raise ModelError(
+                f"{self.component.name}/{self.fidelity}: update of {discrete} has "
+                f"{expression.numel()} elements instead of {discrete.numel()}"
+            )
         for index in range(discrete.numel()):
-            clock.updates[discrete[index].name()] = expression[index]
+            name = discrete[index].name()
+            if name in clock.updates:
+                raise ModelError(f"{name!r} has two updates at clock {clock.name!r}")
+            clock.updates[name] = expression[index]
 
     # -- energy ----------------------------------------------------------------------------------
 

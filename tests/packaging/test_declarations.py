@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sources import variant
@@ -170,3 +171,23 @@ def test_sampled_values_are_declared_in_their_order() -> None:
     tick = m.clock("tick", 0.1)
     m.update(tick, z.k, z.c[0])
     assert set(tick.updates) == {"k"}
+
+
+@pytest.fixture
+def bare() -> Model:
+    return Model(variant.components()["command_link"], "test")
+
+
+def test_an_update_has_as_many_elements_as_its_value_and_one_expression(bare: Model) -> None:
+    tick, held = bare.clock("tick", 1.0), bare.discrete(Quantity("z", "1", "two", size=2))
+    with pytest.raises(ModelError, match="has 4 elements instead of 2"):
+        bare.update(tick, held, np.ones(4))
+    bare.update(tick, held, np.ones(2))
+    with pytest.raises(ModelError, match=r"'z\[1\]' has two updates at clock 'tick'"):
+        bare.update(tick, held, np.zeros(2))
+    bare.update(bare.clock("other", 2.0), held, np.zeros(2))  # each clock has its own
+
+
+def test_a_quantity_is_not_called_as_the_time_of_every_fmu(bare: Model) -> None:
+    with pytest.raises(ModelError, match="give the quantity another name"):
+        bare.input(Quantity("time", "s", "time of another clock"))
