@@ -24,7 +24,7 @@ and hands S to the body instead of f_n; sideways and forward its mass counts to 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -51,6 +51,8 @@ from .wheels import (
     write_wheels,
 )
 
+LEAST_CARRIER = 1e-3
+"""Mass [kg] of a drive wheel with its carrier that springs can move."""
 SPRING = Quantity(
     "spring", "N/m", "suspension stiffness of a drive wheel", start=15e3, minimum=1.0, nominal=1e4
 )
@@ -152,7 +154,9 @@ def spatial_body(m: Model, *, sprung: bool = False) -> None:
     """Collect the equations."""
     mount, places, caster_mass = read_mount(m), read_places(m), read_caster_mass(m)
     r = places.radius
-    p = m.parameters(bs.DRIVE_MASS)
+    # on springs the carrier's acceleration is its force over its mass
+    drive_mass = replace(bs.DRIVE_MASS, minimum=LEAST_CARRIER) if sprung else bs.DRIVE_MASS
+    p = m.parameters(drive_mass)
     x = m.states(
         qs.POSE_X,
         qs.POSE_Y,

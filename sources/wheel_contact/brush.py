@@ -44,6 +44,9 @@ Z_Y = Quantity("z_y", "m", "deflection of the bristles across the wheel", nomina
 
 LOAD_FLOOR = 1.0
 """Normal force [N] below which bristles slide as under this one: a lifted wheel lets go."""
+FRICTION_FLOOR = 1e-4
+"""Friction coefficient below which they slide as at this one, a hundredth of wet ice's: without a
+largest deflection nothing would be a part of it."""
 
 
 def equations(m: Model) -> None:
@@ -55,7 +58,7 @@ def equations(m: Model) -> None:
         patch = m.balance("mu", "coefficient", unit="1", value=p.mu_s, x=c.x, y=c.y)
         square = c.s_x**2 + c.s_y**2
         mu = (p.mu_d + (p.mu_s - p.mu_d) * ca.exp(-square / p.v_s**2)) * (1 + patch.effort / p.mu_s)
-        largest = mu * ca.fmax(c.f_n, LOAD_FLOOR) / p.k_t
+        largest = ca.fmax(mu, FRICTION_FLOOR) * ca.fmax(c.f_n, LOAD_FLOOR) / p.k_t
         used = ca.sqrt(x.z_x**2 + x.z_y**2 + SMALL) / largest
         blend = ca.fmax(0, ca.fmin((used - STICK) / (1 - STICK), 1))
         sliding = blend**2 * (3 - 2 * blend) * ca.sqrt(square + SMALL) / largest

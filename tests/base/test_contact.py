@@ -111,6 +111,33 @@ def test_brush_sticks_at_rest_and_slips_sideways_when_it_rolls() -> None:
     assert (rolling[-1] - rolling[-500]) / 0.499 == pytest.approx(slip, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("wheel_contact/brush", {"mu_d": 0.0, "v_x": 0.7}),
+        ("wheel_contact/brush+low_friction_patch",
+         {"low_friction_patch.reduction": 1.0, "low_friction_patch.edge": 1e-2,
+          "low_friction_patch.x_p": 0.0, "low_friction_patch.y_p": 0.0, "v_x": 0.5}),
+    ],
+)  # fmt: skip
+def test_brush_on_a_floor_without_friction_slides_freely(
+    name: str, values: dict[str, float]
+) -> None:
+    wheel = Stiff(name, {"J_added": 1e6, "speed": 0.0, "f_n": 200.0, **values})
+    for _ in range(20):
+        wheel.step(1e-3)
+    # a thousandth of the load, where floors with friction hold half of it
+    assert abs(wheel.outputs()["f_x"]) < 0.2
+
+
+def test_every_drive_mass_that_springs_accept_can_be_moved() -> None:
+    oracle = oracle_of("mobile_base/sprung")
+    mass = next(v for v in oracle.model.of_role("parameter") if v.name == "drive_mass")
+    assert mass.quantity.minimum is not None and mass.quantity.minimum > 0
+    rates = oracle.derivatives({"drive_mass": mass.quantity.minimum})
+    assert np.isfinite(list(rates.values())).all()
+
+
 def test_brush_breaks_away_at_the_static_limit_and_slides_at_the_dynamic_one() -> None:
     still = {"tau": 0.0, "v_x": 0.0, "J_added": 1e6}
     wheel = Stiff("wheel_contact/brush", {**still, "v_y": 1e-3, "f_n": 200.0})
