@@ -18,12 +18,16 @@ from numpy.typing import ArrayLike, NDArray
 Matrix = NDArray[np.float64]
 
 
+_APART = 1e-9
+"""Distance from a line, relative to the length along it, that is no more than rounding."""
+
+
 def _triad(points: Matrix) -> Matrix:
     a, b, c = points
     x = (b - a) / np.linalg.norm(b - a)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal)
-    if size < 1e-9 * np.linalg.norm(b - a) * np.linalg.norm(c - a):
+    if size < _APART * np.linalg.norm(b - a) * np.linalg.norm(c - a):
         raise ValueError("points A, B and C lie on one line and define no frame")
     z = normal / size
     frame = np.eye(4)
@@ -51,7 +55,8 @@ def kabsch(measured: ArrayLike, reference: ArrayLike) -> Matrix:
         measured, reference: points as rows (n x 2 or n x 3) in either frame [m].
 
     Raises:
-        ValueError: shapes that differ, or too few points.
+        ValueError: shapes that differ, too few points or such that are not finite, or points that
+            define no rotation: all in one place or, in space, on one line.
     """
     m, o = np.asarray(measured, dtype=float), np.asarray(reference, dtype=float)
     if m.shape != o.shape or m.ndim != 2:
@@ -59,7 +64,15 @@ def kabsch(measured: ArrayLike, reference: ArrayLike) -> Matrix:
     count, size = m.shape
     if count < size:
         raise ValueError(f"{count} points define no transform in {size} dimensions")
+    if not (np.isfinite(m).all() and np.isfinite(o).all()):
+        raise ValueError("points of either frame have values that are not finite")
     middle_m, middle_o = m.mean(axis=0), o.mean(axis=0)
+    for points in (m - middle_m, o - middle_o):
+        if np.linalg.matrix_rank(points, tol=_APART * np.abs(points).max(initial=0.0)) < size - 1:
+            raise ValueError(
+                "points in one place, or on one line in space, define no rotation; "
+                "measure one that lies apart"
+            )
     u, _, vt = np.linalg.svd((m - middle_m).T @ (o - middle_o))
     signs = np.ones(size)
     signs[-1] = np.sign(np.linalg.det(u @ vt))  # a rotation, never a reflection

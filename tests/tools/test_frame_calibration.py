@@ -66,3 +66,23 @@ def test_refuses_what_defines_no_frame() -> None:
         kabsch(POINTS[:2], POINTS[:2])
     with pytest.raises(ValueError, match="shapes"):
         kabsch(POINTS, POINTS[:2])
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]],
+        [[0, 0, 0], [1, 1, 1], [2, 2, 2 + 1e-12]],
+        [[1, 1], [1, 1]],
+        [[0, 0], [1, float("nan")], [2, 0]],
+    ],
+    ids=["line", "rounded line", "one place", "nan"],
+)
+def test_points_that_define_no_rotation_are_refused(points: list[list[float]]) -> None:
+    with pytest.raises(ValueError, match=r"no rotation|not finite"):
+        kabsch(points, points)
+
+
+def test_points_on_a_line_define_a_rotation_of_the_plane() -> None:
+    line = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 4.0]])
+    np.testing.assert_allclose(kabsch(line, line), np.eye(3), atol=1e-14)  # rounding
