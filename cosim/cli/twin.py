@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from ..files import claimed
 from .output import say
 from .pairs import pairs
 from .streams import print_json, stdout_for_json
@@ -47,7 +49,7 @@ def twin_command(
     duration: Annotated[
         float | None, typer.Option(help="End after so much of the stream's time [s; never].")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the samples, a data set.")] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder, a data set of the samples.")] = None,
 ) -> None:
     """Run a model beside its machine: residuals, alarms and lateness as JSON lines.
 
@@ -67,14 +69,18 @@ def twin_command(
         calibrated=calibrated,
         variants=pairs(variants, "--set", "INSTANCE=VARIANT"),
     )
-    folder = None if out is None else Folder(out, reading)
-    watch = Watch(reading, settings, _emit, folder)
-    say(f"{reading.problem.name}: waiting for {source}")
-    with stdout_for_json():
-        try:
-            watch.follow(Source(source))
-        except KeyboardInterrupt:  # the way to end a stream that has no end
-            watch.summary()
+    with ExitStack() as place:
+        folder = None
+        if out is not None:
+            place.enter_context(claimed(out))
+            folder = Folder(out, reading)
+        watch = Watch(reading, settings, _emit, folder)
+        say(f"{reading.problem.name}: waiting for {source}")
+        with stdout_for_json():
+            try:
+                watch.follow(Source(source))
+            except KeyboardInterrupt:  # the way to end a stream that has no end
+                watch.summary()
 
 
 def _emit(event: dict[str, Any]) -> None:

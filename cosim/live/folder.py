@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calibrate.mapping import find_system
+from ..errors import InputError
 from ..files import make_folder, read_toml, write_text
 from ..spec.distribution import needed
 from .messages import Sample
@@ -30,16 +31,21 @@ class Folder:
     """A data set that grows while the stream runs; ready for `cosim diagnose` when closed.
 
     Args:
-        place: where it shall be; made, and must be empty of runs.
+        place: where it shall be; made, and must hold no data set yet.
         reading: whose columns and mapping it has.
 
     Raises:
-        InputError: pyarrow is not installed.
+        InputError: pyarrow is not installed, or there is a data set already.
     """
 
     def __init__(self, place: Path, reading: Reading) -> None:
         self.place, self.reading = make_folder(place), reading
-        make_folder(place / "runs")
+        for name in ("set.toml", "dataset.toml", "mapping", "runs"):
+            if (place / name).exists():
+                raise InputError(
+                    f"{place}: has a {name} already, which the stream would be written over; "
+                    "choose another folder with --out"
+                )
         self._runs: list[dict[str, Any]] = []
         self._parquet = needed("pyarrow.parquet", f"{place}: writing Parquet", "tables")
         self._writer: pq.ParquetWriter | None = None
@@ -68,6 +74,7 @@ class Folder:
         import pyarrow as pa
 
         schema = pa.schema([(column, pa.float64()) for column in self._columns])
+        make_folder(self.place / "runs")
         self._writer = self._parquet.ParquetWriter(self.place / file, schema)
         self._span = (first.time, first.time)
         return name

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.machine import Machine
 from cosim.calibrate import read_problem
+from cosim.files import claimed
 from tests.live.disc import commands, rig
 
 ROOT = Path(__file__).parents[2]
@@ -39,6 +40,15 @@ def test_lines_in_lines_out_and_a_data_set(tmp_path: Path) -> None:
     problem = read_problem(tmp_path / "kept")
     assert [run.name for run in problem.runs] == ["morning"]
     assert len(problem.runs[0].times) == 500
+
+
+@pytest.mark.slow
+def test_a_folder_that_another_stream_is_kept_in_is_refused(tmp_path: Path) -> None:
+    rig(tmp_path / "disc")
+    with claimed(tmp_path / "kept"):
+        done = twin(tmp_path / "disc", "--source", "-", "--out", tmp_path / "kept")
+    assert done.returncode == 2
+    assert b"another run writes its results there" in done.stderr
 
 
 def test_a_wrong_name_ends_with_exit_code_2() -> None:

@@ -86,6 +86,17 @@ def test_the_residual_of_a_stream_is_that_of_its_log(reading, tmp_path: Path) ->
             assert told["mean"] == pytest.approx(np.mean(last), rel=1e-3, abs=1e-9)
 
 
+def test_a_stream_is_not_written_over_a_data_set(reading, tmp_path: Path) -> None:
+    place = tmp_path / "kept"
+    Followed(reading, lines(reading, 200, seed=3), Folder(place, reading), report=1e9)
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match="already, which the stream would be written over"):
+        Folder(place, reading)
+    with pytest.raises(InputError, match=r"dataset\.toml already"):
+        Folder(reading.joined.data.folder, reading)  # the one that is followed
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+
+
 def test_five_clean_minutes_are_noise_and_raise_no_alarm(reading) -> None:
     followed = Followed(reading, lines(reading, 30000))
     assert followed.of("alarm") == []
