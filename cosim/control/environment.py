@@ -25,8 +25,8 @@ def environment(
     """A `gymnasium.Env`: an action sets inputs, a step goes on, an observation is what outputs are.
 
     Every reset returns to the begin; the same actions give the same observations, bit for bit. It
-    has no randomness of its own, ends (`truncated`) with the scenario, and is never `terminated`
-    before. `env.unwrapped.twin` is the twin.
+    has no randomness of its own, ends (`truncated`) with the last step that fits into the scenario,
+    and is never `terminated` before. `env.unwrapped.twin` is the twin.
 
     Args:
         scenario: as of `cosim.open`.
@@ -37,6 +37,7 @@ def environment(
         how: as of `cosim.open`, e.g. `duration=5.0`.
 
     Raises:
+        ValueRangeError: bounds that are not rising, or a step longer than the scenario.
         InputError: Gymnasium is not installed; as of `cosim.open`.
     """
     try:
@@ -58,10 +59,21 @@ def environment(
             self.twin = open_twin(scenario, **how)
             for name in actions:
                 self.twin.unit(name)
+            if not self._fits():
+                whole = self.twin.end - self.twin.time
+                self.twin.close()
+                raise ValueRangeError(
+                    f"a step of {step:g} s is longer than the whole, {whole:g} s; shorten it, or "
+                    "give a longer duration"
+                )
             low, high = np.array(list(actions.values()), dtype=np.float64).T
             self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
             shape = (len(observations),)
             self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float64)
+
+        def _fits(self) -> bool:
+            """Whether another step ends within the scenario; times are whole numbers of steps."""
+            return self.twin.time + step < self.twin.end + 0.5 * self.twin.master.step
 
         def _observed(self) -> np.ndarray[Any, np.dtype[np.float64]]:
             return np.array([self.twin.get(name) for name in observations], dtype=np.float64)
@@ -80,7 +92,7 @@ def environment(
             self.twin.step(step)
             seen = self._observed()
             value = float(reward({**dict(zip(observations, seen.tolist(), strict=True)), **given}))
-            over = bool(self.twin.ended) or self.twin.time > self.twin.end - 0.5 * step
+            over = bool(self.twin.ended) or not self._fits()
             return seen, value, False, over, {"time": self.twin.time}
 
         def close(self) -> None:

@@ -55,10 +55,20 @@ def test_the_same_actions_give_the_same_bits_and_reward_the_goal() -> None:
     env.close()
 
 
+@pytest.mark.parametrize(("step", "steps"), [(0.04, 2), (0.05, 2), (0.1, 1)])
+def test_it_ends_with_the_last_step_that_fits(step: float, steps: int) -> None:
+    pytest.importorskip("gymnasium")
+    env = environment("motor_bench/ST1", **{**GIVEN, "step": step})
+    env.reset()
+    assert [env.step([10.0])[3] for _ in range(steps)] == [False] * (steps - 1) + [True]
+    env.close()
+
+
 @pytest.mark.parametrize(
     ("change", "error", "text"),
     [
         ({"actions": {"motor.w_ref": (1.0, 1.0)}}, ValueRangeError, "bounds 1 and 1 are not"),
+        ({"step": 0.2}, ValueRangeError, r"0\.2 s is longer than the whole, 0\.1 s"),
         ({"actions": {"motor.w_reff": (0.0, 1.0)}}, UnknownNameError, "did you mean 'w_ref'"),
     ],
 )
