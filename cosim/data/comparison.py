@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,14 +88,23 @@ def circle(times: Vector, start: Sequence[float], centre: Sequence[float], rate:
     return np.column_stack([centre[0] + c * x - s * y, centre[1] + s * x + c * y])
 
 
-def _unit(recording: Recording, reference: Reference) -> str:
-    units = {recording.units.get(name, "") for name in reference.signals}
-    if len(units) > 1:
+def common_unit(units: Mapping[str, str], signals: Sequence[str]) -> str:
+    """The unit of signals between which a distance is taken.
+
+    Args:
+        units: full scalar name -> unit.
+        signals: full scalar names.
+
+    Raises:
+        UnitError: they have several.
+    """
+    found = {units.get(name, "") for name in signals}
+    if len(found) > 1:
         raise UnitError(
-            f"cannot take the distance of {reference.name}: their units are "
-            f"{', '.join(sorted(units))}; compare them one by one"
+            f"cannot take the distance of {', '.join(signals)}: their units are "
+            f"{', '.join(sorted(found))}; compare them one by one"
         )
-    return units.pop()
+    return found.pop()
 
 
 def convert_reference(recording: Recording, reference: Reference) -> Vector:
@@ -104,7 +113,7 @@ def convert_reference(recording: Recording, reference: Reference) -> Vector:
     Raises:
         UnitError: the units do not convert.
     """
-    unit = _unit(recording, reference)
+    unit = common_unit(recording.units, reference.signals)
     if not reference.unit or not unit:
         return reference.values
     found = []
@@ -164,7 +173,7 @@ def compare(recording: Recording, reference: Reference) -> Comparison:
     differences = apart[0] if len(apart) == 1 else np.sqrt(np.sum(np.square(apart), axis=0))
     return Comparison(
         signals=reference.signals,
-        unit=_unit(recording, reference),
+        unit=common_unit(recording.units, reference.signals),
         rms=float(np.sqrt(np.mean(differences**2))),
         max=float(np.max(np.abs(differences))),
         count=int(times.size),

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data.comparison import common_unit
 from ..errors import ScenarioError, UnknownNameError, VariantError, listing
 from ..files import atomic
 from ..running.preparation import adjusted
@@ -299,6 +300,9 @@ def _keys(
         prepared = group.prepare(provider)
         group = replace(group, parts=group.fingerprint(prepared))
         system = prepared.master.system
+        for name in (name for name in prepared.record if name in signals):
+            elements = system.elements(name)  # a vector's distance is taken
+            common_unit({item: system.unit(item) for item in elements}, elements)
         for member in system.members.values():
             if member.description.can("canBeInstantiatedOnlyOncePerProcess"):
                 single[member.name] = None

@@ -189,7 +189,7 @@ def _row(task: Task, result: Mapping[str, Any], units: dict[str, str]) -> dict[s
         "fmu_steps": result["fmu_steps"],
         "x_real_time": simulated / wall if done and wall else None,
         "energy_residual": result["energy_residual_J"],
-        "checks_failed": sum(not check["ok"] for check in result["checks"]) if done else None,
+        "checks_failed": sum(check["ok"] is False for check in result["checks"]) if done else None,
     }
     for name, item in result["comparison"].items():
         for of in ("rms", "max"):
@@ -202,9 +202,9 @@ def _row(task: Task, result: Mapping[str, Any], units: dict[str, str]) -> dict[s
     return row
 
 
-def _finite(value: float) -> float | None:
+def _finite(value: float | None) -> float | None:
     """None for what JSON cannot write."""
-    return value if math.isfinite(value) else None
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _compare(

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import cosim
-from cosim.errors import UnknownNameError, ValueRangeError
+from cosim.errors import UnitError, UnknownNameError, ValueRangeError
 from cosim.study import run_study, study_from
 from cosim.study.compute import GroupRunner, StudyChangedError
 from cosim.study.picture import _points
@@ -21,6 +21,7 @@ from tests.cosim_fmus import rewrite
 from tests.coupling.faulty import MODES
 from tests.study.conftest import BASE
 from tests.study.test_resume import figures
+from tests.tiny_fmus import V, tiny
 
 SWAP = {
     "set": {"gearbox": ["ratio", "elastic"]},
@@ -166,6 +167,61 @@ def test_a_parameter_that_some_variants_lack_is_left_out_there(run: Any) -> None
         "gearbox.k is left out: gearbox.lab_bench/ratio has none",
         "2 of 6 points are the same run as another one",
     )
+
+
+def test_checks_that_are_not_judged_are_not_counted_as_failed(run: Any) -> None:
+    settled = {"duration": 6.999, "set": {"gearbox": ["", "lossy"]}}
+    own, swapped = run(settled).table.rows
+    assert (own["checks_failed"], swapped["checks_failed"]) == (0, 0)
+    checks = [name for name in swapped if name.startswith("check.")]
+    assert checks and all(swapped[name] is not None for name in checks)
+
+
+def test_a_check_of_a_signal_that_some_variants_lack_is_empty_there(
+    run: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "scenario.toml").write_text(
+        """
+system = "motor_bench"
+duration = 0.01
+step = 1e-3
+variants.gearbox = "elastic+backlash"
+[[checks]]
+name = "loss"
+signal = "gearbox.backlash.P_loss"
+of = "mean"
+limit = 100.0
+"""
+    )
+    found = run(
+        {"scenario": str(tmp_path / "scenario.toml"), "duration": 0.01,
+         "set": {"gearbox": ["", "ratio"]}}
+    ).table  # fmt: skip
+    assert [row["check.loss"] is None for row in found.rows] == [False, True]
+    assert [row["checks_failed"] for row in found.rows] == [0, 0]
+
+
+def test_a_vector_of_several_units_is_refused_before_anything_runs(
+    run: Any, tmp_path: Path
+) -> None:
+    variables = [
+        V("time", "Float64", "independent"),
+        V("q[1]", "Float64", "output", inner='unit="m"'),
+        V("q[2]", "Float64", "output", inner='unit="rad"'),
+    ]
+    units = (
+        '<UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit>'
+        '<Unit name="rad"><BaseUnit rad="1"/></Unit></UnitDefinitions>'
+    )
+    tiny(tmp_path, variables, fmi=2, definitions=units)
+    (tmp_path / "scenario.toml").write_text("system = 'pair.toml'\nduration = 1.0\nstep = 0.1\n")
+    (tmp_path / "pair.toml").write_text("connections = []\ninstances.arm = 'm.fmu'\n")
+    study = {"scenario": str(tmp_path / "scenario.toml"), "duration": 1.0, "step": [0.1, 0.05],
+             "reference": "finest", "signals": ["arm.q"]}  # fmt: skip
+    with pytest.raises(UnitError, match=r"distance of arm\.q\[1\], arm\.q\[2\].* m, rad"):
+        run(study)
+    assert not list(tmp_path.glob("out/runs/*"))
+    assert len(run({**study, "signals": ["arm.q[1]"]}).table.rows) == 2
 
 
 def test_several_runs_of_a_scenario(run: Any) -> None:
