@@ -27,7 +27,10 @@ MOST = 24
 
 def linearize_command(
     name: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario, run, or an .fmu.")],
-    at: Annotated[float, typer.Option(help="Time of the operating point [s].")] = 0.0,
+    at: Annotated[
+        float | None,
+        typer.Option(help="Time of the operating point on the scenario's clock [s; its begin]."),
+    ] = None,
     cut: Annotated[
         list[str] | None,
         typer.Option(help="Connected input at which a loop is cut [all that feed back]."),
@@ -59,14 +62,14 @@ def linearize_command(
     """
     from ..control.linearize import connect, loop_margins, operating_point, plot_bode
 
-    master, inputs, changed = _master(
+    master, inputs, start, changed = _master(
         name,
         pairs(variants, "--set", "INSTANCE=VARIANT"),
         values(parameters, "--param", "INSTANCE.NAME=VALUE"),
         algorithm,
         values(options, "--option", "NAME=VALUE"),
     )
-    parts, notes = operating_point(master, at, inputs)
+    parts, notes = operating_point(master, at, inputs, start)
     notes = [*changed, *notes]
     system = connect(master, parts, notes)
     names = cut or [wire.target for wire in master.system.connections]
@@ -90,8 +93,8 @@ def _master(
     parameters: Mapping[str, Any],
     algorithm: str | None,
     options: Mapping[str, Any],
-) -> tuple[Master, dict[str, Driver], tuple[str, ...]]:
-    """What is linearized, what drives it, and notes; changes as in `cosim run`."""
+) -> tuple[Master, dict[str, Driver], float, tuple[str, ...]]:
+    """What is linearized, what drives it, its start [s], notes; changes as in `cosim run`."""
     from ..errors import InputError
     from ..master.master import Master
     from ..running.preparation import adjusted
@@ -106,7 +109,7 @@ def _master(
         system.add("fmu", name)
         for key, value in parameters.items():
             system.set(key if key.startswith("fmu.") else f"fmu.{key}", value)
-        return Master(system, algorithm or "jacobi", options=options), {}, ()
+        return Master(system, algorithm or "jacobi", options=options), {}, 0.0, ()
     file, run = scenarios.find(name)
     item = adjusted(file.scenario(run or next(iter(file.runs))), algorithm, options)
     with Display() as display:
@@ -114,7 +117,7 @@ def _master(
         prepared = prepare(
             item, provider, variants=variants, parameters=parameters, base=Path.cwd()
         )
-    return prepared.master, dict(item.inputs), prepared.notes
+    return prepared.master, dict(item.inputs), item.start, prepared.notes
 
 
 def _finite(value: float) -> float | None:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import AlgebraicLoopError, InputError, UnknownNameError, listing
+from ..errors import AlgebraicLoopError, InputError, UnknownNameError, ValueRangeError, listing
 from ..files import atomic
 from ..fmu.instance import Instance
 from ..fmu.values import NUMBERS
@@ -207,31 +207,44 @@ def _named(
 
 def linearize(
     master: Master,
-    at: float = 0.0,
+    at: float | None = None,
     inputs: Mapping[str, Driver] | None = None,
     opened: Sequence[str] = (),
+    *,
+    start: float = 0.0,
 ) -> Linear:
     """A system at time `at` of a run with these inputs.
 
     Args:
         master: system, algorithm and step that lead to the operating point.
-        at: [s]; 0 is the state after initialization.
+        at: on the clock of the inputs [s]; at `start`, and by default, the state after
+            initialization.
         inputs: as of `Master.run`.
         opened: connected inputs at which the system is cut open.
+        start: where the run begins [s].
 
     Returns:
         From all inputs that nothing drives, and the opened ones, to all outputs.
+
+    Raises:
+        ValueRangeError: `at` is no time of a run from `start` on.
     """
-    parts, notes = operating_point(master, at, inputs)
+    parts, notes = operating_point(master, at, inputs, start)
     return connect(master, parts, notes, opened)
 
 
 def operating_point(
-    master: Master, at: float, inputs: Mapping[str, Driver] | None
+    master: Master, at: float | None, inputs: Mapping[str, Driver] | None, start: float = 0.0
 ) -> tuple[list[Linear], list[str]]:
-    """The instances at time `at` of a run."""
-    outline = master.outline(at if at > 0.0 else master.step, inputs=inputs, record=[])
-    count = outline.count if at > 0.0 else 0
+    """The instances at time `at` of a run; arguments as of `linearize`."""
+    after = 0.0 if at is None else at - start
+    if not 0.0 <= after < np.inf:
+        raise ValueRangeError(
+            f"the operating point cannot be at t = {at:g} s: the run begins at {start:g} s; take "
+            "that time or a later one (--at)"
+        )
+    outline = master.outline(after or master.step, inputs=inputs, record=[], start=start)
+    count = outline.count if after else 0
     parts, notes = [], []
     with ExitStack() as stack:
         execution = Execution(outline, stack)
@@ -316,7 +329,8 @@ class Margins:
         name: the input at which it is cut.
         crossover: frequency where |L| falls through 1, the last one; nan if it never does [Hz].
         phase: phase margin there [deg].
-        gain: gain margin, at the phase of -180 degrees above the crossover; inf if there is none.
+        gain: gain margin, the factor by which the loop's gain must change until |L| = 1 at a phase
+            of -180 degrees, the nearest to 1 (below 1: by which it must fall); inf for none.
         frequencies, response: of L.
     """
 
@@ -331,20 +345,34 @@ class Margins:
 def margins(name: str, frequencies: Vector, response: NDArray[np.complex128]) -> Margins:
     """Margins of an open loop from its frequency response on a fine raster."""
     size, angle = np.abs(response), np.unwrap(np.angle(response))
+    gain = _gain_margin(size, angle)
     down = np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))
     if not down.size:
-        return Margins(name, np.nan, np.nan, np.inf, frequencies, response)
+        return Margins(name, np.nan, np.nan, gain, frequencies, response)
     k = int(down[-1])
     part = np.log(size[k]) / (np.log(size[k]) - np.log(size[k + 1]))
     crossover = float(frequencies[k] * (frequencies[k + 1] / frequencies[k]) ** part)
     at = float(angle[k] + part * (angle[k + 1] - angle[k]))
     phase = float((np.degrees(at) + 180.0 + 180.0) % 360.0 - 180.0)
-    turned = (angle[k:] + np.pi) / (2.0 * np.pi)  # whole numbers at -180 degrees
-    cuts = np.flatnonzero(np.floor(turned[:-1]) != np.floor(turned[1:]))
-    gain = float(1.0 / size[k + cuts[0]]) if cuts.size else np.inf
     return Margins(name, crossover, phase, gain, frequencies, response)
 
 
+def _gain_margin(size: Vector, angle: Vector) -> float:
+    """Gain margin; interpolated as the crossover is."""
+    turned = (angle + np.pi) / (2.0 * np.pi)  # whole numbers at -180 degrees
+    told = np.flatnonzero((np.abs(turned - np.round(turned)) > TOUCHED) & (size > 0.0))
+    turned, log = turned[told], np.log(size[told])
+    k = np.flatnonzero(np.floor(turned[:-1]) != np.floor(turned[1:]))
+    if not k.size:
+        return np.inf
+    whole = np.maximum(np.floor(turned[k]), np.floor(turned[k + 1]))
+    part = (whole - turned[k]) / (turned[k + 1] - turned[k])
+    there = log[k] + part * (log[k + 1] - log[k])
+    return float(np.exp(-there[np.argmin(np.abs(there))]))
+
+
+TOUCHED = 1e-6
+"""Turns from -180 degrees below which a loop that only tends to them has rounding for a phase."""
 RASTER: Vector = np.logspace(-3, 5, 8001)
 """Frequencies of margins [Hz]."""
 

@@ -23,7 +23,7 @@ from cosim.control.linearize import (
     tune_pi,
     tune_pid,
 )
-from cosim.errors import InputError, UnknownNameError
+from cosim.errors import InputError, UnknownNameError, ValueRangeError
 from cosim.master.master import Master
 from cosim.running.runner import prepare
 from cosim.scenario.scenario import find
@@ -71,9 +71,27 @@ def test_margins_of_a_known_loop() -> None:
     assert 2.0 * np.pi * edge.crossover == pytest.approx(1.0, rel=1e-4)  # raster of 0.23 %
     assert edge.phase == pytest.approx(0.0, abs=0.05)
     half = margins("half", RASTER, 1.0 / (s * (s + 1.0) ** 2))
-    assert half.gain == pytest.approx(2.0, rel=0.01)  # nearest point of the raster
+    assert half.gain == pytest.approx(2.0, rel=1e-5)  # interpolated: the raster's step squared
     gm, pm, *_ = control.margin(1 / (S * (S + 1) ** 2))
     assert half.phase == pytest.approx(pm, abs=0.05) and gm == pytest.approx(2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("loop", "exact"),
+    [
+        (2.0 / (S * (S + 1.0) * (0.1 * S + 1.0)), 5.5),
+        (50.0 / (S * (S + 1.0) * (0.1 * S + 1.0)), 0.22),  # unstable: the gain must fall
+        (1000.0 * (S + 1.0) ** 2 / (S**3 * (0.001 * S + 1.0) ** 2), None),  # stable between two
+        (0.5 / (0.01 * S + 1.0) ** 3, 16.0),  # never above 1
+        (10.0 * (S + 1.0) / S**2, np.inf),  # its phase tends to -180 degrees from above
+    ],
+)
+def test_gain_margins_are_those_of_python_control(loop, exact: float | None) -> None:
+    found = margins("loop", RASTER, loop(2j * np.pi * RASTER)).gain
+    expected = float(control.margin(loop)[0])
+    if exact is not None:
+        assert expected == pytest.approx(exact, rel=1e-6)
+    assert found == pytest.approx(expected, rel=1e-5)  # interpolated: the raster's step squared
 
 
 R, L, KT, J = 0.10, 0.2e-3, 0.13, 0.00601  # motor of the MiR250 and inertia of a translation
@@ -179,6 +197,41 @@ def test_the_command_takes_variants_parameters_and_algorithms(provider, monkeypa
     assert len(followed["poles"]) == len(usual["poles"])
     with pytest.raises(InputError, match=r"--param load: write --param INSTANCE.NAME=VALUE"):
         linear(provider, monkeypatch, *bench, "--param", "load")
+
+
+def test_the_operating_point_is_on_the_clock_of_the_scenario(
+    provider, tmp_path: Path, monkeypatch
+) -> None:
+    def at(start: float, *arguments: str) -> dict:
+        path = tmp_path / f"from_{start:g}.toml"
+        path.write_text(
+            f"""
+system = "motor_bench"
+start = {start}
+duration = 1.0
+step = 1e-3
+variants.load = "+coulomb"
+[parameters]
+load.coulomb.tau_c = 0.3
+load.coulomb.w_0 = 1.0
+load.speed = 3.0
+[inputs]
+"motor.w_ref" = {{ times = [{start}, {start + 0.5}], values = [5.0, 30.0], unit = "rad/s" }}
+"""
+        )
+        return linear(provider, monkeypatch, str(path), *arguments)
+
+    def poles(found: dict) -> np.ndarray:
+        return np.array([[p["real_1_per_s"], p["imag_rad_per_s"]] for p in found["poles"]])
+
+    assert at(10.0)["time_s"] == 10.0
+    for early, late in ((at(0.0), at(10.0)), (at(0.0, "--at", "0.02"), at(10.0, "--at", "10.02"))):
+        # steps at 10 s are rounded differently, and poles at -2/T are many
+        np.testing.assert_allclose(poles(late), poles(early), rtol=1e-6, atol=1e-6)
+    assert not np.allclose(poles(at(0.0)), poles(at(0.0, "--at", "0.02")), rtol=1e-3)
+    for time in ("0", "9.999", "nan", "inf"):
+        with pytest.raises(ValueRangeError, match=r"the run begins at 10 s"):
+            at(10.0, "--at", time)
 
 
 def loop_of_speed(provider, motor: str):
