@@ -98,13 +98,17 @@ def common_unit(units: Mapping[str, str], signals: Sequence[str]) -> str:
     Raises:
         UnitError: they have several.
     """
-    found = {units.get(name, "") for name in signals}
+    found = list(dict.fromkeys(units.get(name, "") for name in signals))
     if len(found) > 1:
         raise UnitError(
             f"cannot take the distance of {', '.join(signals)}: their units are "
-            f"{', '.join(sorted(found))}; compare them one by one"
+            f"{', '.join(found)}; take signals of one unit, or one by one"
         )
-    return found.pop()
+    return found[0] if found else ""
+
+
+def _unit(recording: Recording, reference: Reference) -> str:
+    return common_unit(recording.units, reference.signals)
 
 
 def convert_reference(recording: Recording, reference: Reference) -> Vector:
@@ -113,7 +117,7 @@ def convert_reference(recording: Recording, reference: Reference) -> Vector:
     Raises:
         UnitError: the units do not convert.
     """
-    unit = common_unit(recording.units, reference.signals)
+    unit = _unit(recording, reference)
     if not reference.unit or not unit:
         return reference.values
     found = []
@@ -173,7 +177,7 @@ def compare(recording: Recording, reference: Reference) -> Comparison:
     differences = apart[0] if len(apart) == 1 else np.sqrt(np.sum(np.square(apart), axis=0))
     return Comparison(
         signals=reference.signals,
-        unit=common_unit(recording.units, reference.signals),
+        unit=_unit(recording, reference),
         rms=float(np.sqrt(np.mean(differences**2))),
         max=float(np.max(np.abs(differences))),
         count=int(times.size),

@@ -33,6 +33,7 @@ from ..system.variants import apply
 from ..view.scene import Scenes, needs, scenes
 from .checks_table import checks_html
 from .comparison_table import ComparedQuantity, overview
+from .measures import measurable
 from .plots import plot_overview, plot_run
 from .preparation import (
     adjusted,
@@ -292,10 +293,11 @@ def prepare(
         system, scenario.algorithm, scenario.step, scenario.tolerance, scenario.name,
         isolate=isolate, guard=guard, options=scenario.options,
     )  # fmt: skip
+    every = recording_interval(scenario)
+    coarse = measurable(scenario, system, every)
     return Prepared(
-        scenario, usual, instances, master, record, recording_interval(scenario),
-        (*notes, *others), looks,
-    )  # fmt: skip
+        scenario, usual, instances, master, record, every, (*notes, *others, *coarse), looks
+    )
 
 
 def run_scenario(
