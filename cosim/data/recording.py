@@ -283,14 +283,14 @@ class Recording:
         self,
         signals: Sequence[str] | str | None = None,
         path: Path | str | None = None,
-        references: Mapping[str, tuple[Vector, Vector, str]] | None = None,
+        references: Mapping[str, Sequence[tuple[Vector, Vector, str]]] | None = None,
     ) -> Figure:
         """Plot signals over time, those with the same unit in one axes, named by what it measures.
 
         Args:
             signals: names, or one (vectors too); all if not given, of the units with most signals.
             path: where to write the figure; the suffix says how.
-            references: signal -> (times, values, label), drawn with it.
+            references: signal -> some (times, values, label) that are drawn with it.
         """
         from matplotlib.figure import Figure
 
@@ -308,8 +308,7 @@ class Recording:
         axes = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, (unit, members) in zip(axes, groups.items(), strict=False):
             for name in members:
-                times, values, label = (references or {}).get(name, (None, None, ""))
-                if times is not None:
+                for times, values, label in (references or {}).get(name, ()):
                     axis.plot(times, values, color="0.6", linewidth=2.0, label=label)
                 axis.plot(self.time, self[name], linewidth=1.0, label=name)
             axis.set_ylabel(f"{_QUANTITIES.get(unit, '')} [{unit}]".strip() if unit else "")

@@ -193,10 +193,10 @@ def _courses(run: str, result: RunResult) -> list[_Signal]:
         for column, name in enumerate(recording.names)
         if recording.objects.get(name, recording.time).dtype != object
     ]
-    for reference in result.scenario.references.values():
+    for name, reference in result.scenario.references.items():  # a signal may have several
         if len(reference.signals) == 1:
             values = convert_reference(recording, reference)[:, 0]
-            found.append(_Signal(f"{run}/{reference.name}/log", reference.times, values))
+            found.append(_Signal(f"{run}/{name}/log", reference.times, values))
     for name, item in result.comparisons.items():
         found.append(_Signal(f"{run}/{name}/rest", item.times, item.differences))
     return found
@@ -249,7 +249,7 @@ def _compared(result: Result) -> list[list[Panel]]:
             if len(reference.signals) == 1:
                 signal = reference.signals[0]
                 curves = [
-                    _curve("reference", f"{reference.name}/log", "measured", 2.2),
+                    _curve("reference", f"{name}/log", "measured", 2.2),
                     _curve("model", signal, "after"),
                 ]
                 found[name].insert(0, Panel(f"{signal}{of}", curves, None, 190, name))

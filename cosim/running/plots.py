@@ -134,8 +134,9 @@ def _window(item: Axes, times: Vector) -> NDArray[np.bool_]:
     return within(times, item.after, item.before)
 
 
-def _reference(references: Sequence[Reference], signals: tuple[str, ...]) -> Reference | None:
-    return next((item for item in references if item.signals == signals), None)
+def _compared(references: Sequence[Reference], signals: tuple[str, ...]) -> list[Reference]:
+    """What signals are compared with."""
+    return [item for item in references if item.signals == signals]
 
 
 def _labels(axis: MatplotlibAxes) -> list[str]:
@@ -169,8 +170,9 @@ def draw_paths(
     inside = _window(item, recording.time)
     unit, seen = "", set()
     for pair in item.paths:
-        reference = _reference(references, pair)
-        if reference is not None and reference.text not in seen:
+        for reference in _compared(references, pair):
+            if reference.text in seen:
+                continue
             scale = _scale(recording, item, pair[0])
             seen.add(reference.text)
             points = scale(convert_reference(recording, reference))[_window(item, reference.times)]
@@ -183,7 +185,7 @@ def draw_paths(
         x, y = (scale(recording[name])[inside] for name in pair)
         name = item.names[number] if item.names else ", ".join(pair)
         name = f"{run} {name}".strip() if len(item.paths) > 1 or not run else run
-        several = bool(run) and _reference(references, pair) is None  # they may cover each other
+        several = bool(run) and not _compared(references, pair)  # they may cover each other
         style = _LINES[(len(_labels(axis)) if several else number) % 4]
         (line,) = axis.plot(x, y, style, linewidth=1.2, label=name)
         axis.plot(x[-1:], y[-1:], "o", color=line.get_color(), markersize=4)  # where it ends
@@ -212,8 +214,7 @@ def draw_courses(
         for element in names:
             scale = _scale(recording, item, element)
             unit = item.unit or recording.units.get(element, "")
-            reference = _reference(references, (element,))
-            if reference is not None and not item.minus:
+            for reference in [] if item.minus else _compared(references, (element,)):
                 drawn = _window(item, reference.times)
                 values = scale(convert_reference(recording, reference)[:, 0])
                 text = reference.text if reference.text not in _labels(axis) else None

@@ -87,17 +87,15 @@ class RunResult:
     def plot(self, path: Path | str | None = None) -> Any:
         """Plot what the scenario describes or names, else what is compared, else everything."""
         if self.scenario.plots:
-            item = self.scenario
+            whole = self.scenario
             return plot_run(
-                self.recording, item.plots, item.references, self.comparisons, item.name, path
+                self.recording, whole.plots, whole.references, self.comparisons, whole.name, path
             )
-        references = {
-            name: (reference.times, values, reference.text)
-            for reference in self.scenario.references.values()
-            for name, values in zip(
-                reference.signals, convert_reference(self.recording, reference).T, strict=True
-            )
-        }
+        references: dict[str, list[tuple[Vector, Vector, str]]] = {}
+        for item in self.scenario.references.values():
+            columns = convert_reference(self.recording, item).T
+            for name, values in zip(item.signals, columns, strict=True):
+                references.setdefault(name, []).append((item.times, values, item.text))
         signals = self.scenario.plot or tuple(references) or None
         return self.recording.plot(signals, path, references)
 

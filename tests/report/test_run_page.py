@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -68,6 +69,25 @@ def test_figures_are_those_of_the_json(result: Result) -> None:
         assert f"{item['rms']:.4g}" in shown and f"{item['max']:.4g}" in shown
     for variant in result.runs["ST1"].variants.values():
         assert variant in shown
+
+
+@pytest.mark.parametrize("plots", ["", '[[plots]]\nlabel = "speed"\nsignals = ["load.w"]\n'])
+def test_two_references_of_one_signal_are_both_drawn(tmp_path: Path, plots: str) -> None:
+    place = tmp_path / "scenario.toml"
+    place.write_text(
+        'system = "motor_bench"\nduration = 0.01\nstep = 1e-3\n' + plots + "".join(
+            f'[compare.{name}]\nsignal = "load.w"\nconstant = {value}\nunit = "rad/s"\n'
+            for name, value in (("bench_a", 1.0), ("bench_b", 7.0))
+        )
+    )  # fmt: skip
+    result = cosim.run(place)
+    lines = [line for axis in result.runs[""].plot().axes for line in axis.get_lines()]
+    assert [line.get_ydata()[0] for line in lines if "bench" in line.get_label()] == [1.0, 7.0]
+    page = run_page(result)
+    kept = json.loads(re.search("id=.signal-data.>(.*?)</script>", page, re.S)[1])  # type: ignore[index]
+    for name, value in (("bench_a", 1.0), ("bench_b", 7.0)):
+        assert kept[f"/{name}/log"]["low"] == pytest.approx(value, abs=1e-6)  # 16 bits of a span
+        assert f"/{name}/log" in page.split("signal-data")[0]
 
 
 def test_signals_without_a_reference_are_drawn_together_by_unit(result: Result) -> None:
