@@ -62,6 +62,7 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     time = clock
     if "resample" in table:
         interval = float(table["resample"])
+        check_rising(log, main, clock, twice=True)
         check_span(log, main, clock)
         time = clock[0] + interval * np.arange(
             int((clock[-1] - clock[0]) / interval + COINCIDENT) + 1

@@ -87,6 +87,8 @@ def test_a_part_of_a_log_is_advised_where_it_helps_only(tmp_path: Path) -> None:
     log = written(HEADS, ",", back, TORQUE, SPEED)
     with pytest.raises(ScenarioError, match="take the rows on one side with samples"):
         read(tmp_path, log)
+    with pytest.raises(ScenarioError, match=r"goes back by 0\.49 .* sort the others$"):
+        read(tmp_path, log, TOP="resample = 0.01", COLUMNS="tau = { hold = true }\nw = {}")
     run = read(tmp_path, log, RUN="samples = [1, 201]").run("one")
     assert run.times[-1] == pytest.approx(200 * STEP)
 
