@@ -94,6 +94,11 @@ class MappedLogs:
                 for one, window in windows(name, log, lead):
                     kept = self._unbroken(one, window, window is not log)
                     if kept is not None:
+                        if one in self.logs:  # a piece may be called as another run is
+                            raise ScenarioError(
+                                f"{path}: two runs are named {one!r}, of entries with rows, each "
+                                "or window; give one of the [[run]] another name"
+                            )
                         self.logs[one], self.purposes[one] = kept, run.purpose
         if chosen and not self.logs:
             raise ScenarioError(

@@ -46,7 +46,7 @@ def pieces(log: Log) -> Iterator[tuple[str, Log]]:
     if entry.get("rows"):
         yield from ((f"{name} {row}", one) for row, one in _rows(log))
     elif "each" in entry:
-        yield from ((f"{name} {value:g}", one) for value, one in _each(log, str(entry["each"])))
+        yield from ((f"{name} {value!r}", one) for value, one in _each(log, str(entry["each"])))
     else:
         yield name, log
 
@@ -142,17 +142,18 @@ def _unit(log: Log, stem: str, numbers: list[int]) -> str:
 
 
 def _each(log: Log, key: str) -> Iterator[tuple[float, Log]]:
-    """The samples of each value of a column."""
+    """The samples of each value of a column, whole numbers (days, serial numbers) as such."""
     index = log[key]
-    for value in np.unique(index[np.isfinite(index)]).tolist():
+    for rest in np.unique(index[np.isfinite(index)]).tolist():
+        value = int(rest) + log.origins.get(key, 0) if rest.is_integer() else rest
         if _accepted(log, {key: value}):
-            mine = index == value
+            mine = index == rest
             columns = {
                 name: values[mine]
                 for name, values in log.columns.items()
                 if values.shape == index.shape
             }
-            yield value, replace(log, name=f"{log.name} {value:g}", columns=columns)
+            yield value, replace(log, name=f"{log.name} {value!r}", columns=columns)
 
 
 def windows(name: str, log: Log, lead: float) -> Iterator[tuple[str, Log]]:

@@ -154,6 +154,32 @@ def test_a_clock_of_its_own_is_brought_to_a_grid(tmp_path: Path) -> None:
     np.testing.assert_array_equal(left, [0.1, 0.2])  # held: no value in between
 
 
+def several(ids: list[float]) -> dict[str, np.ndarray]:
+    """A log of runs of 60 samples with these numbers."""
+    short = TIMES[:60]
+    whole = {"t": short, "left": LEFT[:60], "right": RIGHT[:60], **circle(short)}
+    return {name: np.tile(values, len(ids)) for name, values in whole.items()} | {
+        "run": np.repeat(ids, 60)
+    }
+
+
+@pytest.mark.parametrize("ids", [[20240701, 20240702], [0.5, 0.5000001], [2**60, 2**60 + 1]])
+def test_each_number_is_a_run_however_long_it_is(tmp_path: Path, ids: list[float]) -> None:
+    problem = problem_of(tmp_path, HEAD + 'each = "run"\n', **several(ids))
+    assert [run.name for run in problem.runs] == [f"one {one}" for one in ids]
+    assert {run.times.size for run in problem.runs} == {60}
+    text = HEAD + f'each = "run"\nwhere = {{ run = {ids[1]} }}\n'
+    assert [run.name for run in problem_of(tmp_path, text, **several(ids)).runs] == [
+        f"one {ids[1]}"
+    ]
+
+
+def test_two_runs_of_one_name_are_refused(tmp_path: Path) -> None:
+    other = '[[run]]\nname = "one 1"\nfile = "one.npz"\npurpose = "validation"\n'
+    with pytest.raises(ScenarioError, match="two runs are named 'one 1'"):
+        problem_of(tmp_path, HEAD + 'each = "run"\n' + other, **several([1]))
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
