@@ -59,6 +59,13 @@ EVEN, ROUGHLY = 1e-3, 1e-2
 second for drafts."""
 
 
+LEFT = 0.5
+"""Share of the information on a direction that must be left of it where both sides disagree, or
+all is differentiated anew: over steps that are felt, a bend is less, a jump is not. What a bend
+takes off may be little of each parameter, and still more than what the others do not make up for.
+"""
+
+
 class Descent:
     """A point on its way to the minimum, with what was simulated there last."""
 
@@ -118,7 +125,9 @@ class Descent:
             return
         self.uneven |= any(unevenness(p, item) > UNEVEN for item in self.jacobian)
         if not self.uneven:
-            return
+            normal = Normal(p, self.theta, self.jacobian, self.residuals, self.loss)
+            if normal.left > LEFT:
+                return
         everything = {item.run for item in self.jacobian}  # jumps that few see count, too
         for _ in range(TURNS):
             normal = self._felt(everything)

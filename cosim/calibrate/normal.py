@@ -38,6 +38,7 @@ class Normal:
         matrix, gradient: J^T J and J^T r, with priors.
         scores: J^T r of each block (rows), for the sandwich.
         rough: runs that jump.
+        claimed: the matrix with all that the derivatives say.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Normal:
     ) -> None:
         size, scale = theta.size, problem.scale
         self.matrix, self.gradient = np.zeros((size, size)), np.zeros(size)
+        self.claimed = np.zeros((size, size))
         self.rough: list[str] = []
         scores = []
         residuals = list(residuals)
@@ -73,6 +75,7 @@ class Normal:
             if share is not None:
                 self.rough += [name] * bool(np.trace(reliable) < 0.99 * np.trace(matrix))
             self.matrix[np.ix_(columns, columns)] += reliable
+            self.claimed[np.ix_(columns, columns)] += matrix
             per_sample = np.einsum("tcp,tc->tp", derivative, factor * errors)
             index = ((run.times - run.times[0]) / block).astype(np.intp)
             sums = np.zeros((int(index[-1]) + 1, size))
@@ -87,7 +90,16 @@ class Normal:
             if p.prior:
                 ratio = scale[i] / p.prior
                 self.matrix[i, i] += ratio**2
+                self.claimed[i, i] += ratio**2
                 self.gradient[i] -= ratio * (theta[i] - p.nominal) / p.prior
+
+    @property
+    def left(self) -> float:
+        """The least share that is left of the information claimed on a direction that is known."""
+        values, vectors = np.linalg.eigh(self.claimed)
+        known = values > 1.0 / KNOWN**2
+        ways = vectors[:, known] / np.sqrt(values[known])
+        return float(np.min(np.linalg.eigvalsh(ways.T @ self.matrix @ ways), initial=1.0))
 
 
 def block_length(times: Sequence[Vector]) -> float:
