@@ -323,11 +323,8 @@ class Joined(MappedLogs):
             begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
         if entry.startswith("first:"):
-            log = self.logs[run]
             column = entry.removeprefix("first:")
-            values = log[column][log.time >= 0.0]
-            if not np.isfinite(values).any():
-                raise ScenarioError(f"{where}: {log.name} has no value of {column!r}")
+            begun = self.first(run, column, where)
             own = self.units.get(column, "")
             gain, offset = 1.0, 0.0
             if own and unit:
@@ -339,7 +336,7 @@ class Joined(MappedLogs):
                     "unit",
                     "",
                 )
-            return float(values[np.isfinite(values)][0]) * gain + offset
+            return begun * gain + offset
         return lookup(self.logs[run].values, entry, where)
 
     def run(self, name: str, channels: list[Channel]) -> MeasuredRun:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data.logs import DataSet, Log, LoggedRun
 from ..data.segments import pieces, windows
@@ -22,6 +23,7 @@ from .scales import known
 from .schema import RUN, strict
 from .stamps import apart, check_rising
 
+Vector = NDArray[np.float64]
 WHOLE = 0.25
 """Share of a count up to which noise is rounded off: half a count is two deviations and more."""
 FAINT = 1e-3
@@ -241,8 +243,7 @@ class MappedLogs:
         if window and np.count_nonzero(time >= 0.0) < FEWEST:
             self._left_out(name, "the log has no samples there")
             return None
-        usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-        longest = float(self.table.get("gap", LONGEST * usual))
+        longest = self._longest(time)
         until, reason = time.size, ""
         for column in self.sources():
             if column in log.own and np.any(log.own[column][0] <= time[0]):
@@ -288,6 +289,35 @@ class MappedLogs:
             for one, values in log.columns.items()
         }
         return replace(log, columns=columns)
+
+    def first(self, run: str, column: str, where: str) -> float:
+        """What a run begins with: the first value of a column, which is said where it is late.
+
+        Raises:
+            ScenarioError, UnknownNameError: there is none.
+        """
+        log = self.logs[run]
+        during = log.time >= 0.0
+        time, values = log.time[during], log[column][during]
+        good = np.flatnonzero(np.isfinite(values))
+        if not good.size:
+            raise ScenarioError(f"{where}: {log.name} has no value of {column!r}")
+        late = float(time[good[0]] - time[0])
+        if late > self._longest(time) * (1.0 + COINCIDENT):
+            text = (
+                f"is measured only from {late:.6g} s ({good[0]} rows) after the run begins, and "
+                f"its first value counts as that at the beginning (first:{column}): right if it "
+                "stands till then; else begin there with samples"
+            )
+            finding = Finding("warning", "start", run, column, text)
+            if finding not in self.findings:
+                self.findings.append(finding)
+        return float(values[good[0]])
+
+    def _longest(self, time: Vector) -> float:
+        """Gap that is bridged in what samples at these times hold [s]."""
+        usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+        return float(self.table.get("gap", LONGEST * usual))
 
     def _left_out(self, name: str, reason: str) -> None:
         """Say that a window is not used."""

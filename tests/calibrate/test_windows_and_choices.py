@@ -100,3 +100,19 @@ def test_a_choice_that_no_run_meets_is_refused_with_what_there_is(tmp_path: Path
         read(tmp_path, written(), TOP="only = { load = 3 }", RUN=more)
     (run,) = read(tmp_path, written(), TOP="only = { load = 4 }", RUN=more).runs
     assert run.name == "two"
+
+
+@pytest.mark.parametrize(
+    ("rows", "gap", "said"), [(6, "", True), (5, "", False), (6, "0.1", False)]
+)
+def test_a_start_that_is_measured_late_is_said(
+    tmp_path: Path, rows: int, gap: str, said: bool
+) -> None:
+    """Later than what counts as a gap; the value at the beginning may have been another one."""
+    log = written(HEADS, ",", TIMES, TORQUE, np.where(np.arange(SIZE) < rows, np.nan, SPEED))
+    top = (f"gap = {gap}\n" if gap else "") + '[starts]\n"first:w" = "load.w"'
+    problem = read(tmp_path, log, TOP=top)
+    assert problem.run("one").starts["load.w"] == pytest.approx(SPEED[rows])
+    found = [f for f in problem.source.findings if f.kind == "start"]
+    assert [(f.severity, f.run, f.column) for f in found] == [("warning", "one", "w")] * said
+    assert not said or found[0].text.startswith("is measured only from 0.06 s (6 rows) after")
