@@ -1,4 +1,4 @@
-"""Runs that are copies of each other, whole or in part, at whatever offset, or in one column."""
+"""Runs that are copies of each other or of themselves, whole or in part, or in one column."""
 
 from __future__ import annotations
 
@@ -62,6 +62,35 @@ def check_copies(problem: Problem) -> Iterator[Finding]:
             f"same{shifted}; {what}. Take one of the two out"
         )
         yield Finding("error", "copy", b.name, "", text)
+
+
+def check_repeated(problem: Problem) -> Iterator[Finding]:
+    """Rows that a run holds twice, one offset apart: a part of it was written again.
+
+    Only columns with noise finer than their resolution count (`smooth.noise`), since a machine that
+    repeats a motion exactly is no copy. A row counts if the run holds it twice, so that `SHORT` at
+    one offset are as improbable as in two runs.
+    """
+    fine = [
+        i for i in range(len(problem.channels))
+        if noise([run.data[:, i] for run in problem.runs]) is not None
+    ]  # fmt: skip
+    for run in problem.runs if fine else ():
+        places: dict[bytes, list[int]] = defaultdict(list)
+        for index, key in _rows(run.data[:, fine]):
+            places[key].append(index)
+        twice = [at for at in places.values() if len(at) == 2]
+        offsets = Counter(second - first for first, second in twice)
+        offset, count = offsets.most_common(1)[0] if offsets else (0, 0)
+        if count < SHORT:
+            continue
+        begin = min(first for first, second in twice if second - first == offset)
+        text = (
+            f"holds {count} samples twice: what was measured from {run.logged[begin]:.6g} s on "
+            f"stands once more from {run.logged[begin + offset]:.6g} s on; take it out, or give "
+            "what is before and what comes after it a run each, with samples"
+        )
+        yield Finding("error", "copy", run.name, "", text)
 
 
 def check_columns(problem: Problem) -> Iterator[Finding]:

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from ...errors import CosimError
 from .clipped import check_clipped
-from .copies import check_columns, check_copies
+from .copies import check_columns, check_copies, check_repeated
 from .finding import Finding, passed, quantity
 from .gaps import check_gaps
+from .jumps import check_jumps
 from .lags import check_lags
 from .late import check_late
 from .scale import check_scale
 from .smooth import check_smooth, check_stated
-from .spiking import check_spikes
+from .spiking import check_commands, check_spikes
 from .starts import check_starts
 from .still import check_still
 from .swaps import check_channels, check_inputs, check_runs
@@ -58,7 +59,10 @@ def check_data(problem: Problem) -> list[Finding]:
     found = list(problem.source.findings)
     if not problem.chosen("identification"):
         found.append(Finding("error", "purpose", "", "", "no run is for identification"))
-    for check in (check_times, check_still, check_gaps, check_copies, check_columns, check_smooth):
+    for check in (
+        check_times, check_still, check_gaps, check_copies, check_columns, check_repeated,
+        check_smooth, check_commands,
+    ):  # fmt: skip
         found += check(problem)
     return found
 
@@ -90,7 +94,10 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
     except CosimError as error:
         return [Finding("error", "simulation", "", "", _stopped(problem, error))]
     found += check_spikes(problem, models)
-    found += check_wraps(problem, models)
+    turns = list(check_wraps(problem, models))
+    found += turns
+    known = {(f.run, f.column) for f in turns}
+    found += [f for f in check_jumps(problem, models) if (f.run, f.column) not in known]
     found += check_clipped(problem, models)
     for index in range(len(problem.channels)):
         found += check_scale(problem, models, index)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data.signals import Table
 from ..columns import spikes
 from .finding import Finding, quantity
 
@@ -28,6 +29,43 @@ with less, a model that leaves noise still passes for one, whether they are faul
 the machine that hide in the noise of the other columns."""
 
 
+OUTSIDE = 3.0
+"""Times the range of all other values by which a command lies outside of it."""
+USUAL = 1.5
+"""Sample intervals that a command lasts at most to be a single one."""
+
+
+def check_commands(problem: Problem) -> Iterator[Finding]:
+    """Single samples of inputs that are far outside of what else was commanded.
+
+    They last one sample, between two that agree (`columns.spikes`), and lie outside of the range of
+    all other values by `OUTSIDE` times that. A short blow may be meant, so it is a warning.
+    """
+    for run in problem.runs:
+        usual = float(np.median(np.diff(run.times))) if run.times.size > 1 else 0.0
+        for target, table in run.inputs.items():
+            if not isinstance(table, Table) or table.values.ndim > 1:
+                continue
+            values, times = table.values, table.times
+            found = spikes(values)
+            if not found.any():
+                continue
+            found[:-1] &= np.diff(times) < USUAL * usual
+            low, high = (float(f(values[~found])) for f in (np.min, np.max))
+            away = np.maximum(values - high, low - values)
+            at = np.flatnonzero(found & (away > OUTSIDE * (high - low)) & (high > low))
+            if at.size:
+                text = (
+                    f"drives {target} with {values[at[0]]:.6g} for one sample, at "
+                    f"{times[at[0]] - run.lead:.6g} s, and else with {low:.6g} to {high:.6g}"
+                    + (f" ({at.size} such samples)" if at.size > 1 else "")
+                    + "; if that was not sent, make a gap of it with despike = true (or limit) "
+                    "in [columns]"
+                )
+                column = table.text.rpartition(":")[2]
+                yield Finding("warning", "spikes", run.name, column, text)
+
+
 def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
     """Samples that stand out in the data (`columns.spikes`) and in what the model leaves of them.
 
@@ -44,7 +82,7 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
     bends, rests = {}, {}
     for run in problem.runs:
         for index, channel in enumerate(problem.channels):
-            bent = _bent(_without(run.data[:, index], channel.sigma))
+            bent = _bent(without_spikes(run.data[:, index], channel.sigma))
             bends[run.name, index] = _size(bent, channel.sigma)
             if run.name in models:
                 model = _bent(models[run.name][:, index])
@@ -79,7 +117,7 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             yield Finding(severity, "spikes", run.name, channel.name, text)
 
 
-def _without(values: Vector, sigma: float) -> Vector:
+def without_spikes(values: Vector, sigma: float) -> Vector:
     """A column whose spikes are gaps."""
     return np.where(spikes(values, sigma), np.nan, values)
 
