@@ -70,3 +70,19 @@ def test_a_run_in_which_the_model_moves_at_once_begins_elsewhere(
     away[:, k] += 2.0 * OFF["current"]
     (error,) = found(short, {**standing, "sines": away})
     assert (error.severity, error.run) == ("error", "sines")
+
+
+def test_a_speed_that_most_runs_begin_with_is_told_beside_angles_that_differ(
+    short: Problem, standing: dict[str, np.ndarray]
+) -> None:
+    """By itself it might be a sensor's zero; the twin begins where the model does but for that."""
+    names = [c.name for c in short.channels]
+    moving = {name: values.copy() for name, values in standing.items()}
+    for values in moving.values():
+        values[:, names.index("speed")] += OFF["speed"]
+    assert len(moving) > 2 and found(short, moving) == []
+    moving["stairs"][:, names.index("angle")] += 2.0 * OFF["angle"]
+    (error,) = found(short, moving)
+    means = moving["stairs"][:5].mean(axis=0)
+    for name in ("speed", "angle"):
+        assert f"{name} {means[names.index(name)]:.4g} instead of " in error.text

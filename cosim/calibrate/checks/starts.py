@@ -7,7 +7,7 @@ model lacks (friction, a detent, a weight) holds it there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,15 +48,13 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
         if any(p.run == run.name for p in (*problem.parameters, *problem.late))
     }  # fmt: skip
     off: dict[str, Vector] = {}
+    begun: dict[str, Vector] = {}
     for run in problem.runs:
-        size = min(FIRST, run.times.size)
-        with np.errstate(invalid="ignore"):
-            apart = run.data[:size] - models[run.name][:size]
-        counted = np.isfinite(apart).any(axis=0)
-        mean = np.full(apart.shape[1], np.nan)
-        mean[counted] = np.nanmean(apart[:, counted], axis=0)
-        off[run.name] = mean
-    common = np.nan_to_num(_median(np.stack(list(off.values())))) if len(off) > 2 else 0.0
+        data, model = run.data[:FIRST], models[run.name][:FIRST]
+        begun[run.name] = _known(np.nanmean, np.where(np.isfinite(data), model, np.nan))
+        off[run.name] = _known(np.nanmean, data) - begun[run.name]
+    middle = _known(np.nanmedian, np.stack(list(off.values())))
+    common = np.nan_to_num(middle) if len(off) > 2 else 0.0
     for run in problem.runs:
         far = np.abs(off[run.name] - common)
         wrong = [
@@ -69,11 +67,16 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
         wrong = [i for i in wrong if far[i] > OFF * (problem.channels[i].sigma + moved[i])]
         if not wrong:
             continue
+        # a speed that most runs begin with is no sensor's zero where the angles are not alike
+        apart, expected = np.abs(off[run.name]), begun[run.name]
+        told = {i for i in range(apart.size) if apart[i] > OFF * problem.sigma[i] + moved[i]}
+        told |= set(wrong)
         names = ", ".join(
-            f"{problem.channels[i].name} {run.data[0, i]:.4g} instead of "
-            f"{models[run.name][0, i]:.4g} {problem.channels[i].unit}".rstrip()
-            for i in wrong
+            f"{problem.channels[i].name} {expected[i] + off[run.name][i]:.4g} instead of "
+            f"{expected[i]:.4g} {problem.channels[i].unit}".rstrip()
+            for i in sorted(told, key=lambda i: -apart[i] / problem.sigma[i])
         )
+        names += f"; means of the first {FIRST} samples"
         if _held(simulator, run, models[run.name], wrong):
             text = (
                 f"stands where the model stands, but not with the same effort ({names}): a force "
@@ -82,9 +85,11 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
             yield Finding("warning", "start", run.name, "", text)
             continue
         text = (
-            f"begins where the model does not ({names}): give what the system begins with in "
-            '[starts] ("first:COLUMN" = "VARIABLE"), or estimate it as a [[nuisance]] with '
-            "per_run = true, or begin with a sample at rest"
+            f"begins where the model does not ({names}): estimate what the system begins with as "
+            'a [[nuisance]] with targets = "VARIABLE" of the start, nominal = "first:COLUMN", a '
+            "span of several of the column's deviations and per_run = true; or, of a column "
+            'without noise, give it in [starts] ("first:COLUMN" = "VARIABLE"); or begin with a '
+            "sample at rest"
         )
         yield Finding("error", "start", run.name, "", text)
 
@@ -111,10 +116,11 @@ def _moves(problem: Problem, channel: int) -> bool:
     return not (exponents["kg"] or exponents["A"])
 
 
-def _median(values: Vector) -> Vector:
+def _known(average: Callable[..., Vector], values: Vector) -> Vector:
+    """The average of each column's known values, nan where there are none."""
     known = np.isfinite(values).any(axis=0)
     found = np.full(values.shape[1], np.nan)
-    found[known] = np.nanmedian(values[:, known], axis=0)
+    found[known] = average(values[:, known], axis=0)
     return found
 
 
