@@ -141,6 +141,7 @@ def _ended_by_hand(budget: Budget, say: Callable[[str], None]) -> Iterator[None]
 def _print(result: Diagnosis) -> None:
     from rich.table import Table
 
+    from ..calibrate.checks.finding import lines
     from ..diagnose.story.verdicts import in_words
 
     console = open_console(120)
@@ -158,6 +159,9 @@ def _print(result: Diagnosis) -> None:
         console.print(f"  to tell them apart: {in_words(result.experiment)}", soft_wrap=True)
     for hint in result.answer.hints:
         console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
+    said = lines(result.findings)  # the report has these
+    for text in [w for w in result.warnings if w not in said]:
+        console.print(f"  warning: {text}", soft_wrap=True, markup=False, highlight=False)
     if (law := result.to_dict()["law_from_data"]) is not None:
         _print_law(law, console)
     for text in clock_lines(result.to_dict()["clocks"]):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .facts import Force, Law, Left
+from .facts import Force, Law, Left, Value
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,9 @@ class Verdict:
         force: the free force that explains most of the rest.
         unused: whether there were unused runs.
         errors, ended, stopped: see `Table`.
+        bounds: of `unexplained`: see `Table`, if unused runs want these bounds opened.
+        opened: share of what the declared model leaves beyond noise that this explains.
+        beyond: channels that it leaves above their noise.
     """
 
     kind: str
@@ -92,6 +95,9 @@ class Verdict:
     errors: tuple[str, ...] = ()
     ended: tuple[tuple[str, float], ...] = ()
     stopped: str = ""
+    bounds: tuple[Value, ...] = ()
+    opened: float = 0.0
+    beyond: tuple[Left, ...] = ()
 
     @property
     def reason(self) -> str:
@@ -127,6 +133,11 @@ class Verdict:
         else:
             text = f"{tail.strip()} No effect of the catalogue can be named".strip()
             text += "." if self.unused else ": no run was kept unused to judge by."
+        if self.bounds:
+            text += (
+                f" The declared model would explain {percent(self.opened)} of it with "
+                f"{past(self.bounds)}: look at these bounds in the mapping first."
+            )
         if self.hints:
             text += f" Nearest, but no name: {self.hints[0]}"
             text += "." if self.hints[0].left else f"; {self.hints[0].why[0]}."
@@ -198,6 +209,15 @@ class Verdict:
             "left": list(dict.fromkeys(x.channel for x in self.left)),
             "hints": [hint.to_dict() for hint in self.hints],
             "stopped": self.stopped,
+            "bounds_opened": {
+                v.name: {
+                    "value": v.value,
+                    "ci95": [v.low, v.high],
+                    "unit": v.unit,
+                    "bounds": [v.minimum, v.maximum],
+                }
+                for v in self.bounds
+            },
         }
 
 
@@ -213,6 +233,15 @@ def parameters(law: Law) -> dict[str, dict[str, Any]]:
                  "identifiable": v.identifiable}
         for v in law.values
     }  # fmt: skip
+
+
+def past(bounds: Sequence[Value]) -> str:
+    """Values beyond their bounds, for people."""
+    return " and ".join(
+        f"{v.name} beyond its bound {v.maximum if v.value > v.maximum else v.minimum:.4g}, at "
+        f"{v.value:.4g} [{v.low:.4g}, {v.high:.4g}] {v.unit}".rstrip()
+        for v in bounds
+    )
 
 
 def over(left: Sequence[Left]) -> str:

@@ -21,6 +21,7 @@ from ..errors import CosimError
 from .adding import made_of
 from .anew import asked_anew
 from .answer import Verdict
+from .bounds import opened, told
 from .bursts import bursts, times
 from .candidates import candidates
 from .carriers import leave_fmus
@@ -229,7 +230,8 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         with task.budget.lifted():  # what was found stands, and is told whole
             _completed(result, search, current, wide)
         assert result.after is not None
-        if asked or (task.law and result.verdict == "unexplained"):
+        enough = result.answer.bounds and not result.answer.beyond
+        if asked or (task.law and result.verdict == "unexplained" and not enough):
             if asked is None and not search.raw.late:
                 asked_everywhere(result)
                 asked_single(result)
@@ -249,6 +251,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
             sudden = bursts(search.fit_data - result.after.fit, search.fitting)
             result.bursts = times(sudden, list(search.fitting.runs))
         left_over(result)
+        result.warnings += told(base, result.after)
     return result
 
 
@@ -294,6 +297,8 @@ def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estim
     current = examined(search, current, candidates_of(rounds))
     declared = search.memo.get(frozenset())
     assert declared is not None
+    if search.lifted is None:
+        search.lifted = opened(search, declared)
     simple: set[frozenset[str]] = set()
     level: set[frozenset[str]] = set()
     offered = list(dict.fromkeys(c for stage in rounds for c in stage.probes))

@@ -198,6 +198,7 @@ class Model:
         squares: the same in all runs, every window in full; likelihoods count those far off by
             their logarithm where runs may turn unstable.
         rough: not fitted, a first order from the declared model: it can be a hint alone.
+        beyond: what it is better by than the declared model with bounds opened (`Table.opened`).
     """
 
     laws: tuple[Law, ...]
@@ -210,6 +211,7 @@ class Model:
     worst: float = 0.0
     squares: float = 0.0
     rough: bool = False
+    beyond: Gain | None = None
 
     @property
     def labels(self) -> frozenset[str]:
@@ -244,6 +246,9 @@ class Table:
         errors: what makes the data useless.
         ended: run -> time from which it did not count for later laws.
         stopped: why the search was ended before its end, "" if it was not.
+        opened: the declared model with the bounds opened at which its parameters ended, if it was
+            fitted.
+        bounds: these parameters' values in it, with the bounds that they have in the mapping.
     """
 
     models: tuple[Model, ...] = ()
@@ -254,6 +259,8 @@ class Table:
     errors: tuple[str, ...] = ()
     ended: tuple[tuple[str, float], ...] = ()
     stopped: str = ""
+    opened: Model | None = None
+    bounds: tuple[Value, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """For a file; `read` is the inverse."""

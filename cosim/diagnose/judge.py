@@ -45,6 +45,8 @@ class Judge:
         self.memo = Memo()
         self.foretold: dict[frozenset[str], tuple[Vector, Vector]] = {}
         """Parameters of sets, and what these leave of unused runs (`foretelling.foretold`)."""
+        self.lifted: Fitted | None = None
+        """The declared model with bounds opened (`bounds.opened`), if it was fitted."""
         self._measured(problem)
 
     def _measured(self, problem: Problem) -> None:

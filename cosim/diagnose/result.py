@@ -186,6 +186,7 @@ class Diagnosis:
                     "value": float(estimate.theta[i]),
                     "ci95": [float(estimate.low[i]), float(estimate.high[i])],
                     "identifiable": bool(estimate.identifiable[i]),
+                    "at_bound": p.name in estimate.at_bound,
                 }
         return table
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CosimError
+from .bounds import beyond
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .foretelling import foretold
 from .judge import Judge
@@ -74,6 +75,7 @@ def table_of(
                 _excess(judge, f, run),
                 _beyond(judge.fit_data - f.fit)
                 + (_beyond(judge.check_data - f.check) if unused else 0.0),
+                beyond=judge.better(judge.lifted, f) if judge.lifted and f.effects else None,
             )
         )
     rough = _first_orders(models, rounds) if rounds else []
@@ -85,6 +87,8 @@ def table_of(
         judge.checking.size if unused else 0,
         ended=tuple(ended.items()),
         stopped=stopped,
+        opened=_opened(judge, declared),
+        bounds=beyond(declared, judge.lifted) if judge.lifted else (),
     )
     told = [_foretold(judge, table, *pair) for pair in zip(models, fits, strict=True)]
     table = replace(table, models=(*told, *rough))
@@ -124,6 +128,16 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
             for t in whiteness_tests(residual, stack)
         ]
     return tuple(found)
+
+
+def _opened(judge: Judge, declared: Fitted) -> Model | None:
+    """The declared model with bounds opened, if it was fitted."""
+    f = judge.lifted
+    if f is None:
+        return None
+    unused = -judge.checking.cost(judge.check_data - f.check) if judge.unused else 0.0
+    return Model((), f.complexity, -judge.fitting.cost(judge.fit_data - f.fit), unused,
+                 _left(judge, f), judge.better(declared, f))  # fmt: skip
 
 
 def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model:

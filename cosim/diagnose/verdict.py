@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
-from .answer import Hint, Verdict, over, percent
+from .answer import Hint, Verdict, over, past, percent
 from .facts import Force, Gain, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
@@ -64,8 +64,12 @@ def decide(table: Table) -> Verdict:
     if best is None and not left and not table.stopped:
         return Verdict("nothing_missing", unused=unused, ended=table.ended)
     force = declared.forces[0] if declared.forces else None
+    open_ = table.opened
+    told = open_ is not None and wanted(open_.gain, table.candidates)
     return Verdict("unexplained", left=left, hints=_hints(table), force=force, unused=unused,
-                   ended=table.ended, stopped=table.stopped)  # fmt: skip
+                   ended=table.ended, stopped=table.stopped, bounds=table.bounds if told else (),
+                   opened=_explained(table, open_, declared) if open_ is not None and told else 0.0,
+                   beyond=above(open_) if open_ is not None and told else ())  # fmt: skip
 
 
 def proposal(table: Table) -> int | None:
@@ -130,6 +134,8 @@ def doubts(table: Table, model: Model) -> list[str]:
             f"unused runs do not want it ({gain:.3g} nats by {z:.2g} standard deviations; "
             f"{threshold(table.candidates):.3g} by {GATE_Z:g} are needed)"
         )
+    elif model.beyond is not None and not wanted(model.beyond, table.candidates):
+        found.append(f"the declared model does no worse with {past(table.bounds)}")
     for law in model.laws:
         if not law.there:
             edge = max(law.absent, law.size.minimum)

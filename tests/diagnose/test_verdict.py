@@ -345,6 +345,22 @@ def test_a_rival_of_one_of_two_laws_is_no_rival_of_both() -> None:
     assert (alternative["effects"], alternative["instead_of"]) == ([first], [second])
 
 
+def test_a_set_that_a_wider_bound_makes_needless_has_no_name() -> None:
+    far = Value("J", "kg.m2", 0.1, 0.09, 0.11, 0.005, 0.08, True)
+    for gain, kind in ((-3.0, "unexplained"), (500.0, "effect_found")):
+        named = replace(model(law()), beyond=Gain(gain, gain, 20.0, 20.0, 3.0))
+        open_ = replace(model(), gain=Gain(900.0, 900.0, 20.0, 20.0, 3.0))
+        found = decide(replace(table(FAR, named), opened=open_, bounds=(far,)))
+        assert found.kind == kind
+        assert ("J beyond its bound 0.08, at 0.1 [0.09, 0.11] kg.m2" in found.reason) == (
+            gain < 0.0
+        )
+        bounds = {n: v["bounds"] for n, v in found.to_dict()["bounds_opened"].items()}
+        assert bounds == ({"J": [0.005, 0.08]} if gain < 0.0 else {})
+    content = json.loads(json.dumps(replace(table(FAR), opened=open_, bounds=(far,)).to_dict()))
+    assert Table.read(content).opened == open_
+
+
 def test_laws_are_compared_with_the_one_to_be_named_where_little_is_to_be_explained() -> None:
     """A better one that cannot be named, with half of the evidence, hides no rival of it."""
     found = [

@@ -345,6 +345,12 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
              else join("no run was kept unused to judge by, so none is named for what is left of ",
                        left, ".")),
     ]  # fmt: skip
+    bounds = words([tag("code", name) for name in facts.table.get("bounds_opened", {})])
+    if bounds:
+        meaning.append(
+            join("Calibration ended at the bound that the mapping gives ", bounds, "; with more "
+                 "room the model itself does better on unused runs. That may be all.")
+        )  # fmt: skip
     if law.get("made"):
         meaning.append(
             join("A law made from the data says more: ", tag("code", law["formula"]), " at ",
@@ -370,6 +376,17 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         )  # fmt: skip
     meaning.append(join(facts.table.get("inside", "")))
     steps = _compare(facts)
+    if bounds:
+        steps.insert(
+            0,
+            join(
+                tag("b", "Look at the bounds"),
+                " of ",
+                bounds,
+                " in the mapping. If "
+                "the machine may be beyond them, widen them and diagnose again.",
+            ),
+        )
     if not facts.asked:
         steps.append(
             join(tag("b", "Ask the catalogue"), ": the same command without ",

@@ -1,0 +1,104 @@
+"""Parameters that end at a bound of the mapping, and the declared model with these bounds opened.
+
+A bound in the wrong place is a fault like any other: laws and gains of sensors make up for it. So
+the declared model that may go on beyond it is a rival of every set of laws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from ..calibrate.deferred import corrected
+from ..calibrate.fit import CORRECTION, DRAFT, fit
+from ..calibrate.parts import Parameter
+from ..errors import CosimError
+from .facts import Value
+from .fitter import Fitter
+from .models import Fitted
+
+ROOM = 10.0
+"""Times as far from 0 that a bound is opened, or as near: an order of magnitude, in which a device
+is still of the same kind. A bound of 0 stays: beyond it a mass or a friction is none."""
+
+
+def opened(fitter: Fitter, declared: Fitted) -> Fitted | None:
+    """The declared model fitted with the bounds opened at which its parameters ended.
+
+    None if none did, or nothing can be simulated there.
+
+    Args:
+        fitter: fits it; its memo keeps the declared model.
+        declared: the fit within the bounds.
+    """
+    raw, theta = fitter.raw, declared.estimate.theta
+    wider = [_opened(p, ended(p, declared)) for p in raw.parameters]
+    if wider == list(raw.parameters):
+        return None
+    names = declared.problem.names
+    begin = np.array([
+        theta[names.index(p.name)] if p.name in names else p.nominal for p in raw.parameters
+    ])  # fmt: skip
+    simulator = fitter.simulator.of(raw.with_parameters(wider))
+    try:
+        for effort in (DRAFT, CORRECTION):
+            found = fit(corrected(simulator, begin, raw), begin, effort=effort)
+            begin = found.theta
+        return fitter.judged(found)
+    except CosimError as error:
+        fitter.say(f"the declared model with its bounds opened: {error}")
+        return None
+
+
+def ended(parameter: Parameter, fitted: Fitted) -> str:
+    """The key of the bound at which a declared parameter ended: `min`, `max`, "" if at none."""
+    if parameter.role != "declared" or parameter.name not in fitted.estimate.at_bound:
+        return ""
+    value = fitted.estimate.values[parameter.name]
+    return "max" if parameter.maximum - value < value - parameter.minimum else "min"
+
+
+def beyond(declared: Fitted, found: Fitted) -> tuple[Value, ...]:
+    """Values of the opened parameters, with the bounds that the mapping gives them."""
+    estimate = found.estimate
+    return tuple(
+        Value(
+            p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]),
+            float(estimate.high[i]), p.minimum, p.maximum, bool(estimate.identifiable[i]),
+        )
+        for p in declared.problem.parameters if _opened(p, ended(p, declared)) != p
+        for i in [found.problem.index(p.name)]
+    )  # fmt: skip
+
+
+def told(before: Fitted, after: Fitted) -> Iterable[str]:
+    """Warnings of declared parameters that ended at a bound."""
+    models = [("the declared model", before)]
+    if after is not before:
+        models.append(("the model with what was found", after))
+    where: dict[str, list[str]] = {}
+    for model, fitted in models:
+        for p in fitted.problem.parameters:
+            if key := ended(p, fitted):
+                bound = p.maximum if key == "max" else p.minimum
+                text = f"{p.name} ended at its bound {key} = {bound:.4g} {p.unit}".rstrip()
+                where.setdefault(text, []).append(model)
+    for text, found in where.items():
+        yield (
+            f"{text} in {' and in '.join(found)}: laws and other parameters may make up for what "
+            "it may not; give a wider bound in the mapping if the machine may be beyond this one"
+        )
+
+
+def _opened(parameter: Parameter, key: str) -> Parameter:
+    """A parameter with more room at one of its bounds, steps as before."""
+    low, high = parameter.minimum, parameter.maximum
+    if key == "max":
+        high *= ROOM if high > 0.0 else 1.0 / ROOM
+    elif key == "min":
+        low *= ROOM if low < 0.0 else 1.0 / ROOM
+    if (low, high) == (parameter.minimum, parameter.maximum):
+        return parameter
+    return replace(parameter, minimum=low, maximum=high, span=parameter.scale)

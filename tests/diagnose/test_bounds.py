@@ -1,0 +1,53 @@
+"""Where a parameter ends at a bound of the mapping, the model beyond it is a rival of all laws."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cosim.cli.app import app
+from tests.diagnose import disc
+
+FEW = ("sweep", "steps", "check")
+ROOM = {
+    "J": ("nominal = 0.025\nmin = 0.005\nmax = 0.08", "nominal = 0.01\nmin = 0.005\nmax = 0.016"),
+    "b": ("max = 0.3", "max = 0.035"),
+}
+"""What the mapping allows, and less: the disc has 0.02 kg.m2, and friction looks like more `b`."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "friction", "verdict"), [("J", 0.0, "unexplained"), ("b", 0.08, "effect_found")]
+)
+def test_a_bound_in_the_wrong_place_is_told_and_no_law_named_for_it(
+    tmp_path: Path, name: str, friction: float, verdict: str
+) -> None:
+    """The twin: a bound that is reached since a law is missing hides no law."""
+    folder = disc.write(tmp_path, lambda w, theta, t: friction * math.tanh(w / 0.02), names=FEW)
+    mapping = folder / "dataset.toml"
+    text = mapping.read_text(encoding="utf-8")
+    assert text.count(ROOM[name][0]) == 1
+    mapping.write_text(text.replace(*ROOM[name]), encoding="utf-8")
+    told = CliRunner().invoke(app, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert found["verdict"] == verdict, found["reason"]
+    assert found["parameters"][name]["before"]["at_bound"]
+    (warning,) = [w for w in found["warnings"] if w.startswith(f"{name} ended at its bound max")]
+    assert warning in told.stdout
+    assert list(found["bounds_opened"]) == ([] if friction else [name])
+    if friction:
+        assert [e["effect"] for e in found["effects"]] == ["coulomb"]
+        low, high = found["parameters"]["b"]["after"]["ci95"]
+        assert low <= disc.B <= high and not found["parameters"]["b"]["after"]["at_bound"]
+        return
+    low, high = found["bounds_opened"]["J"]["ci95"]
+    assert low <= disc.J <= high
+    assert "look at these bounds in the mapping first" in found["reason"]
+    assert all("no worse with J beyond its bound" in hint["why"][0] for hint in found["hints"])
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Look at the bounds" in page
