@@ -19,6 +19,12 @@ MARGIN = 0.05
 """By which the best one must be better than the second."""
 SELDOM = 0.6
 """What is left of what speaks for a column being an input, if it looks measured."""
+ITSELF = 10.0
+"""What a column is worth that has the variable's own name: more than all words of a name."""
+WIDER = {"angle": "yaw"}
+"""Words that may mean less: `theta` beside x and y is a heading."""
+MAYBE = 0.5
+"""What is left of a word's weight then."""
 TOO_MUCH = 0.01
 """What each word of a variable's name costs that the column does not have."""
 
@@ -146,7 +152,12 @@ def score(column: Column, place: Place) -> float:
         return 0.0
     if "measured" in said and place.role == "input":
         return 0.0
-    total = sum(place.words.get(word, 0.0) for word in dict.fromkeys(said))
+    if column.name in (place.name, place.name.partition(".")[2]):
+        return ITSELF
+    total = 0.0
+    for word in dict.fromkeys(said):
+        less = MAYBE * place.words.get(WIDER.get(word, ""), 0.0)
+        total += max(place.words.get(word, 0.0), less)
     if total <= 0.0:
         return 0.0
     if place.role == "output" and "measured" in place.words:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,24 @@ def test_names_and_units_tell() -> None:
         "base.x": "px_mm", "base.y": "py_mm", "base.phi": "heading_deg", "motor.w": "MotSpd_rpm",
         "motor.i": "I_mA",
     }  # fmt: skip
+
+
+def test_a_column_with_a_variables_own_name_is_it() -> None:
+    # "turns left" in what is said of the base's turning rate had made `w_l` a measurement of it
+    turning = place("base.w_z", "rad/s", "output")
+    turning = replace(turning, words={**turning.words, "left": 0.3})
+    matches = Matches()
+    guess([column("w_l", "rad/s"), column("w_r", "rad/s")], [*PLACES, turning], matches)
+    drives = {name: m.column.source for name, m in matches.inputs.items()}
+    assert drives == {"base.w_l": "w_l", "base.w_r": "w_r"} and not matches.channels
+    # two of that name: neither
+    drives, measures, matches = matched([column("w", "rad/s")])
+    assert not drives and not measures and matches.unsure["w"] == ["motor.w", "load.w"]
+
+
+def test_theta_beside_x_and_y_is_a_heading() -> None:
+    _, measures, _ = matched([column("x", "m"), column("y", "m"), column("theta", "rad")])
+    assert measures == {"base.x": "x", "base.y": "y", "base.phi": "theta"}
 
 
 def test_a_measured_speed_drives_nothing_and_a_command_is_no_measurement() -> None:

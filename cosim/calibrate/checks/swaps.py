@@ -60,21 +60,22 @@ def check_channels(
 def _differs(problem: Problem, models: Mapping[str, Vector], a: int, b: int) -> bool:
     """Whether what two columns differ by follows the model with the sign turned round.
 
-    What is common to both (the currents of two wheels that carry one base) hides an exchange.
+    What is common to both (the currents of two wheels that carry one base) hides an exchange. All
+    runs together decide: a place that begins at another heading turns x - y round in one of them.
     """
-    signs = []
+    pairs = []
     for run in problem.runs:
         measured = run.data[:, a] - run.data[:, b]
         simulated = models[run.name][:, a] - models[run.name][:, b]
         good = np.isfinite(measured) & np.isfinite(simulated)
         measured, simulated = measured[good], simulated[good]
-        if measured.size < 2 or np.std(simulated) < 5.0 * problem.channels[a].sigma:
-            continue
-        if np.std(measured) > 0.0:
-            correlation = float(np.corrcoef(measured, simulated)[0, 1])
-            if abs(correlation) > FOLLOWS:
-                signs.append(correlation)
-    return sum(c < 0.0 for c in signs) > 0.5 * max(len(signs), 1)
+        if measured.size >= 2 and np.std(simulated) >= 5.0 * problem.channels[a].sigma:
+            pairs.append((measured - np.mean(measured), simulated - np.mean(simulated)))
+    if not pairs:
+        return False
+    measured, simulated = (np.concatenate(one) for one in zip(*pairs, strict=True))
+    size = np.sqrt((measured @ measured) * (simulated @ simulated))
+    return bool(measured @ simulated < -FOLLOWS * size)
 
 
 def check_runs(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Finding]:
