@@ -107,8 +107,8 @@ def prepared(log: Log, table: Mapping[str, Any], path: Path) -> Log:
     if entries or main != "time" or main in log.origins or not 0.0 <= clock[0] < LATEST:
         clock = clock - clock[0]
     columns["time"] = clock
-    if clock.size > 1:
-        raw = time[part]
+    raw = time[part]
+    if raw[-1] != raw[0]:  # else it is one sample, or a clock that stands still, which is refused
         rate = (clock[-1] - clock[0]) / (raw[-1] - raw[0])
         own = {one: (clock[0] + rate * (t - raw[0]), v) for one, (t, v) in own.items()}
     return replace(log, columns=columns, units=units, noise=noise, own=own)

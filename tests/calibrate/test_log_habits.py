@@ -248,6 +248,8 @@ def test_times_that_go_back_or_stand_still(tmp_path: Path) -> None:
     rows = written().splitlines()
     with pytest.raises(ScenarioError, match=r"stands still after row 5"):
         read(tmp_path, "\n".join([*rows[:6], rows[5], *rows[6:]]))
+    with pytest.raises(ScenarioError, match=r"stands still after row 1, and so in 299 places"):
+        read(tmp_path, written("time,tau,w", ",", np.full(TIMES.size, 0.5), TORQUE, SPEED))
 
 
 @pytest.mark.parametrize("jump", [0.8, 1.7e9])
