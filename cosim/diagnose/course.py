@@ -96,7 +96,9 @@ class Course:
     def _located(self, stage: Round) -> None:
         """What the first round tells besides: power, and where what is missing enters."""
         result, search = self.result, self.search
-        result.power = power(stage, search.fitting)
+        bench = search.bench(self.base, search.fitting)
+        result.power = power(stage, search.fitting, bench)
+        search.evaluations += bench.evaluations
         result.warnings += [stage.unasked] if stage.failed else []
         if stage.winner is not None or self._slow(self.base):
             search.say("where does it enter?")

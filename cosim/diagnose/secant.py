@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
@@ -110,7 +111,7 @@ class Bench:
             raise CosimError(f"{problem.name}: with {values} the simulation runs away")
         return found
 
-    def _spread(
+    def spread(
         self, function: Callable[[Item], list[Trials]], items: Iterable[Item]
     ) -> list[Trials]:
         """Apply a function to batches of trials in threads, and free the sessions that it used."""
@@ -153,7 +154,7 @@ class Bench:
                         self._varied([one], {})
             return trials
 
-        return self._spread(simulated, batches(candidates, self.problem))
+        return self.spread(simulated, batches(candidates, self.problem))
 
     def _alone(self, trials: Trials) -> None:
         while trials.best is None and trials.going:
@@ -297,7 +298,7 @@ class Bench:
                     self.more(trials)
             return group
 
-        self._spread(pursued, by_problem(begun))
+        self.spread(pursued, by_problem(begun))
         self.failed = {t.probe.candidate.label: t.error for t in begun if t.best is None}
         return [t.best for t in begun if t.best is not None]
 
@@ -330,16 +331,22 @@ class Bench:
             )
             for item in found
         ]  # fmt: skip
-        self._spread(simulated, by_problem(again))
+        self.spread(simulated, by_problem(again))
         return self.followed(again)
+
+    def again(self, item: Signature, value: float) -> Signature:
+        """An effect as it was simulated, at another strength."""
+        trials = Trials(item.probe, value, second=item.second, fixed=item.fixed)
+        values = item.probe.values(value, item.second, item.fixed)
+        change = self.at(item.probe.problem, values) - self.model
+        return replace(self._measure(trials, value, change), twins=item.twins)
 
     def more(self, trials: Trials) -> None:
         """One more simulation."""
         strength, tried = trials.probe.strength, trials.tried
         value = trials.clipped(trials.value)
-        least = FLOOR * strength.span if strength.unit == "s" else 0.0
         near = NEAR if trials.between() is None else BETWEEN
-        if abs(value) <= least or any(abs(value / old - 1.0) < near for old in tried):
+        if abs(value) <= floor(strength) or any(abs(value / old - 1.0) < near for old in tried):
             trials.going = False
             return
         tried.append(value)
@@ -416,6 +423,11 @@ class Bench:
             trials.probe, value, change.astype(np.float32), rest.astype(np.float32), result,
             absorbed, trials.second, dict(trials.fixed),
         )  # fmt: skip
+
+
+def floor(strength: Parameter) -> float:
+    """Strength up to which an effect is as good as none, see `FLOOR`."""
+    return FLOOR * strength.span if strength.unit == "s" else 0.0
 
 
 def patience(base: Simulator) -> dict[str, float]:

@@ -27,6 +27,7 @@ class Trials:
         going: whether another may be tried.
         rough: whether `best` was measured together with other elements of a vector.
         known: whether its second parameter is known well enough to begin with.
+        weak: strength that was seen not to show, where a greater one does.
         error: of the last one that could not be simulated.
     """
 
@@ -42,6 +43,7 @@ class Trials:
     going: bool = True
     rough: bool = False
     known: bool = False
+    weak: float = 0.0
     error: str = ""
 
     def between(self) -> float | None:

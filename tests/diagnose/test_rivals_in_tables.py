@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,3 +94,26 @@ def test_what_is_told_to_be_detectable_is_detected_as_often_as_told(tmp_path: Pa
                 chance = np.exp(-0.5 * got.z**2) if item.probe.mix else got.p_value
                 seen.append(chance * tests < LEVEL)
     assert np.mean(seen) == pytest.approx(POWER, abs=0.1)
+
+
+def test_what_is_told_to_be_detectable_was_simulated_about_as_weak(tmp_path: Path) -> None:
+    """Friction that holds the disc is as good as inertia, and of much viscosity curvature is left.
+
+    The weak friction shows all the same, and weak viscosity is the declared one.
+    """
+    friction, viscosity = "coulomb at load.flange", "viscous at load.flange"
+    with built.rig(tmp_path / "none", lambda w, theta, t: 0.0, seconds=4.0) as rig:
+        rig.search.known = [rig.candidate(e) for e in ("coulomb", "viscous")]
+        found, stack = rig.search.scored(rig.base), rig.search.fitting
+        strong = {s.candidate.label: s.value for s in found.signatures}
+        told = power(found, stack, rig.search.bench(rig.base, stack))
+    size = told[friction]["smallest_detectable"]
+    assert size < 0.001 * strong[friction]
+    assert "extrapolated_from" not in told[friction]
+    assert told[viscosity]["smallest_detectable"] is None
+    assert "absorbs" in told[viscosity]["reason"]
+    with built.rig(tmp_path / "some", lambda w, theta, t: 2.0 * size * math.tanh(w / 0.002),
+                   seconds=4.0) as rig:  # fmt: skip
+        rig.search.known = [rig.candidate(e) for e in ("coulomb", "viscous")]
+        corrected = rig.search.scored(rig.base).corrected
+    assert corrected[friction] < LEVEL < corrected[viscosity]
