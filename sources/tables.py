@@ -98,7 +98,7 @@ def _symbols(variables: Iterable[Declared]) -> list[tuple[str, ...]]:
         if role == "parameter" and quantity.variability == "fixed":
             kind += ", fixed"
         unit = ", ".join(dict.fromkeys(v.quantity.unit for v in group))
-        start = "" if role in ("input", "output") else _values(v.start for v in group)
+        start = "" if role == "output" else _values(v.start for v in group)
         rows.append((f"`{name}{size}`", unit, kind, start, _bounds(quantity), quantity.text))
     order = {"input": 0, "output": 1, "parameter": 2, "state": 3, "sampled": 4}
     return sorted(rows, key=lambda row: order[row[2].split(",")[0]])
