@@ -453,9 +453,10 @@ def _read_meta(path: Path, content: bytes) -> dict[str, Any]:
         raise ScenarioError(
             f"{path}: what it says about itself is not JSON ({error}); record it again"
         ) from error
-    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str, "notes": list}
+    kinds = {"units": dict, "provenance": dict, "bond_energy_J": dict, "error": str, "notes": list,
+             "relative": list}  # fmt: skip
     for key, kind in kinds.items():
-        missing: Any = [] if key == "notes" else None  # older recordings have none
+        missing: Any = [] if kind is list else None  # older recordings have none
         if not isinstance(meta, dict) or not isinstance(meta.get(key, missing), kind):
             raise ScenarioError(f"{path}: what it says about itself lacks {key}; record it again")
     energies = [meta["bond_energy_J"], meta.get("bond_turnover_J", {})]

@@ -150,9 +150,8 @@ def adjusted(
     Options of the scenario hold for its own algorithm only; a shorter run drops the checks that it
     does not reach.
     """
-    for what, value in (("step", step), ("record period", record_period)):
-        if value is not None and not 0.0 < value < math.inf:
-            raise ValueRangeError(f"{item.name}: {what} {value:g} s: must be a positive number")
+    if record_period is not None and not math.isfinite(record_period):
+        raise ValueRangeError(f"{item.name}: record period {record_period:g} s: must be finite")
     need_texts("signals to record", record, 'record=["motor.i"]')
     if duration is not None and duration < item.duration:
         item = shortened(item, duration)
