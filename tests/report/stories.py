@@ -55,6 +55,7 @@ def structured(*channels: str) -> list[dict[str, Any]]:
     return [
         {"channel": item.name, "rms_over_noise": 1.0, "lasting_over_noise": 1.0,
          "slow_over_noise": 1.0, "correlation": 0.0, "effective_samples": 100.0, "p_value": 0.5,
+         "p_fast": 0.5,
          "structured": item.name in channels}
         for item in CHANNELS
     ]  # fmt: skip
@@ -65,8 +66,8 @@ def table(verdict: str) -> dict[str, Any]:
     found = verdict in ("effect_found", "confounded")
     after = 1.0 if found or verdict == "nothing_missing" else 3.21
     before = after if not found else 3.21
-    value = {"value": 0.35802, "ci95": [0.35695, 0.35909], "identifiable": True}
-    unknown = {"value": 0.81297, "ci95": [0.78, 0.86], "identifiable": False}
+    value = {"value": 0.35802, "ci95": [0.35695, 0.35909], "identifiable": True, "at_bound": False}
+    unknown = {"value": 0.81297, "ci95": [0.78, 0.86], "identifiable": False, "at_bound": False}
     content: dict[str, Any] = {
         "dataset": "MB-99", "system": "motor_bench", "verdict": verdict, "reason": "said elsewhere",
         "warnings": [], "findings": [], "effects": [copy.deepcopy(EFFECT)] if found else [],
@@ -100,6 +101,7 @@ def table(verdict: str) -> dict[str, Any]:
             "eta": {"unit": "-", "before": unknown, "after": unknown},
         },
         "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {}, "small_laws": [],
+        "bounds_opened": {},
         "structure": {
             f"{which} {purpose}": structured(*([] if which == "after" and after < 1.1
                                                else ["speed"]))
