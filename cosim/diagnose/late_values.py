@@ -18,7 +18,7 @@ from .fitter import Fitter
 from .models import Fitted
 from .secant import patience
 from .unstable import ended
-from .whiteness import whiteness_tests
+from .whiteness import structured, whiteness_tests
 
 Vector = NDArray[np.float64]
 RELEASES, PAYS = 4, 0.01
@@ -81,10 +81,12 @@ class LateValueFitter(Fitter):
         """The model with late values of unused runs as its own parameters want them.
 
         Turns end when fitted runs are at the noise, or want no other values; those of unused runs
-        are then as the model before wanted them.
+        are then as the model before wanted them. A start value that is off by little shows in slow
+        parts first.
         """
         left = whiteness_tests(self.check_data - winner.check, self.checking)
-        if not self.unused or self.lacking(winner) or not any(t.structured for t in left):
+        more = any(t.structured or structured(t.slow, len(left) * t.p_value) for t in left)
+        if not self.unused or self.lacking(winner) or not more:
             return winner
         theta = winner.estimate.theta
         try:
