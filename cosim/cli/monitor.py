@@ -37,8 +37,11 @@ def monitor_command(
         typer.Option(help="A dataset.toml, or a name of `cosim scenarios` [by the rig]."),
     ] = None,
     baseline: Annotated[
-        int, typer.Option(help="First logs that parameters and control limits are taken from.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            help="First logs that parameters and limits are taken from [10, or half of all]."
+        ),
+    ] = None,
     rate: Annotated[
         float, typer.Option(help="Probability of any alarm on a series in which nothing changes.")
     ] = 0.001,

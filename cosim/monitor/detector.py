@@ -102,9 +102,13 @@ class Detector:
 
     # -- names and dates ---------------------------------------------------------------------------
 
-    def gains(self, moments: Moments, root: Vector) -> tuple[dict[int, Vector], Vector, Vector]:
-        """Per direction the gain of each profile [nats]; weighted sums."""
+    def gains(
+        self, changes: Sequence[Change], root: Vector
+    ) -> tuple[dict[int, Vector], Vector, Vector]:
+        """Per direction the gain of each profile beside changes [nats]; weighted sums."""
+        moments = self._without(changes)
         z, weight = moments.weighted(root)
+        own = moments.own()
         projected = self.centred @ z
         found = {}
         for index, direction in enumerate(self.patterns.directions):
@@ -120,7 +124,34 @@ class Detector:
             )
             solved = np.linalg.solve(h, u[:, :, None])[:, :, 0]
             found[index] = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
+            if direction.least is not None:
+                there = self._there(direction, changes, solved[:, 0], *own)
+                found[index][there < direction.least] = 0.0
         return found, z, weight
+
+    def _there(
+        self, direction: Direction, changes: Sequence[Change], amounts: Vector, values: Vector,
+        deviations: Vector,
+    ) -> Vector:  # fmt: skip
+        """By profile, how small the value of a column becomes with an amount of it, at most.
+
+        What the logs that the profile leaves alone say of it counts, with twice its deviation.
+        """
+        (column,) = direction.columns
+        good = np.isfinite(values[:, column])
+        series = np.where(good, values[:, column], 0.0)
+        weight = np.where(good, weights(values[:, column], deviations[:, column]), 0.0)
+        calm = (self.matrix == 0.0) * weight
+        total = np.maximum(calm.sum(axis=1), 1e-300)
+        most = calm @ series / total + 2.0 / np.sqrt(total)
+        others = sum(
+            (c.amounts[0] * c.profile.values for c in changes
+             if c.direction is not None and c.direction.name == direction.name),
+            np.zeros(self.days.size),
+        )  # fmt: skip
+        with_it = others + amounts[:, None] * self.matrix
+        touched = np.where(self.matrix != 0.0, with_it, np.inf)
+        return np.asarray(most + touched.min(axis=1))
 
     def best(
         self, changes: Sequence[Change], root: Vector, *, further: bool = False, plain: bool = False
@@ -133,8 +164,7 @@ class Detector:
             further: it is one more, and no small one.
             plain: only what has one column: two fit the sum of two changes too well.
         """
-        moments = self._without(changes)
-        gains, z, weight = self.gains(moments, root)
+        gains, z, weight = self.gains(changes, root)
         taken = {(c.direction.name, c.profile.kind) for c in changes if c.direction}
         best: list[tuple[float, int, int]] = []
         for index, gain in gains.items():
@@ -172,7 +202,7 @@ class Detector:
         A large change of a parameter does more than many small ones, which would count for another
         name.
         """
-        gains, z, weight = self.gains(self._without(changes), root)
+        gains, z, weight = self.gains(changes, root)
         known = {change.direction.name for change in changes if change.direction}
         order = sorted(
             (

@@ -39,7 +39,7 @@ def monitor(
     series: Series | Path | str,
     say: Callable[[str], None] = lambda text: None,
     *,
-    baseline: int = BASELINE,
+    baseline: int | None = None,
     rate: float = RATE,
     workers: int | None = None,
     without: Iterable[str] = (),
@@ -53,7 +53,8 @@ def monitor(
     Args:
         series: the logs, or their folder.
         say: told what is done.
-        baseline: number of first logs that parameters and control limits are taken from.
+        baseline: number of first logs that parameters and control limits are taken from; ten, or
+            half of them if there are fewer than twenty, unless given.
         rate: probability of any alarm on a series in which nothing changes.
         workers: threads, one per core if not given.
         without: effects that are left out of the catalogue.
@@ -70,9 +71,10 @@ def monitor(
     if not 0.0 < rate < 1.0:
         raise InputError(f"the rate of false alarms is {rate:g}, not between 0 and 1")
     most = count - LEAST // 2
-    if not 2 <= baseline <= max(most, BASELINE):
+    if baseline is None:
+        baseline = min(BASELINE, count // 2)  # what changes is in the later half rather
+    if not 2 <= baseline <= most:
         raise InputError(f"a baseline of {baseline} of {count} logs: take 2 to {most}")
-    baseline = min(baseline, most)
     if known is None:
         with threadpool_limits(1, user_api="blas"):  # its threads wait at the cost of simulations
             known = baseline_patterns(

@@ -84,6 +84,14 @@ class Direction:
         return self.columns[0] if self.own is None else self.own
 
     @property
+    def least(self) -> float | None:
+        """Least value of an effect's strength, in scales: less of it than none there is not."""
+        if self.probe is None or len(self.columns) > 1:
+            return None
+        least = self.probe.strength.minimum / self.scale
+        return least if np.isfinite(least) else None
+
+    @property
     def declared(self) -> bool:
         """Whether it is a parameter of the declared system."""
         return self.kind == "parameter"
@@ -166,8 +174,8 @@ class Patterns:
                 if size == 0.0:
                     return False
                 changed = self._values(self.simulator, theta)
-            elif len(direction.columns) > 1 or amplitude[0] * direction.scale < (
-                direction.probe.strength.minimum
+            elif len(direction.columns) > 1 or (
+                direction.least is not None and amplitude[0] < direction.least
             ):
                 return False  # less of an effect than the declared system has
             else:

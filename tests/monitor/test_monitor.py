@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
@@ -99,6 +100,36 @@ def test_the_same_law_is_named_if_the_catalogue_has_it(tmp_path: Path) -> None:
     (change,) = found.changes
     assert change.direction is not None and change.profile.first == JUMP
     assert "coulomb at load.flange" in {change.direction.name, *change.rivals}
+
+
+@pytest.fixture(scope="module")
+def dry_only() -> Callable[[Path], Monitored]:
+    """Monitored with declared parameters, sensors and plain dry friction."""
+
+    def look(folder: Path) -> Monitored:
+        series = read_series(folder)
+        others = {c.effect for c in candidates(series.problem)} - {"coulomb"}
+        return monitor(series, without=others)
+
+    return look
+
+
+@pytest.mark.slow
+def test_less_of_a_law_than_none_is_no_name(
+    tmp_path: Path, dry_only: Callable[[Path], Monitored]
+) -> None:
+    found = dry_only(write(tmp_path / "disc", dry=step(JUMP, -0.08)))
+    assert found.verdict == "unexplained"
+    assert not any("coulomb" in c.direction.name for c in found.changes if c.direction)
+
+
+@pytest.mark.slow
+def test_a_law_that_was_there_before_may_go(
+    tmp_path: Path, dry_only: Callable[[Path], Monitored]
+) -> None:
+    found = dry_only(write(tmp_path / "disc", dry=lambda log: 0.08 * (log < NEW)))
+    names = {c.direction.name: float(c.amounts[0]) for c in found.changes if c.direction}
+    assert names["coulomb at load.flange"] < 0.0
 
 
 def test_the_rate_of_false_alarms_is_at_most_the_stated_one() -> None:
