@@ -100,6 +100,11 @@ class Verdict:
     beyond: tuple[Left, ...] = ()
 
     @property
+    def white(self) -> bool:
+        """Whether more than noise is left, and all of it is white."""
+        return bool(self.left) and all(x.white for x in self.left)
+
+    @property
     def reason(self) -> str:
         """Two or three sentences."""
         if self.kind == "bad_data":
@@ -107,6 +112,11 @@ class Verdict:
         names = " and ".join(law.label for law in self.laws)
         explain = "explains" if len(self.laws) == 1 else "explain"
         tail = f" More than noise is left in {over(self.left)}." if self.left else ""
+        if self.white:
+            tail += (
+                " What is left is white, which no force makes: the noise is larger than stated "
+                "there, or an error of the sensor differs from sample to sample."
+            )
         if self.kind == "effect_found":
             text = (
                 f"{names} {explain} {percent(self.explained)} of what the declared model leaves "
@@ -207,6 +217,7 @@ class Verdict:
                 )
             ],
             "left": list(dict.fromkeys(x.channel for x in self.left)),
+            "left_white": self.white,
             "hints": [hint.to_dict() for hint in self.hints],
             "stopped": self.stopped,
             "bounds_opened": {

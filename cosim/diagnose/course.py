@@ -16,11 +16,11 @@ from .grey_box.single import ALL
 from .localise import everywhere, localise
 from .models import Fitted, is_open
 from .power import power
-from .result import PURPOSES, Diagnosis
+from .result import Diagnosis
 from .rivals import reconsidered
 from .rounds import Round
 from .search import ROUNDS, Search
-from .second_look import around_nominal, tests_of
+from .second_look import around_nominal, leaves_law
 from .together import ahead, together
 from .unstable import ends
 from .verdict import HALF
@@ -106,8 +106,8 @@ class Course:
             result.located = localise(search, self.base, ranked)
 
     def _slow(self, model: Fitted) -> bool:
-        """Whether a model leaves slow parts that noise does not have."""
-        return any(s.structured for p in PURPOSES for s in tests_of(self.search, model, p))
+        """Whether a model leaves what noise of any size is not."""
+        return leaves_law(self.search, model)
 
     def _taken(self, stage: Round) -> None:
         """Go on with what a round has found."""

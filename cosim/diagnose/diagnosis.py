@@ -230,7 +230,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         with task.budget.lifted():  # what was found stands, and is told whole
             _completed(result, search, current, wide)
         assert result.after is not None
-        enough = result.answer.bounds and not result.answer.beyond
+        enough = result.answer.white or (result.answer.bounds and not result.answer.beyond)
         if asked or (task.law and result.verdict == "unexplained" and not enough):
             if asked is None and not search.raw.late:
                 asked_everywhere(result)

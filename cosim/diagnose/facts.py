@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints
 
-from .whiteness import structured
+from .whiteness import structured, white
 
 
 @dataclass(frozen=True)
@@ -146,6 +146,7 @@ class Left:
         p_value: that noise alone has such slow parts.
         slow: these parts over what noise has, likewise (`whiteness.WhitenessTest`).
         p_fast: that noise alone has neighbours so alike.
+        p_white: that white noise of any size has such slow parts; 0 if not asked.
     """
 
     channel: str
@@ -155,6 +156,12 @@ class Left:
     p_value: float
     slow: float = 1.0
     p_fast: float = 1.0
+    p_white: float = 0.0
+
+    @property
+    def white(self) -> bool:
+        """Noise that is only larger than stated: see `whiteness.white`."""
+        return self.structured and white(self.p_fast, self.p_white)
 
     @property
     def structured(self) -> bool:

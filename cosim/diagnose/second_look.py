@@ -19,16 +19,25 @@ def tests_of(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest
     return whiteness_tests(search.check_data - fitted.check, search.checking)
 
 
+def leaves_law(search: Search, fitted: Fitted) -> bool:
+    """Whether a model leaves more than noise that is not white: white noise has no law.
+
+    One channel that is not is enough, and then the others may be of the same law.
+    """
+    left = [t for p in PURPOSES for t in tests_of(search, fitted, p) if t.structured]
+    return not all(t.white for t in left)
+
+
 def leaves_more(search: Search, fitted: Fitted) -> bool:
-    """Whether a model leaves more than noise in fitted or unused runs; of a set, also slow parts.
+    """Whether a model leaves what noise of any size is not; of a set, also in slow parts.
 
     What a wrong law leaves in unused runs may be less than sheets tell noise apart by, and last for
     seconds all the same.
     """
     left = [t for p in PURPOSES for t in tests_of(search, fitted, p)]
     count = len(left)  # one of so many tests (Bonferroni)
-    slow = any(structured(t.slow, count * t.p_value) for t in left)
-    return any(t.structured for t in left) or (slow and bool(fitted.effects))
+    slow = any(structured(t.slow, count * t.p_value) and not t.white for t in left)
+    return leaves_law(search, fitted) or (slow and bool(fitted.effects))
 
 
 def around_nominal(search: Search, current: Fitted) -> Round | None:

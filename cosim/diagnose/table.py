@@ -124,7 +124,7 @@ def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
         parts.append((judge.purpose, judge.checking, judge.check_data - fitted.check))
     for purpose, stack, residual in parts:
         found += [
-            Left(t.channel, purpose, t.rms, t.lasting, t.p_value, t.slow, t.p_fast)
+            Left(t.channel, purpose, t.rms, t.lasting, t.p_value, t.slow, t.p_fast, t.p_white)
             for t in whiteness_tests(residual, stack)
         ]
     return tuple(found)

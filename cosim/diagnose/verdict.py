@@ -185,16 +185,16 @@ def above(model: Model) -> tuple[Left, ...]:
 def stands(table: Table, place: int) -> bool:
     """Whether what a set leaves is noise, or nothing that another law could explain.
 
-    That is: its RMS is a tenth of what was explained, and no more in unused runs than in fitted
-    ones; no free force at a port would have left less of the declared model's rest, and none
-    explains half of its own.
+    That is: it is white, of any size; or its RMS is a tenth of what was explained, and no more
+    in unused runs than in fitted ones, and no free force at a port would have left less of the
+    declared model's rest, nor explains half of its own.
 
     Args:
         table: of all models.
         place: of the set in it.
     """
     model, declared = table.models[place], table.models[0]
-    if not above(model):
+    if all(x.white for x in above(model)):
         return True
     if not model.forces or _most(model.forces).explained >= HALF:
         return False

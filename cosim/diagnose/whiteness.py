@@ -7,7 +7,9 @@ s_w over the n_w samples of a window, fast ones the products of samples up to `N
 
 with N_k pairs and the mean square v of the residual itself: chi-square with as many degrees of
 freedom as there are windows and distances, of white noise of the stated size and of any size. The
-second sees a hum of whole periods per window, of which the first sees nothing.
+second sees a hum of whole periods per window, of which the first sees nothing. The first over v is
+chi-square of white noise of any size, too: where neither says more than size, no law does, since
+forces last and vibrate.
 
 Source: Box and Pierce, Distribution of residual autocorrelations in autoregressive-integrated
 moving average time series models, 1970.
@@ -32,6 +34,8 @@ BURST = 0.01
 decide when something turns over (`Problem.late`): for some tenths of a second a model that is right
 is off by tens of sigma there. What lasts no longer in all runs together is no ground to look for a
 cause. Elsewhere a right model has no such moments, and a wrong one may be wrong in few."""
+RARE = 0.01
+"""Probability below which it was not noise."""
 CALIBRATED = 1.1
 """RMS over noise up to which a model counts as calibrated: the sheets give noise to a few percent,
 and thousands of samples make any smaller excess significant without making it worth a cause."""
@@ -56,6 +60,7 @@ class WhitenessTest:
         freedom: effective number of independent residuals.
         p_value: that noise alone has such slow parts, the worst windows left out.
         p_fast: that white noise of any size has neighbours so alike, likewise.
+        p_white: that white noise of any size has such slow parts, likewise.
     """
 
     channel: str
@@ -66,6 +71,12 @@ class WhitenessTest:
     freedom: float
     p_value: float
     p_fast: float
+    p_white: float
+
+    @property
+    def white(self) -> bool:
+        """Whether samples do not know of each other, however large they are."""
+        return white(self.p_fast, self.p_white)
 
     @property
     def structured(self) -> bool:
@@ -78,7 +89,8 @@ class WhitenessTest:
             "channel": self.channel, "rms_over_noise": self.rms,
             "lasting_over_noise": self.lasting, "slow_over_noise": self.slow,
             "correlation": self.correlation, "effective_samples": self.freedom,
-            "p_value": self.p_value, "p_fast": self.p_fast, "structured": self.structured,
+            "p_value": self.p_value, "p_fast": self.p_fast, "p_white": self.p_white,
+            "structured": self.structured,
         }  # fmt: skip
 
 
@@ -89,7 +101,16 @@ def structured(lasting: float, *p_values: float) -> bool:
         lasting: RMS over noise without the worst windows.
         p_values: that noise alone has such slow parts, or such fast ones.
     """
-    return min(p_values) < 0.01 and lasting > CALIBRATED
+    return min(p_values) < RARE and lasting > CALIBRATED
+
+
+def white(*p_values: float) -> bool:
+    """Whether a residual is white noise, of any size.
+
+    Args:
+        p_values: that white noise of any size has such slow parts, and such fast ones.
+    """
+    return min(p_values) >= RARE
 
 
 def slowly(slow: float, p_value: float, tests: int) -> bool:
@@ -100,7 +121,7 @@ def slowly(slow: float, p_value: float, tests: int) -> bool:
         p_value: that noise alone has such slow parts.
         tests: as many were made, of which one is the worst (Bonferroni).
     """
-    return slow > UNNAMED and tests * p_value < 0.01
+    return slow > UNNAMED and tests * p_value < RARE
 
 
 def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]:
@@ -133,6 +154,7 @@ def whiteness_tests(residual: Vector, stack: SampleStack) -> list[WhitenessTest]
                 channel.name, float(np.sqrt(variance)), float(np.sqrt(lasting)),
                 float(np.sqrt(slow)), float(correlation), freedom,
                 float(chdtrc(kept.size, np.sum(sums[kept]))), _fast(one, numbers, lasting),
+                float(chdtrc(kept.size, np.sum(sums[kept]) / max(lasting, 1e-300))),
             )
         )  # fmt: skip
     return found

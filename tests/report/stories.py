@@ -55,7 +55,7 @@ def structured(*channels: str) -> list[dict[str, Any]]:
     return [
         {"channel": item.name, "rms_over_noise": 1.0, "lasting_over_noise": 1.0,
          "slow_over_noise": 1.0, "correlation": 0.0, "effective_samples": 100.0, "p_value": 0.5,
-         "p_fast": 0.5,
+         "p_fast": 0.5, "p_white": 0.5,
          "structured": item.name in channels}
         for item in CHANNELS
     ]  # fmt: skip
@@ -101,7 +101,7 @@ def table(verdict: str) -> dict[str, Any]:
             "eta": {"unit": "-", "before": unknown, "after": unknown},
         },
         "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {}, "small_laws": [],
-        "bounds_opened": {},
+        "bounds_opened": {}, "left_white": False,
         "structure": {
             f"{which} {purpose}": structured(*([] if which == "after" and after < 1.1
                                                else ["speed"]))
