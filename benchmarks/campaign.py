@@ -40,13 +40,13 @@ ONE = "--clean {} --repeats 1"
 SOME = "--clean 0 --repeats 0 --pairs {} --triples {}"
 WITHHELD = "--clean 0 --repeats 1 --withheld"
 SERIES = (
-    *(Series("motor", "one", 140004 + i, ONE.format(7)) for i in range(5)),
+    *(Series("motor", "one", 140005 + i, ONE.format(7)) for i in range(5)),
     *(Series("motor", "several", 140102 + i, SOME.format(10, 5)) for i in range(4)),
     *(Series("motor", "withheld", 140201 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141002 + i, ONE.format(6)) for i in range(2)),
     *(Series("crawler", "several", 141101 + i, SOME.format(10, 4)) for i in range(2)),
     Series("crawler", "withheld", 141201, WITHHELD),
-    Series("omni", "one", 142002, ONE.format(6)),
+    Series("omni", "one", 142003, ONE.format(6)),
     Series("omni", "several", 142101, SOME.format(8, 2)),
     Series("arm", "one", 143001, ONE.format(6)),
     Series("arm", "several", 143101, SOME.format(8, 0)),

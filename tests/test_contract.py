@@ -51,7 +51,7 @@ def kind(request: pytest.FixtureRequest) -> Iterator[str]:
 @pytest.mark.parametrize("name", NAMES)
 def test_check_finds_no_problem(name: str, kind: str) -> None:
     assert check(fmu(name, kind)) == []
-    if kind == "native":
+    if kind == "native" and name in PLAIN:
         assert check(fmu(name, kind, 3)) == []
 
 
@@ -62,8 +62,9 @@ def test_native_is_python(name: str) -> None:
         np.testing.assert_array_equal(run(native), run(python))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLAIN)
 def test_fmi_3_is_fmi_2(name: str) -> None:
+    # an effect changes the equations, which both versions include as they are
     with Slave(fmu(name)) as two, Slave(fmu(name, fmi=3)) as three:
         np.testing.assert_array_equal(run(two), run(three))
 
