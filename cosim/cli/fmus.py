@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import time
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -146,15 +146,22 @@ def _compiled(
         names = _asked(variants)
         for name in names if variants else ():  # bad names are found before anything is built
             sources("variant").build_model(name)
-    done = itertools.count(1)
-    with naming_errors(), Display() as display:
+    done: list[str] = []
+    begun, where = time.monotonic(), " for all platforms" if platform is Platform.all else ""
+
+    def look() -> str:  # the first one for all platforms brings their C libraries: minutes
+        after = 20 * int((time.monotonic() - begun) / 20.0)
+        told = f" after {after} s" if after else ""
+        return f"building: {len(done)} of {len(names)} FMUs{where}{told}"
+
+    with naming_errors(), Display() as display, display.watch("building", look):
         built = build_many(
             names,
             out=folder,
             fmi=fmi,
             kind=kind.value,
             platform=platform.value,
-            progress=lambda name, path: display.building(name, next(done), len(names)),
+            progress=lambda name, path: done.append(name),
         )
     return dict(zip(names, built, strict=True))
 
