@@ -5,9 +5,9 @@
 
 The series of `SERIES` one after the other, as `benchmarks.selftest` runs them; a series of one rig
 is short, so a campaign that ends early holds a bit of everything. A set that is there is not
-diagnosed again, so the same command goes on, and one command for each rig may run beside others;
-with another state of the program or of the rig's plant (the files of `STATE`) a series is refused,
-since figures of two states are figures of none.
+diagnosed again, so the same command goes on, and one command for each rig and kind may run beside
+others; with another state of the program or of the rig's plant (the files of `STATE`) a series is
+refused, since figures of two states are figures of none.
 Prints, and writes as `campaign.md`, a table of outcomes for each rig and kind of series:
 
     one      one effect or none
@@ -102,10 +102,14 @@ def main() -> None:
     """Run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rig", choices=sorted({s.rig for s in SERIES}), help="of one rig alone")
+    parser.add_argument("--kind", choices=sorted({s.kind for s in SERIES}), help="of this alone")
     parser.add_argument("--workers", default="2")
     parser.add_argument("--out", type=Path, default=Path("out/campaign"))
     arguments = parser.parse_args()
-    chosen = [s for s in SERIES if arguments.rig in (None, s.rig)]
+    chosen = [
+        s for s in SERIES
+        if arguments.rig in (None, s.rig) and arguments.kind in (None, s.kind)
+    ]  # fmt: skip
     rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for series in turns(chosen):
         words = ["--rig", series.rig, "--wide", "--seed", str(series.seed), *series.sizes.split()]
@@ -116,7 +120,7 @@ def main() -> None:
     text = "\n".join(
         f"## {rig}, {kind}\n\n{selftest.summary(found)}" for (rig, kind), found in rows.items()
     )
-    name = "campaign.md" if arguments.rig is None else f"campaign_{arguments.rig}.md"
+    name = "_".join(filter(None, ("campaign", arguments.rig, arguments.kind))) + ".md"
     with atomic(arguments.out / name) as place:
         place.write_text(text, encoding="utf-8")
     print(text)
