@@ -62,7 +62,6 @@ class Found:
     Attributes:
         changes: by date.
         tests: how many were made.
-        limit: probability below which one alarms.
         root: of the scatter of declared parameters between logs.
         own: values and deviations of each column by log, all changes but its own taken off.
         left: mean square over the noise by log and channel, declared parameters fitted per log.
@@ -71,7 +70,6 @@ class Found:
 
     changes: list[Change]
     tests: int
-    limit: float
     root: Vector
     own: tuple[Vector, Vector]
     left: Vector

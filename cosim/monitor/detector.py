@@ -21,7 +21,7 @@ from ..diagnose.models import GATE
 from .change import Change, Found
 from .evidence import Evidence, Moments
 from .patterns import Direction
-from .profiles import Profile, chances, constants, profiles, regress, weights
+from .profiles import Profile, chances, constants, profiles, regress, shares, weights
 
 Vector = NDArray[np.float64]
 MOST = 6
@@ -61,11 +61,17 @@ class Detector:
         keys = [tuple(self.patterns.keys[name] for name in log.runs) for log in logs]
         self.known = constants(keys)
         self.centred = self._centred(self.matrix)
+        self._squared = self.centred**2
         self.moments = evidence.moments()
         own = self.moments.own()[0]
         self.watched = [k for k in range(self.patterns.width) if np.isfinite(own[:, k]).sum() > 3]
-        self.tests = (len(self.watched) + evidence.channels) * len(self.shapes)
-        self.limit = rate / self.tests
+        quantities = len(self.watched) + evidence.channels
+        self.tests = quantities * len(self.shapes)
+        self.among = quantities * shares(self.shapes)
+        """By profile, the number of tests that its share of the rate is divided by."""
+        self.rate = rate
+        self._chosen = np.log(self.among / self.among.min())
+        """What the best of many profiles gains more by chance than the best of few [nats]."""
         self._changes: list[Change] = []
 
     def _centred(self, shapes: Vector) -> Vector:
@@ -90,14 +96,14 @@ class Detector:
         return self.moments.without(*self._columns(changes))
 
     def alarm(self, changes: Sequence[Change]) -> float:
-        """Smallest probability over all tests."""
+        """Smallest probability over all tests, corrected for their number."""
         values, deviations = self._without(changes).own()
         known = np.column_stack([self.known, *(c.profile.values for c in changes)])
         least = 1.0
         for column in self.watched:
             series, own = values[:, column], deviations[:, column]
             p = chances(series, own, known, self.matrix)
-            least = min(least, float(p.min()))
+            least = min(least, float(np.min(p * self.among)))
         return least
 
     # -- names and dates ---------------------------------------------------------------------------
@@ -115,7 +121,7 @@ class Detector:
             columns = list(direction.columns)
             u = projected[:, columns]
             block = weight[:, columns][:, :, columns]
-            h = np.einsum("an,nij->aij", self.centred**2, block)
+            h = (self._squared @ block.reshape(len(block), -1)).reshape(-1, *block.shape[1:])
             h = (
                 h
                 + 1e-12
@@ -123,7 +129,8 @@ class Detector:
                 * np.maximum(np.trace(h, axis1=1, axis2=2), 1e-300)[:, None, None]
             )
             solved = np.linalg.solve(h, u[:, :, None])[:, :, 0]
-            found[index] = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
+            gain = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
+            found[index] = gain - self._chosen
             if direction.least is not None:
                 there = self._there(direction, changes, solved[:, 0], *own)
                 found[index][there < direction.least] = 0.0
@@ -166,12 +173,14 @@ class Detector:
         """
         gains, z, weight = self.gains(changes, root)
         taken = {(c.direction.name, c.profile.kind) for c in changes if c.direction}
+        # what the bend of a pattern leaves of a creep looks like a spell
+        bent = {c.direction.name for c in changes if c.profile.kind == "creep" and c.direction}
         best: list[tuple[float, int, int]] = []
         for index, gain in gains.items():
             direction = self.patterns.directions[index]
             allowed = np.array(
-                [(direction.name, shape.kind) not in taken or shape.kind == "outlier"
-                 for shape in self.shapes]
+                [((direction.name, shape.kind) not in taken or shape.kind == "outlier")
+                 and not (direction.name in bent and shape.last) for shape in self.shapes]
             )  # fmt: skip
             if allowed.any() and not (plain and len(direction.columns) > 1):
                 place = int(np.argmax(np.where(allowed, gain, -np.inf)))
@@ -344,13 +353,13 @@ class Detector:
         changes: list[Change] = []
         first = self.moments.own()[0][:, : self.patterns.declared]
         for plain in (True, False):
-            while len(changes) < MOST and (least := self.alarm(changes)) < self.limit:
+            while len(changes) < MOST and (least := self.alarm(changes)) < self.rate:
                 root = self._without(changes).scatter()
                 self.full(changes, root)
                 change = self.best(changes, root, further=True, plain=plain)
                 if change is None or change.gain < GATE * change.spread:
                     break
-                change = replace(change, p=min(least * self.tests, 1.0))
+                change = replace(change, p=least)
                 changes = self.refitted([*changes, change], root)
                 changes = self.sharpened(changes, root)
                 changes = self.weighed(changes, self._without(changes).scatter(), plain=plain)
@@ -372,9 +381,7 @@ class Detector:
         before = left
         if named:
             before = self.evidence.left([], np.zeros((0, self.days.size)), first)
-        return Found(
-            changes, self.tests, self.limit, root, self._own(named), before, self._correlated(named)
-        )
+        return Found(changes, self.tests, root, self._own(named), before, self._correlated(named))
 
     def _needed(self, changes: list[Change]) -> list[Change]:
         """Those that are not small beside the largest one, once all names are right."""
@@ -416,11 +423,12 @@ class Detector:
         for place, channel in enumerate(self.evidence.series.problem.channels):
             series = np.where(np.isfinite(logs[:, place]), logs[:, place], np.nan)
             result = regress(series, np.ones_like(series), self.known, self.matrix)
-            best = int(np.argmin(result.p))
+            p = result.p * self.among
+            best = int(np.argmin(p))
             shape = self.shapes[best]
             whole = float(result.slope[best] * np.max(np.abs(shape.values)))
             least = max(MATERIAL**2, SHARE**2 * float(explained[place]))
-            if not result.p[best] < self.limit or abs(math.expm1(whole)) < least:
+            if not p[best] < self.rate or abs(math.expm1(whole)) < least:
                 continue
             gains = 0.5 * (result.slope / result.deviation) ** 2
             near = [
@@ -431,7 +439,7 @@ class Detector:
                 Change(
                     None, shape, result.slope[best : best + 1], result.deviation[best : best + 1],
                     float(gains[best]), min(near), max(near), channel=channel.name,
-                    p=min(float(result.p[best]) * self.tests, 1.0),
+                    p=float(p[best]),
                 )
             )  # fmt: skip
         return found

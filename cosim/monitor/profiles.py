@@ -3,11 +3,14 @@
     step      other from a log on
     creep     grows with time from the log before on
     outlier   other in one log only
+    spell     other from a log up to another one, then as before
 
 A number per log, independent and normal about a constant with an unknown spread, is regressed on
 the constant and one profile. The slope over its deviation is Student's t if nothing has changed,
 whatever the spread is. Over all profiles and all numbers, the chance that one of them exceeds a
-threshold is at most the sum of their chances (Bonferroni), so the stated rate is shared evenly.
+threshold is at most the sum of their chances (Bonferroni), so the stated rate is shared: half by
+what lasts or is one log, half by what passes, of which there are many more. Without the latter, a
+change that is undone later would count as scatter.
 """
 
 from __future__ import annotations
@@ -21,9 +24,12 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 Vector = NDArray[np.float64]
-Kind = Literal["step", "creep", "outlier"]
+Kind = Literal["step", "creep", "outlier", "spell"]
 ASIDE = 2
 """Logs on either side of a step at least: a single one is an outlier."""
+EACH, WIDER = 32, 1.1
+"""Spells of up to so many logs have every length; longer ones differ by this factor, since their
+number would grow with the square of that of the logs."""
 MEDIAN = 1.4826
 """Deviation of normal numbers over the median of their sizes."""
 GROUP = 4
@@ -37,12 +43,14 @@ class Profile:
     Attributes:
         kind: see above.
         first: index of the first log that differs.
-        values: by log; 1 for a step and an outlier, days for a creep.
+        values: by log; 1 for a step, an outlier and a spell, days for a creep.
+        last: index of the first log that is as before again; None if none is.
     """
 
     kind: Kind
     first: int
     values: Vector
+    last: int | None = None
 
 
 def profiles(days: Vector) -> list[Profile]:
@@ -55,7 +63,27 @@ def profiles(days: Vector) -> list[Profile]:
         found.append(Profile("creep", first, np.maximum(days - days[first - 1], 0.0)))
     for first in range(count):
         found.append(Profile("outlier", first, (np.arange(count) == first).astype(np.float64)))
+    for length in _lengths(count):
+        for first in range(ASIDE, count - ASIDE - length + 1):
+            last = first + length
+            within = (np.arange(count) >= first) & (np.arange(count) < last)
+            found.append(Profile("spell", first, within.astype(np.float64), last))
     return found
+
+
+def shares(shapes: Sequence[Profile]) -> Vector:
+    """By profile, into how many parts the rate is divided if this is one: see above."""
+    spells = np.array([shape.kind == "spell" for shape in shapes])
+    sizes = np.where(spells, spells.sum(), (~spells).sum())
+    return np.asarray(sizes * len(set(spells.tolist())), dtype=np.float64)
+
+
+def _lengths(count: int) -> list[int]:
+    """Of spells [logs]."""
+    found = [ASIDE]
+    while found[-1] < count:
+        found.append(found[-1] + 1 if found[-1] < EACH else round(WIDER * found[-1]))
+    return found[:-1]
 
 
 def constants(groups: Sequence[object]) -> Vector:

@@ -166,6 +166,7 @@ class Monitored:
             "first_log": self.series.logs[first].name,
             "since": self.dated(first),
             "last_before": self.dated(first - 1) if first else None,
+            "until": None if change.profile.last is None else self.dated(change.profile.last),
             "between": [self.dated(max(change.low - 1, 0)), self.dated(change.high)],
             "p": change.p,
             "gain_nats": change.gain,
@@ -202,6 +203,8 @@ class Monitored:
         when = f"since {entry['since']}"
         if entry["last_before"]:
             when += f" (95 %: between {entry['between'][0]} and {entry['between'][1]})"
+        if entry["until"]:
+            when += f", as before again from {entry['until']}"
         if change.profile.kind == "outlier":
             when = f"in the log of {entry['since']} only"
         if change.direction is None:
@@ -212,8 +215,8 @@ class Monitored:
         name = entry["what"]
         if change.direction.kind == "effect":
             name += f" ({entry['quantity']})"
-        verb = {"step": "jumps by", "creep": "creeps by", "outlier": "differs by"}
-        text = f"{name} {verb[change.profile.kind]} {size} {when}"
+        verb = {"step": "jumps by", "creep": "creeps by"}
+        text = f"{name} {verb.get(change.profile.kind, 'differs by')} {size} {when}"
         if change.profile.kind == "creep":
             text += f", {30.0 * entry['per_day']:+.3g}{unit} in 30 days"
         if not change.fits:

@@ -18,7 +18,7 @@ TONES = {
     "unexplained": "unexplained",
 }
 """Classes of the style sheet."""
-KINDS = {"step": "jump", "creep": "creep", "outlier": "one log"}
+KINDS = {"step": "jump", "creep": "creep", "outlier": "one log", "spell": "for a while"}
 
 
 def write_monitor_page(result: Monitored, path: Path) -> None:
@@ -95,6 +95,10 @@ def _next(result: Monitored) -> Html:
             steps.append(
                 join("Look up what was done to the machine before ", tag("b", day), ".")
             )  # fmt: skip
+        elif change.profile.kind == "spell":
+            until = tag("b", result.dated(change.profile.last or 0))
+            steps.append(join("Look up what was done to the machine before ", tag("b", day),
+                              " and undone before ", until, "."))  # fmt: skip
         else:
             steps.append(join("Look for wear that began about ", tag("b", day), "."))
     steps = list(dict.fromkeys(steps))

@@ -102,6 +102,36 @@ def test_the_same_law_is_named_if_the_catalogue_has_it(tmp_path: Path) -> None:
     assert "coulomb at load.flange" in {change.direction.name, *change.rivals}
 
 
+def test_what_is_undone_later_is_no_scatter(tmp_path: Path) -> None:
+    first, last = JUMP - 4, NEW
+    found = plain(
+        write(tmp_path / "disc", viscous=lambda log: 0.0012 * (first <= log < last))
+    )  # fmt: skip
+    (change,) = found.changes
+    assert change.direction is not None and change.direction.name == "b"
+    assert (change.profile.kind, change.profile.first, change.profile.last) == (
+        "spell",
+        first,
+        last,
+    )
+    entry = found.entry(change)
+    assert entry["until"] == str(day(last)) and entry["since"] == str(day(first))
+    assert f"as before again from {day(last)}" in found.sentence(change)
+    low, high = entry["ci95"]
+    assert abs(entry["change"] - 0.0012) < high - low < 0.0012  # twice the interval of 95 %
+
+
+def test_wear_that_was_repaired_is_not_quiet(tmp_path: Path) -> None:
+    first, last = JUMP - 5, NEW
+    found = plain(write(
+        tmp_path / "disc",
+        viscous=lambda log: 0.0005 * (log - first + 1) * (first <= log < last),
+    ))  # fmt: skip
+    assert found.verdict != "nothing_changed"
+    assert all(c.direction is not None and c.direction.name == "b" for c in found.changes)
+    assert {c.profile.last for c in found.changes} & {last}
+
+
 @pytest.fixture(scope="module")
 def dry_only() -> Callable[[Path], Monitored]:
     """Monitored with declared parameters, sensors and plain dry friction."""
