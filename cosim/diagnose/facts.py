@@ -161,7 +161,7 @@ class Left:
     @property
     def white(self) -> bool:
         """Noise that is only larger than stated: see `whiteness.white`."""
-        return self.structured and white(self.p_fast, self.p_white)
+        return self.structured and white(self.lasting, self.p_fast, self.p_white)
 
     @property
     def structured(self) -> bool:

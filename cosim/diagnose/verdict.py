@@ -185,7 +185,7 @@ def above(model: Model) -> tuple[Left, ...]:
 def stands(table: Table, place: int) -> bool:
     """Whether what a set leaves is noise, or nothing that another law could explain.
 
-    That is: it is white, of any size; or its RMS is a tenth of what was explained, and no more
+    That is: it is white; or its RMS is a tenth of what was explained, and no more
     in unused runs than in fitted ones, and no free force at a port would have left less of the
     declared model's rest, nor explains half of its own.
 

@@ -39,6 +39,9 @@ RARE = 0.01
 CALIBRATED = 1.1
 """RMS over noise up to which a model counts as calibrated: the sheets give noise to a few percent,
 and thousands of samples make any smaller excess significant without making it worth a cause."""
+STATED = 2.0
+"""What noise may be over its figure where it is white. Figures that are guessed are good to this;
+of more, a vibration that passes faster than it is sampled, which looks white, is as likely."""
 UNNAMED = float(np.sqrt(1.0 + WINDOW * MATERIAL**2))
 """Slow parts over noise's, as much as laws that are too small for a name can leave: one that adds
 `MATERIAL` to a channel, and keeps its sign over windows. Right models of the laboratory's and of
@@ -75,8 +78,8 @@ class WhitenessTest:
 
     @property
     def white(self) -> bool:
-        """Whether samples do not know of each other, however large they are."""
-        return white(self.p_fast, self.p_white)
+        """Whether samples do not know of each other, though they may be larger than stated."""
+        return white(self.lasting, self.p_fast, self.p_white)
 
     @property
     def structured(self) -> bool:
@@ -104,13 +107,14 @@ def structured(lasting: float, *p_values: float) -> bool:
     return min(p_values) < RARE and lasting > CALIBRATED
 
 
-def white(*p_values: float) -> bool:
-    """Whether a residual is white noise, of any size.
+def white(lasting: float, *p_values: float) -> bool:
+    """Whether a residual is white noise, of the stated size or up to `STATED` times that.
 
     Args:
+        lasting: RMS over noise without the worst windows.
         p_values: that white noise of any size has such slow parts, and such fast ones.
     """
-    return min(p_values) >= RARE
+    return lasting < STATED and min(p_values) >= RARE
 
 
 def slowly(slow: float, p_value: float, tests: int) -> bool:

@@ -55,10 +55,11 @@ def test_white_noise_that_is_larger_than_stated_is_not_fast(disc_alone: Problem)
     assert np.quantile(values, 0.5) == pytest.approx(0.5, abs=0.12)
 
 
-def test_noise_of_any_size_is_white_and_what_lasts_is_not(disc_alone: Problem) -> None:
+def test_larger_noise_is_white_and_what_lasts_is_not(disc_alone: Problem) -> None:
     runs = noise(1000, 1000)
     large = whiteness(disc_alone, *(1.5 * one for one in runs))
     assert large.structured and large.white and large.p_white > 0.01 > large.p_value
+    assert not whiteness(disc_alone, *(2.5 * one for one in runs)).white
     walk = [one + np.sin(0.05 * np.arange(one.size)) for one in runs]
     alternating = [one + np.cos(np.pi * np.arange(one.size)) for one in runs]
     for other in (walk, alternating):
