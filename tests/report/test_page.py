@@ -102,6 +102,20 @@ def test_a_search_that_was_stopped_claims_nothing() -> None:
     assert "leaves noise" in told(Facts(content)).headline
 
 
+def test_white_leftovers_are_told_as_noise() -> None:
+    content = table("unexplained")
+    assert "What is left" not in told(Facts(content)).label
+    content["left_white"] = True
+    story = told(Facts(content))
+    assert story.label == "The noise is larger than stated"
+    assert "what it misses is white" in Marked(str(story.headline)).text
+    assert "sigma" in story.steps[0]
+    content = table("effect_found") | {"left_white": True, "left": ["speed"]}
+    assert "is white, and larger than its stated noise" in Marked(
+        str("".join(told(Facts(content)).meaning))
+    ).text  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("column", "channels"),
     [

@@ -22,6 +22,7 @@ LABELS = {
     "unexplained": "Something is missing that has no name here",
     "bad_data": "The data cannot be used",
     "stopped": "The search was stopped before its end",
+    "white": "The noise is larger than stated",
 }
 SMALL = 3
 """Effects whose smallest visible size is said beside `nothing_missing`."""
@@ -55,9 +56,10 @@ def told(facts: Facts) -> Story:
     write = {
         "effect_found": _effect_found, "nothing_missing": _nothing_missing,
         "confounded": _confounded, "unexplained": _unexplained, "bad_data": _bad_data,
-        "stopped": _stopped,
+        "stopped": _stopped, "white": _white,
     }  # fmt: skip
-    kind = "stopped" if facts.table.get("stopped") else facts.verdict
+    white = facts.verdict == "unexplained" and facts.table.get("left_white")
+    kind = "stopped" if facts.table.get("stopped") else "white" if white else facts.verdict
     headline, meaning, steps = write[kind](facts)
     return Story(LABELS[kind], headline, tuple(meaning), tuple(steps))
 
@@ -136,6 +138,8 @@ def _left(facts: Facts) -> Html:
     if not facts.left:
         return Html("")
     names = words([tag("b", name) for name in facts.left])
+    if facts.table.get("left_white"):
+        return join("What is left of ", names, " is white, and larger than its stated noise.")
     return join(
         "More is missing: the residual of ", names, " still holds more than noise.",
     )  # fmt: skip
@@ -404,6 +408,24 @@ def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
              "load: what changes tells what it hangs on."),
         join(tag("b", "Write the law"), " as an effect (one file with its equation), or use a "
              "finer variant of the component, and diagnose again."),
+    ]  # fmt: skip
+    return headline, _some(meaning), steps
+
+
+def _white(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
+    names = words([tag("b", name) for name in facts.left])
+    headline = join("The model misses ", tag("b", facts.worst), " by ", _misses(facts, "after"),
+                    " its sensor's stated noise, and what it misses is white.")  # fmt: skip
+    meaning = [
+        join("Samples of what is left of ", names, " do not know of each other, neither neighbours "
+             "nor over long times. A force or a law of motion does not do that: the noise is "
+             "larger than the mapping says, or the sensor errs otherwise from sample to sample."),
+    ]  # fmt: skip
+    steps = [
+        join(tag("b", "Look at the figure"), " of ", names, " (", tag("code", "sigma"),
+             " in the mapping): a log at rest shows the noise. Correct it and diagnose again."),
+        join(tag("b", "If the figure is right"), ", look at what differs from sample to sample: "
+             "rounding, times of the samples, interference."),
     ]  # fmt: skip
     return headline, _some(meaning), steps
 
