@@ -52,7 +52,7 @@ def test_a_shift_of_the_load_is_compared_with_a_payload_whose_place_is_fitted(
     """Tried along one axis alone, its place would tell it from a shift that does the same."""
     names = ("load_shift at base.load", "payload at base.body")
     write(tmp_path, {names[1]: 8.0}, 22)
-    problem = read_problem(tmp_path).only(["IN1", "IN2", "CN1", "S1", "CN2"])
+    problem = read_problem(tmp_path).only(["IN1", "CN1", "CN2"])
     search = Search(simulator(problem), only=[c for c in candidates(problem) if c.label in names])
     search.round(search.calibrated())
     search.close()
