@@ -50,6 +50,12 @@ class Change:
     half: float = 0.0
 
     @property
+    def by_shape(self) -> bool:
+        """Whether its name hangs on the shape of its pattern: of laws, and of what is late."""
+        d = self.direction
+        return d is not None and (d.kind == "effect" or d.quantity == "latency")
+
+    @property
     def full(self) -> float:
         """Largest value of its profile."""
         return float(np.max(np.abs(self.profile.values)))
@@ -65,6 +71,7 @@ class Found:
         root: of the scatter of declared parameters between logs.
         own: values and deviations of each column by log, all changes but its own taken off.
         left: mean square over the noise by log and channel, declared parameters fitted per log.
+        rest: the same with all changes taken off.
         alone: declared parameters whose successive logs are alike: name -> correlation.
     """
 
@@ -73,4 +80,5 @@ class Found:
     root: Vector
     own: tuple[Vector, Vector]
     left: Vector
+    rest: Vector
     alone: dict[str, float] = field(default_factory=dict)

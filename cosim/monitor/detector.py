@@ -21,7 +21,18 @@ from ..diagnose.models import GATE
 from .change import Change, Found
 from .evidence import Evidence, Moments
 from .patterns import Direction
-from .profiles import Profile, chances, constants, profiles, regress, shares, weights
+from .profiles import (
+    Profile,
+    chances,
+    constants,
+    paired,
+    profiles,
+    reached,
+    regress,
+    shares,
+    successive,
+    weights,
+)
 
 Vector = NDArray[np.float64]
 MOST = 6
@@ -29,6 +40,8 @@ MOST = 6
 SHARE = 0.1
 """A further change that is smaller than this share of the largest one is not told from what that
 one leaves: patterns are of first order, and laws have their usual shapes."""
+EXACT = 0.01
+"""The same where patterns are taken at the very size, of parameters and sensors."""
 FINALISTS = 4
 """Likeliest names, and likeliest declared parameters, whose patterns are taken at their full size
 before one of them is chosen."""
@@ -61,6 +74,9 @@ class Detector:
         keys = [tuple(self.patterns.keys[name] for name in log.runs) for log in logs]
         self.known = constants(keys)
         self.centred = self._centred(self.matrix)
+        rest, whole = (np.sum(m**2, axis=1) for m in (self.centred, self.matrix))
+        self.unseen = [self.shapes[k] for k in np.flatnonzero(rest < 1e-9 * whole)]
+        """What cannot be told from logs that are driven otherwise."""
         self._squared = self.centred**2
         self.moments = evidence.moments()
         own = self.moments.own()[0]
@@ -69,6 +85,7 @@ class Detector:
         self.tests = quantities * len(self.shapes)
         self.among = quantities * shares(self.shapes)
         """By profile, the number of tests that its share of the rate is divided by."""
+        self.pairs = 0.5 * quantities * len(self.shapes) * (len(self.shapes) - 1)
         self.rate = rate
         self._chosen = np.log(self.among / self.among.min())
         """What the best of many profiles gains more by chance than the best of few [nats]."""
@@ -103,7 +120,8 @@ class Detector:
         for column in self.watched:
             series, own = values[:, column], deviations[:, column]
             p = chances(series, own, known, self.matrix)
-            least = min(least, float(np.min(p * self.among)))
+            both = paired(series, own, known, self.matrix) * self.pairs
+            least = min(least, 1.5 * float(np.min(p * self.among)), 3.0 * both)
         return least
 
     # -- names and dates ---------------------------------------------------------------------------
@@ -132,33 +150,12 @@ class Detector:
             gain = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
             found[index] = gain - self._chosen
             if direction.least is not None:
-                there = self._there(direction, changes, solved[:, 0], *own)
+                same = [c for c in changes if c.direction and c.direction.name == direction.name]
+                others = sum((c.amounts[0] * c.profile.values for c in same), 0.0 * self.days)
+                values, deviations = (part[:, direction.columns[0]] for part in own)
+                there = reached(values, deviations, others, self.matrix, solved[:, 0])
                 found[index][there < direction.least] = 0.0
         return found, z, weight
-
-    def _there(
-        self, direction: Direction, changes: Sequence[Change], amounts: Vector, values: Vector,
-        deviations: Vector,
-    ) -> Vector:  # fmt: skip
-        """By profile, how small the value of a column becomes with an amount of it, at most.
-
-        What the logs that the profile leaves alone say of it counts, with twice its deviation.
-        """
-        (column,) = direction.columns
-        good = np.isfinite(values[:, column])
-        series = np.where(good, values[:, column], 0.0)
-        weight = np.where(good, weights(values[:, column], deviations[:, column]), 0.0)
-        calm = (self.matrix == 0.0) * weight
-        total = np.maximum(calm.sum(axis=1), 1e-300)
-        most = calm @ series / total + 2.0 / np.sqrt(total)
-        others = sum(
-            (c.amounts[0] * c.profile.values for c in changes
-             if c.direction is not None and c.direction.name == direction.name),
-            np.zeros(self.days.size),
-        )  # fmt: skip
-        with_it = others + amounts[:, None] * self.matrix
-        touched = np.where(self.matrix != 0.0, with_it, np.inf)
-        return np.asarray(most + touched.min(axis=1))
 
     def best(
         self, changes: Sequence[Change], root: Vector, *, further: bool = False, plain: bool = False
@@ -172,14 +169,14 @@ class Detector:
             plain: only what has one column: two fit the sum of two changes too well.
         """
         gains, z, weight = self.gains(changes, root)
-        taken = {(c.direction.name, c.profile.kind) for c in changes if c.direction}
+        taken = [(c.direction.name, c.profile) for c in changes if c.direction]
         # what the bend of a pattern leaves of a creep looks like a spell
         bent = {c.direction.name for c in changes if c.profile.kind == "creep" and c.direction}
         best: list[tuple[float, int, int]] = []
         for index, gain in gains.items():
             direction = self.patterns.directions[index]
             allowed = np.array(
-                [((direction.name, shape.kind) not in taken or shape.kind == "outlier")
+                [not any(name == direction.name and shape.alike(other) for name, other in taken)
                  and not (direction.name in bent and shape.last) for shape in self.shapes]
             )  # fmt: skip
             if allowed.any() and not (plain and len(direction.columns) > 1):
@@ -189,7 +186,7 @@ class Detector:
             return None
         best.sort(reverse=True)
         if further:
-            least = SHARE**2 * max((self._explained(c).sum() for c in changes), default=0.0)
+            least = max((self._blur(c) for c in changes), default=0.0)
             while best and self._explained(self._change(gains, z, weight, *best[0])).sum() < least:
                 best.pop(0)
             if not best:
@@ -381,12 +378,13 @@ class Detector:
         before = left
         if named:
             before = self.evidence.left([], np.zeros((0, self.days.size)), first)
-        return Found(changes, self.tests, root, self._own(named), before, self._correlated(named))
+        own, alone = self._own(named), self._correlated(named)
+        return Found(changes, self.tests, root, own, before, left, alone)
 
     def _needed(self, changes: list[Change]) -> list[Change]:
         """Those that are not small beside the largest one, once all names are right."""
         sizes = [float(self._explained(change).sum()) for change in changes]
-        least = SHARE**2 * max(sizes)
+        least = max(map(self._blur, changes))
         kept = [
             change for change, size in zip(changes, sizes, strict=True)
             if size >= least and change.gain > GATE * change.spread
@@ -413,6 +411,12 @@ class Detector:
             pattern = values[:, list(change.direction.columns)] @ full
             found = np.maximum(found, np.mean(pattern.reshape(-1, count) ** 2, axis=0))
         return found
+
+    def _blur(self, change: Change) -> float:
+        """What a change may leave: laws have their usual shapes, creeps a pattern of one size."""
+        assert change.direction is not None
+        exact = change.direction.kind != "effect" and change.profile.kind != "creep"
+        return (EXACT if exact else SHARE) ** 2 * float(self._explained(change).sum())
 
     def _unexplained(self, left: Vector, changes: Sequence[Change]) -> list[Change]:
         """Channels of which other than before is left, by more than patterns are wrong by."""
@@ -459,7 +463,7 @@ class Detector:
         known = np.column_stack([self.known, *(c.profile.values for c in others)])
         shape = change.profile.values[None, :]
         result = regress(values, weights(values, deviations), known, shape)
-        if result.freedom < 1:
+        if result.freedom < 1 or not np.isfinite(result.deviation[0]):
             return change
         size = float(result.slope[0]) * change.full
         half = float(stdtrit(result.freedom, 0.975) * result.deviation[0]) * change.full
@@ -488,13 +492,6 @@ class Detector:
         """Declared parameters whose successive logs are more alike than chance makes them."""
         values = self._without(changes).own()[0]
         known = np.column_stack([self.known, *(c.profile.values for c in changes)])
-        basis = np.linalg.qr(known)[0]
-        found = {}
-        for direction in self.patterns.directions[: self.patterns.declared]:
-            series = values[:, direction.value]
-            rest = series - basis @ (basis.T @ series)
-            correlation = float(rest[1:] @ rest[:-1]) / max(float(rest @ rest), 1e-300)
-            # 1 / sqrt(n) is its deviation, and over ten parameters 3 of them are rare
-            if correlation > 3.0 / math.sqrt(rest.size):
-                found[direction.name] = correlation
-        return found
+        declared = self.patterns.directions[: self.patterns.declared]
+        found = {d.name: successive(values[:, d.value], known) for d in declared}
+        return {name: size for name, size in found.items() if size}

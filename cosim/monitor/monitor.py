@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..calibrate.checks.examine import check_data
-from ..calibrate.checks.finding import lines, passed
+from ..calibrate.checks.finding import Finding, lines, passed
 from ..calibrate.fit import Effort, fit
 from ..calibrate.parts import PURPOSE
 from ..calibrate.simulator import Simulator
@@ -83,13 +83,20 @@ def monitor(
     say("looking for changes")
     detector = Detector(Evidence(series, known), rate)
     found = detector.found()
-    calm = np.sqrt(np.nanmean(found.left[:baseline], axis=0))
+    calm = np.sqrt(np.nanmean(found.rest[:baseline], axis=0))
+    if max(calm.tolist()) > FAR:  # first orders around a model that is far off tell no laws apart
+        found.changes = [replace(c, fits=c.fits and not c.by_shape) for c in found.changes]
     for channel, size in zip(series.problem.channels, calm.tolist(), strict=True):
         if size > FAR:
             warnings.append(
                 f"the model leaves {size:.2g} times the noise of {channel.name} in the first logs "
                 "already, so names are less sure: run cosim diagnose on them first"
             )
+    for first in sorted({shape.first for shape in detector.unseen}):
+        warnings.append(
+            f"log {series.logs[first].name} is driven otherwise than logs before it: what changed "
+            "just then is not seen"
+        )
     for name, correlation in found.alone.items():
         warnings.append(
             f"{name} of successive logs is correlated by {correlation:.2f}: logs are not "
@@ -100,14 +107,19 @@ def monitor(
     )  # fmt: skip
 
 
+def plain_lines(findings: Iterable[Finding]) -> list[str]:
+    """Warnings in a line each, of those that are alike together, without the word."""
+    found = lines(f for f in findings if f.severity == "warning")
+    return [text.removeprefix("warning: ") for text in found]
+
+
 def _usable(series: Series) -> tuple[Series, list[str]]:
     """The series without logs that cannot be used, and warnings.
 
     Raises:
         InputError: too few are left.
     """
-    problem, warnings = series.problem, [str(f) for f in series.problem.source.findings
-                                         if f.severity == "warning"]  # fmt: skip
+    problem, warnings = series.problem, plain_lines(series.problem.source.findings)
     plain = problem.changed(
         runs=[replace(run, purpose=PURPOSE) for run in problem.runs],
         source=replace(problem.source, findings=()),
@@ -124,7 +136,7 @@ def _usable(series: Series) -> tuple[Series, list[str]]:
             warnings.append(f"log {log.name} is not used: {'; '.join(wrong)}")
         else:
             kept.append(log)
-            warnings += lines(f for f in findings if f.severity == "warning")
+            warnings += plain_lines(findings)
     if len(kept) < LEAST:
         raise InputError(
             f"{series.name}: {len(kept)} of {len(series.logs)} logs can be used, and it takes "

@@ -8,9 +8,9 @@
 A number per log, independent and normal about a constant with an unknown spread, is regressed on
 the constant and one profile. The slope over its deviation is Student's t if nothing has changed,
 whatever the spread is. Over all profiles and all numbers, the chance that one of them exceeds a
-threshold is at most the sum of their chances (Bonferroni), so the stated rate is shared: half by
-what lasts or is one log, half by what passes, of which there are many more. Without the latter, a
-change that is undone later would count as scatter.
+threshold is at most the sum of their chances (Bonferroni), so the stated rate is shared by
+what lasts or is one log, by what passes, of which there are many more, and by all pairs. Without
+these, a change that is undone later, or two changes, would count as scatter.
 """
 
 from __future__ import annotations
@@ -51,6 +51,14 @@ class Profile:
     first: int
     values: Vector
     last: int | None = None
+
+    def alike(self, other: Profile) -> bool:
+        """Whether one quantity does not change in both ways: one would be the other's date."""
+        if self.kind != other.kind:
+            return False
+        if self.last is not None and other.last is not None:
+            return self.first <= other.last and other.first <= self.last
+        return self.kind == "creep" or abs(self.first - other.first) < ASIDE
 
 
 def profiles(days: Vector) -> list[Profile]:
@@ -175,3 +183,56 @@ def chances(values: Vector, deviations: Vector, known: Vector, shapes: Vector) -
     """
     weighted = regress(values, weights(values, deviations), known, shapes).p
     return np.asarray(np.maximum(weighted, regress(values, np.ones_like(values), known, shapes).p))
+
+
+def successive(series: Vector, known: Vector) -> float:
+    """Correlation of successive logs beside what is known; 0 where chance makes as much."""
+    basis = np.linalg.qr(known)[0]
+    rest = series - basis @ (basis.T @ series)
+    found = float(rest[1:] @ rest[:-1]) / max(float(rest @ rest), 1e-300)
+    # 1 / sqrt(n) is its deviation, and over ten parameters 3 of them are rare
+    return found if found > 3.0 / np.sqrt(rest.size) else 0.0
+
+
+def reached(
+    values: Vector, deviations: Vector, others: Vector, shapes: Vector, amounts: Vector
+) -> Vector:
+    """By profile, how small a series becomes with an amount of it, at most.
+
+    What the logs that the profile leaves alone say of it counts, with twice its deviation.
+
+    Args:
+        values, deviations: one per log, other changes of it taken off.
+        others: what these changes make of it, by log.
+        shapes: (profiles, logs).
+        amounts: by profile.
+    """
+    good = np.isfinite(values)
+    weight = np.where(good, weights(values, deviations), 0.0)
+    calm = (shapes == 0.0) * weight
+    total = np.maximum(calm.sum(axis=1), 1e-300)
+    most = calm @ np.where(good, values, 0.0) / total + 2.0 / np.sqrt(total)
+    touched = np.where(shapes != 0.0, others + amounts[:, None] * shapes, np.inf)
+    return np.asarray(most + touched.min(axis=1))
+
+
+def paired(values: Vector, deviations: Vector, known: Vector, shapes: Vector) -> float:
+    """Probability of two profiles together if nothing has changed: each hides the other's.
+
+    The second is the best one beside the best, which is one of all pairs.
+    """
+    worst = 0.0
+    for weight in (weights(values, deviations), np.ones_like(values)):
+        first = regress(values, weight, known, shapes)
+        best = int(np.argmin(first.p))
+        second = regress(values, weight, np.column_stack([known, shapes[best]]), shapes)
+        if second.freedom < 1:
+            return 1.0
+        # Student's t of each gives the share of the squares that is left
+        left = 1.0
+        for one in (first, second):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                square = np.where(np.isfinite(one.deviation), (one.slope / one.deviation) ** 2, 0.0)
+            left /= 1.0 + float(np.max(square)) / one.freedom
+        worst = max(worst, left ** (0.5 * second.freedom))  # F with two degrees of freedom
+    return worst

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,6 +125,7 @@ class Monitored:
         return self._limited(
             direction.name, direction.unit, direction.text,
             origin + direction.scale * values[:, column], direction.scale * deviations[:, column],
+            [c for c in self.changes if c.direction and c.direction.name == direction.name],
         )  # fmt: skip
 
     def channel_charts(self) -> list[Chart]:
@@ -132,17 +134,23 @@ class Monitored:
             self._limited(
                 f"left of {channel.name}", "1",
                 "what the model with each log's own parameters leaves, over the noise",
-                np.sqrt(self.found.left[:, place]), np.zeros(len(self.series.logs)),
+                np.sqrt(self.found.left[:, place]), np.zeros(len(self.series.logs)), self.changes,
             )
             for place, channel in enumerate(self.series.problem.channels)
         ]  # fmt: skip
 
     def _limited(
-        self, name: str, unit: str, text: str, values: Vector, deviations: Vector
-    ) -> Chart:
-        """With limits that all points of all charts together exceed at the stated rate."""
-        first = values[: self.baseline]
-        first = first[np.isfinite(first)]
+        self, name: str, unit: str, text: str, values: Vector, deviations: Vector,
+        changes: Sequence[Change],
+    ) -> Chart:  # fmt: skip
+        """With limits that all points of all charts together exceed at the stated rate.
+
+        They come from those of the first logs in which none of the changes is.
+        """
+        known = np.isfinite(values)
+        alike = np.all([known, *(c.profile.values == 0.0 for c in changes)], axis=0)
+        calm = np.flatnonzero(alike[: self.baseline])
+        first = values[calm if calm.size > 1 else np.flatnonzero(known[: self.baseline])]
         if first.size < 2:
             return Chart(name, unit, text, values, deviations, math.nan, math.nan, math.nan, ())
         centre, spread = float(first.mean()), float(first.std(ddof=1))

@@ -75,7 +75,8 @@ def _meaning(result: Monitored) -> Html:
     items = [tag("li", result.sentence(change)) for change in result.changes]
     rests = (
         f"Of series in which nothing changes, {result.rate:g} would alarm: {result.found.tests} "
-        "tests share that evenly. It holds for logs that are independent of each other."
+        "tests share that, a third of it those of what passes, and a third all pairs of changes. "
+        "It holds for logs that are independent of each other."
     )
     return tag(
         "section", tag("h2", "What it means"), tag("ul", *items) if items else "",
@@ -104,8 +105,8 @@ def _next(result: Monitored) -> Html:
     steps = list(dict.fromkeys(steps))
     if result.changes:
         steps.append(
-            join("Confirm the name by a diagnosis of logs after the change:",
-                 command("cosim diagnose FOLDER_WITH_LATE_LOGS"))
+            join("Confirm the name by a diagnosis of logs in which it is so:",
+                 command("cosim diagnose FOLDER_WITH_THESE_LOGS"))
         )  # fmt: skip
     else:
         steps.append(join("Go on; run this again when there are more logs."))
@@ -126,7 +127,8 @@ def _changes(result: Monitored) -> Html:
             low, high = entry["ci95"]
             size, interval = f"{entry['change']:+.4g}", f"{low:+.4g} to {high:+.4g}"
         rows.append(
-            [explained(named, entry["text"]), KINDS[entry["kind"]], Cell(entry["since"]),
+            [explained(named, entry["text"]), KINDS[entry["kind"]],
+             Cell(entry["since"] + (f" until {entry['until']}" if entry["until"] else "")),
              Cell(" to ".join(entry["between"]) if entry["kind"] != "outlier" else "–"),
              Cell(size), Cell(interval), unit(entry["unit"]),
              Cell(", ".join([*entry["cannot_tell_from"], *entry.get("same", [])]) or "–", None,
@@ -134,7 +136,8 @@ def _changes(result: Monitored) -> Html:
         )  # fmt: skip
     head = [
         "what", "how", "since", ("between", "95 % interval of the date."),
-        ("size", "At the end of the series, or in that log."), ("95 % interval", "Of the size."),
+        ("size", "At the end of the series, in that log, or in between."),
+        ("95 % interval", "Of the size."),
         "unit", ("not told from", "Names that explain the logs as well."),
     ]  # fmt: skip
     return section("changes", "Changes", table(head, rows, "changes"))

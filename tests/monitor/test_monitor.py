@@ -121,6 +121,40 @@ def test_what_is_undone_later_is_no_scatter(tmp_path: Path) -> None:
     assert abs(entry["change"] - 0.0012) < high - low < 0.0012  # twice the interval of 95 %
 
 
+def test_two_changes_do_not_hide_each_other(tmp_path: Path) -> None:
+    spells = (4, 7), (11, 15)
+    found = plain(write(
+        tmp_path / "disc", zero=lambda log: 0.02 * any(a <= log < b for a, b in spells)
+    ))  # fmt: skip
+    assert found.verdict == "changed"
+    assert [(c.profile.first, c.profile.last) for c in found.changes] == list(spells)
+    assert {c.direction.name for c in found.changes if c.direction} == {"offset of theta"}
+
+
+def test_one_quantity_may_jump_twice(tmp_path: Path) -> None:
+    found = plain(write(
+        tmp_path / "disc", viscous=lambda log: 0.0012 * ((log >= 6) + (log >= 12))
+    ))  # fmt: skip
+    assert [(c.direction.name, c.profile.kind, c.profile.first) for c in found.changes
+            if c.direction] == [("b", "step", 6), ("b", "step", 12)]  # fmt: skip
+
+
+def test_a_small_change_beside_a_large_one_is_told(tmp_path: Path) -> None:
+    found = plain(write(
+        tmp_path / "disc", viscous=lambda log: 0.006 * (5 <= log < 9),
+        zero=lambda log: 0.02 * (12 <= log < 15),
+    ))  # fmt: skip
+    assert [(c.direction.name, c.profile.first) for c in found.changes if c.direction] == [
+        ("b", 5), ("offset of theta", 12)
+    ]  # fmt: skip
+
+
+def test_limits_come_from_logs_without_the_change(tmp_path: Path) -> None:
+    found = plain(write(tmp_path / "disc", viscous=step(3, 0.003)))
+    chart = next(chart for chart in found.parameter_charts() if chart.name == "b")
+    assert chart.centre == pytest.approx(0.03, abs=2e-4)  # a fifth of the change would be 6e-4
+
+
 def test_wear_that_was_repaired_is_not_quiet(tmp_path: Path) -> None:
     first, last = JUMP - 5, NEW
     found = plain(write(
