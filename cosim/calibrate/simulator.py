@@ -31,6 +31,9 @@ from .threads import shared
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+BETWEEN = 16
+"""Recorded points per interval where samples fall between them: a line across a jump then misreads
+the samples of a sixteenth of the interval."""
 
 
 class Simulator:
@@ -110,8 +113,13 @@ class Simulator:
         )
         interval = problem.period or run.interval
         every = max(round(interval / problem.step), 1)
-        size = every * problem.step
         first = float(run.times[0]) - run.lead
+        places = (run.times - first) / (every * problem.step)
+        if np.max(np.abs(places - np.rint(places))) > COINCIDENT:
+            every = max(
+                every // BETWEEN, 1
+            )  # else signals that jump are read off lines across them
+        size = every * problem.step
         last = float(run.times[-1]) + max(channel.shift for channel in problem.channels)
         count = math.ceil((last - first) / size - COINCIDENT)
         if excess := DATA.excess(8 * count * every * (1 + len(run.inputs))):
