@@ -116,9 +116,7 @@ class Simulator:
         first = float(run.times[0]) - run.lead
         places = (run.times - first) / (every * problem.step)
         if np.max(np.abs(places - np.rint(places))) > COINCIDENT:
-            every = max(
-                every // BETWEEN, 1
-            )  # else signals that jump are read off lines across them
+            every = max(every // BETWEEN, 1)  # else jumps are read off lines across them
         size = every * problem.step
         last = float(run.times[-1]) + max(channel.shift for channel in problem.channels)
         count = math.ceil((last - first) / size - COINCIDENT)

@@ -13,7 +13,7 @@ import typer
 from ..errors import InputError
 from ..files import claimed, json_text, write_text
 from ..installation.builder import default_provider
-from .output import open_console
+from .output import new_table, open_console
 from .progress import Display
 from .streams import print_json
 
@@ -263,11 +263,9 @@ def clock_lines(clocks: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _print(content: dict[str, Any]) -> None:
-    from rich.table import Table
-
-    console = open_console(None)
+    console = open_console()
     console.print(f"{content['dataset']} with {content['system']}, {content['wall_s']:.1f} s")
-    table = Table("parameter", "value", "95 %", "unit", "nominal", "")
+    table = new_table("parameter", "value", "95 %", "unit", "nominal", "")
     for name, item in content["parameters"].items():
         low, high = item["ci95"]
         note = "" if item["identifiable"] else "not identifiable"
@@ -283,7 +281,7 @@ def _print(content: dict[str, Any]) -> None:
     purposes = ("identification", "validation")
     guessed = any("first_guess" in item for item in content["channels"].values())
     heads = [f"first guess, {purpose}" for purpose in purposes] if guessed else []
-    table = Table("channel", "unit", "noise", *heads, *purposes)
+    table = new_table("channel", "unit", "noise", *heads, *purposes)
     for name, item in content["channels"].items():
         cells = [item[key] for key in purposes]
         cells = [item["first_guess"][key] for key in purposes] + cells if guessed else cells

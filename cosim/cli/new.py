@@ -41,9 +41,10 @@ def system_command(
     logs: Annotated[bool, typer.Option(help="Simulate example logs, too.")] = True,
     as_json: AsJson = False,
 ) -> None:
-    """Write a system, a scenario that runs it and a mapping of logs, with comments.
+    """Write a system and a scenario that runs it, with comments.
 
-    From a template with your dimensions, or from components (--from), connected where names tell.
+    From a template with your dimensions, and a mapping of logs; or from components (--from),
+    connected where names tell: `cosim data import` writes a mapping of your logs then.
 
     Example: `cosim new system my_base --template diff_drive --param track=0.35`
     """

@@ -14,6 +14,7 @@ import numpy as np
 from ..calibrate.deferred import corrected
 from ..calibrate.fit import CORRECTION, DRAFT, fit
 from ..calibrate.parts import Parameter
+from ..display.html import unit as shown_unit
 from ..errors import CosimError
 from .facts import Value
 from .fitter import Fitter
@@ -83,7 +84,9 @@ def told(before: Fitted, after: Fitted) -> Iterable[str]:
         for p in fitted.problem.parameters:
             if key := ended(p, fitted):
                 bound = p.maximum if key == "max" else p.minimum
-                text = f"{p.name} ended at its bound {key} = {bound:.4g} {p.unit}".rstrip()
+                text = (
+                    f"{p.name} ended at its bound {key} = {bound:.4g} {shown_unit(p.unit)}".rstrip()
+                )
                 where.setdefault(text, []).append(model)
     for text, found in where.items():
         yield (

@@ -72,6 +72,8 @@ _SYMBOLS: dict[str, tuple[Exponents, float, float]] = {
     "rpm": (_powers(rad=1, s=-1), math.pi / 30.0, 0.0),
     "degC": (_powers(K=1), 1.0, 273.15),
 }
+_ALIASES = dict.fromkeys(("RPM", "U/min", "Upm", "UPM", "r/min"), "rpm")
+"""Other ways to write a unit that logs have in their heads."""
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXED = ("m", "s", "A", "N", "J", "W", "V", "ohm", "H", "F", "C", "T", "Hz", "Pa", "g", "rad")
 _HIGHEST = 20
@@ -98,7 +100,7 @@ def parse(symbol: str) -> Unit:
     Raises:
         UnitError: an unknown symbol.
     """
-    text = symbol.strip().replace("*", ".").replace("^", "")
+    text = _ALIASES.get(symbol.strip(), symbol.strip()).replace("*", ".").replace("^", "")
     if text in ("", "-"):
         text = "1"
     total = [0] * len(BASE)

@@ -357,6 +357,15 @@ def test_clocks_in_thousandths(noisy) -> None:
     assert not [f for f in check_times(problem.changed(runs=slow)) if f.kind == "rate"]
 
 
+@pytest.mark.parametrize(("interval", "warned"), [(10.0, True), (7.7, False)])
+def test_clocks_of_whole_numbers_hardly_count_seconds(noisy, interval, warned) -> None:
+    problem = noisy(0).changed(source=NO_SOURCE, step=2.5e-3)
+    runs = [replace(r, times=interval * np.arange(r.times.size)) for r in problem.runs]
+    found = [f for f in check_times(problem.changed(runs=runs)) if f.kind == "rate"]
+    assert [f.severity for f in found] == ["warning"] * warned
+    assert all("4000 communication steps" in f.text and '"time [ms]"' in f.text for f in found)
+
+
 def test_where_all_columns_are_too_small_the_inputs_are_named(noisy) -> None:
     problem = noisy(0)
     data = {run.name: 0.01 * run.data for run in problem.runs}

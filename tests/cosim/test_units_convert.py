@@ -14,6 +14,8 @@ from cosim.spec.units import conversion, parse
     ("source", "target", "value", "expected"),
     [
         ("rpm", "rad/s", 60.0, 2.0 * math.pi),
+        ("U/min", "rad/s", 60.0, 2.0 * math.pi),
+        ("RPM", "rpm", 60.0, 60.0),
         ("deg", "rad", 180.0, math.pi),
         ("mm", "m", 1.0, 1e-3),
         ("kN", "N", 2.0, 2000.0),

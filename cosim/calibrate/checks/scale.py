@@ -40,6 +40,8 @@ FACTORS = {
     "a hundred times the unit": 1e-2,
     "turns instead of radians": 0.5 / np.pi,
     "radians instead of turns": 2.0 * np.pi,
+    "rpm instead of degrees per second": 1.0 / 6.0,
+    "degrees per second instead of rpm": 6.0,
 }
 
 
@@ -100,6 +102,13 @@ def _unit(size: float) -> str:
     return near if abs(np.log(size / FACTORS[near])) < 0.2 else ""
 
 
+def _wrong(near: str) -> str:
+    """What may be wrong with a unit: factors that differ by less than models do are listed."""
+    close = [name for name, factor in FACTORS.items()
+             if abs(np.log(factor / FACTORS[near])) < 0.1]  # fmt: skip
+    return ", or ".join([near, *(name for name in close if name != near)])
+
+
 def _spread(problem: Problem, models: Mapping[str, Vector], index: int) -> float:
     """By how many times what its signal does a column changes, in the median over the runs."""
     sizes = []
@@ -143,7 +152,8 @@ def _one_run(
         if _foretold(problem, models, index, name, factor):
             text = (
                 f"is {abs(slope):.4g} times what the model has in this run, and "
-                f"{_size(others):.4g} times in the others; the unit looks wrong here: {near}"
+                f"{_size(others):.4g} times in the others; the unit looks wrong here: "
+                f"{_wrong(near)}"
             )
             yield Finding("error", "unit", name, channel.name, text)
 
@@ -177,7 +187,7 @@ def check_scale(problem: Problem, models: Mapping[str, Vector], index: int) -> I
     size = _size(follow)
     if not alone and not 0.5 < size < 2.0:
         near = _unit(size)
-        reason = f"the unit looks wrong: {near}" if near else "unit or scale look wrong"
+        reason = f"the unit looks wrong: {_wrong(near)}" if near else "unit or scale look wrong"
         unit = f" [{channel.unit}]" if channel.unit else ""
         text = f"is {size:.4g} times what the model has{unit}; {reason}"
         if _all_alike(problem, models, size):

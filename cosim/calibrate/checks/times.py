@@ -27,6 +27,9 @@ UNEVEN = 0.15
 0.16 (a sqrt(2/3)); real recorders that are even but for their scheduler have 0.11 at most."""
 EVEN = 0.02
 """Deviation over the interval below which it is even, but for rounding."""
+MANY = 200
+"""Communication steps between samples of a clock of whole numbers from which it hardly counts
+seconds: a step that is right leaves next to nothing at a tenth of that."""
 RATE = 1e-3
 """Share by which a clock may differ from the stated rate: quartz keeps 1e-4, float32 rounds to 1e-7
 of the time."""
@@ -111,12 +114,18 @@ def _units(problem: Problem) -> Iterator[Finding]:
             f"times less: {way}; else mend period"
         )
         yield Finding("error", "rate", "", "time", text)
-    elif _thousands(least / problem.step):
+    elif _thousands(least / problem.step) or (least / problem.step > MANY and _whole(problem)):
         text = (
             f"samples are {least:.6g} s apart, {least / problem.step:.6g} communication steps: "
             f"{way}"
         )
         yield Finding("warning", "rate", "", "time", text)
+
+
+def _whole(problem: Problem) -> bool:
+    """Whether all clocks count whole numbers: rather of something smaller than seconds."""
+    since = [run.times - run.times[0] for run in problem.runs if run.times.size > 1]
+    return all(bool(np.all(times == np.rint(times))) for times in since)
 
 
 def _thousands(ratio: float) -> bool:
