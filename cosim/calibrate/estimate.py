@@ -171,6 +171,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
         scaled = profiled(run, scaled, vectors[:, doubtful])
+    scaled = _held(problem, scaled, np.diag(inverse), variance)
     # any value between two of a lattice may do as well
     lattice = np.array([p.hints.lattice**2 / 12.0 for p in problem.parameters]) / scale**2
     scaled += np.diag(lattice)
@@ -215,6 +216,29 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         residuals=run.residuals,
         unkept=run.unkept,
     )
+
+
+def _held(problem: Problem, scaled: Vector, alone: Vector, variance: Vector) -> Vector:
+    """A covariance in which priors count in full, however much the misfit widens the rest.
+
+    With D / s the information of the data, widened by s, and P that of priors, (D + P) / s is
+    where it comes from and D / s + P what it should be.
+
+    Args:
+        problem: its parameters.
+        scaled: covariance [spans^2].
+        alone: variances before they were widened.
+        variance: after that.
+    """
+    prior = np.array([k / p.prior if p.prior else 0.0
+                      for k, p in zip(problem.scale, problem.parameters, strict=True)])  # fmt: skip
+    lost = 1.0 - alone / np.maximum(variance, 1e-300)
+    root = prior * np.sqrt(np.clip(lost, 0.0, 1.0))
+    if not np.any(root):
+        return scaled
+    inner = np.eye(root.size) + root[:, None] * scaled * root
+    pulled = scaled * root
+    return np.asarray(scaled - pulled @ np.linalg.solve(inner, pulled.T))
 
 
 def widths(problem: Problem) -> Vector:
