@@ -171,7 +171,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     if confirm:
         doubtful = values < (math.inf if run.uneven else WEAK * values.max())
         scaled = profiled(run, scaled, vectors[:, doubtful])
-    scaled = _held(problem, scaled, np.diag(inverse), variance)
+    scaled = _with_priors(problem, scaled, np.diag(inverse), variance)
     # any value between two of a lattice may do as well
     lattice = np.array([p.hints.lattice**2 / 12.0 for p in problem.parameters]) / scale**2
     scaled += np.diag(lattice)
@@ -218,7 +218,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
     )
 
 
-def _held(problem: Problem, scaled: Vector, alone: Vector, variance: Vector) -> Vector:
+def _with_priors(problem: Problem, scaled: Vector, alone: Vector, variance: Vector) -> Vector:
     """A covariance in which priors count in full, however much the misfit widens the rest.
 
     With D / s the information of the data, widened by s, and P that of priors, (D + P) / s is

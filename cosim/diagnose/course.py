@@ -106,7 +106,7 @@ class Course:
             result.located = localise(search, self.base, ranked)
 
     def _slow(self, model: Fitted) -> bool:
-        """Whether a model leaves what noise of any size is not."""
+        """Whether a model leaves what is no noise, larger than stated or not."""
         return leaves_law(self.search, model)
 
     def _taken(self, stage: Round) -> None:

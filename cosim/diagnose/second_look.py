@@ -29,7 +29,7 @@ def leaves_law(search: Search, fitted: Fitted) -> bool:
 
 
 def leaves_more(search: Search, fitted: Fitted) -> bool:
-    """Whether a model leaves what noise of any size is not; of a set, also in slow parts.
+    """Whether a model leaves what is no noise, however stated; of a set, also in slow parts.
 
     What a wrong law leaves in unused runs may be less than sheets tell noise apart by, and last for
     seconds all the same.

@@ -22,6 +22,7 @@ from .change import Change, Found
 from .evidence import Evidence, Moments
 from .patterns import Direction
 from .profiles import (
+    PARTS,
     Profile,
     chances,
     constants,
@@ -85,7 +86,7 @@ class Detector:
         self.tests = quantities * len(self.shapes)
         self.among = quantities * shares(self.shapes)
         """By profile, the number of tests that its share of the rate is divided by."""
-        self.pairs = 0.5 * quantities * len(self.shapes) * (len(self.shapes) - 1)
+        self.pairs = PARTS * 0.5 * quantities * len(self.shapes) * (len(self.shapes) - 1)
         self.rate = rate
         self._chosen = np.log(self.among / self.among.min())
         """What the best of many profiles gains more by chance than the best of few [nats]."""
@@ -121,7 +122,7 @@ class Detector:
             series, own = values[:, column], deviations[:, column]
             p = chances(series, own, known, self.matrix)
             both = paired(series, own, known, self.matrix) * self.pairs
-            least = min(least, 1.5 * float(np.min(p * self.among)), 3.0 * both)
+            least = min(least, float(np.min(p * self.among)), both)
         return least
 
     # -- names and dates ---------------------------------------------------------------------------

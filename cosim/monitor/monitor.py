@@ -84,7 +84,7 @@ def monitor(
     detector = Detector(Evidence(series, known), rate)
     found = detector.found()
     calm = np.sqrt(np.nanmean(found.rest[:baseline], axis=0))
-    if max(calm.tolist()) > FAR:  # first orders around a model that is far off tell no laws apart
+    if np.any(calm > FAR):  # first orders around a model that is far off tell no laws apart
         found.changes = [replace(c, fits=c.fits and not c.by_shape) for c in found.changes]
     for channel, size in zip(series.problem.channels, calm.tolist(), strict=True):
         if size > FAR:

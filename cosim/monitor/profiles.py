@@ -30,6 +30,8 @@ ASIDE = 2
 EACH, WIDER = 32, 1.1
 """Spells of up to so many logs have every length; longer ones differ by this factor, since their
 number would grow with the square of that of the logs."""
+PARTS = 3
+"""Of the rate: for what lasts or is one log, for spells, for pairs."""
 MEDIAN = 1.4826
 """Deviation of normal numbers over the median of their sizes."""
 GROUP = 4
@@ -80,10 +82,10 @@ def profiles(days: Vector) -> list[Profile]:
 
 
 def shares(shapes: Sequence[Profile]) -> Vector:
-    """By profile, into how many parts the rate is divided if this is one: see above."""
+    """By profile, into how many parts the rate is divided if this is one: of one in `PARTS`."""
     spells = np.array([shape.kind == "spell" for shape in shapes])
     sizes = np.where(spells, spells.sum(), (~spells).sum())
-    return np.asarray(sizes * len(set(spells.tolist())), dtype=np.float64)
+    return np.asarray(PARTS * sizes, dtype=np.float64)
 
 
 def _lengths(count: int) -> list[int]:

@@ -43,6 +43,9 @@ FACTORS = {
     "rpm instead of degrees per second": 1.0 / 6.0,
     "degrees per second instead of rpm": 6.0,
 }
+ALIKE = 0.1
+"""Logarithm of their ratio below which two factors are told by no slope: half of what a model may
+be off by where a factor counts as one of a unit at all."""
 
 
 def _centred(models: Mapping[str, Vector], data: int, model: int,
@@ -105,7 +108,7 @@ def _unit(size: float) -> str:
 def _wrong(near: str) -> str:
     """What may be wrong with a unit: factors that differ by less than models do are listed."""
     close = [name for name, factor in FACTORS.items()
-             if abs(np.log(factor / FACTORS[near])) < 0.1]  # fmt: skip
+             if abs(np.log(factor / FACTORS[near])) < ALIKE]  # fmt: skip
     return ", or ".join([near, *(name for name in close if name != near)])
 
 
