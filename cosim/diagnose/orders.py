@@ -19,6 +19,7 @@ Source: order tracking, Fyfe and Munck, Mech. Syst. Signal Process. 11(2), 1997.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,6 +44,9 @@ LAGS = (0.0, 0.002, 0.004, 0.008, 0.016)
 """How late a force may arrive [s]. A lag that is wrong by d turns the phase by n d times the change
 of speed within a stretch, which hides an order once that is a turn; loops of drives and links take
 between a tick and some 20 ms."""
+TURNED = 0.1
+"""Phase [rad] that a lag may turn within a stretch beside what it turns all of it, for the wave to
+count as the one without lag: it hides a hundredth of its square at most."""
 CHUNK = 4096
 """Samples whose waves are held at once: a shaft at rest is one long stretch."""
 
@@ -57,48 +61,61 @@ def spectrum(
         angles: of the shaft there [rad].
         residuals: (samples, channels) of each run over the noise, NaN in gaps.
     """
-    lags = [
-        [_power(np.interp(time - lag, time, angle), residual) for lag in LAGS]
-        for time, angle, residual in zip(times, angles, residuals, strict=True)
-    ]
-    return np.asarray(np.max(np.array(lags), axis=1))
+    runs = zip(times, angles, residuals, strict=True)
+    return np.array([_power(*run) for run in runs])
 
 
-def _power(angle: Vector, residual: Vector) -> Vector:
-    """P(n) of one run without a lag."""
-    power = np.zeros(HIGHEST)
+def _power(time: Vector, angle: Vector, residual: Vector) -> Vector:
+    """P(n) of one run."""
+    power = np.zeros((len(LAGS), HIGHEST))
+    paths = np.array([np.interp(time - lag, time, angle) for lag in LAGS])
     turns = np.cumsum(np.abs(np.diff(angle, prepend=angle[:1]))) / (2.0 * np.pi)
     first = np.flatnonzero(np.diff(np.floor(turns / TURNS), prepend=-1.0))
     for begin, end in zip(first, [*first[1:], angle.size], strict=True):
-        if end - begin >= LEAST:
-            power += _gained(angle[begin:end], np.nan_to_num(residual[begin:end]))
-    return power
+        if end - begin < LEAST:
+            continue
+        rows = np.nan_to_num(residual[begin:end])
+        prompt = _gained(paths[0, begin:end], rows, 1)
+        for place, path in enumerate(paths[:, begin:end]):
+            # at a speed that stays the same, a lag turns the phase alone, and changes no gain
+            turned = float(np.ptp(path - paths[0, begin:end]))
+            same = HIGHEST if turned * HIGHEST <= TURNED else int(TURNED / turned)
+            gained = prompt[:same]
+            if same < HIGHEST:
+                gained = np.concatenate([gained, _gained(path, rows, same + 1)])
+            power[place] += gained
+    return np.asarray(np.max(power, axis=0))
 
 
-def _gained(angle: Vector, rows: Vector) -> Vector:
-    """P(n) of one stretch."""
+def _gained(angle: Vector, rows: Vector, lowest: int) -> Vector:
+    """Summands of P(n) of one stretch, n from the lowest order on."""
+    orders = HIGHEST + 1 - lowest
     window = np.hanning(angle.size)
     time = np.linspace(-1.0, 1.0, angle.size)
     slow, _ = np.linalg.qr(window[:, None] * time[:, None] ** np.arange(SLOW + 1))
     own = window[:, None] * rows
     own -= slow @ (slow.T @ own)
-    crossed = np.zeros((2, HIGHEST, rows.shape[1]))
-    absorbed = np.zeros((2, HIGHEST, SLOW + 1))
-    gram = np.zeros((3, HIGHEST))
+    columns = window[:, None] * np.hstack([own, slow])
+    weights, channels = window**2, rows.shape[1]
+    products = np.zeros((2, orders, columns.shape[1]))
+    squares, mixed = np.zeros(orders), np.zeros(orders)
     for part in range(0, angle.size, CHUNK):
         piece = slice(part, part + CHUNK)
-        turned = np.exp(1j * angle[piece])
-        wave = np.multiply.accumulate(np.broadcast_to(turned, (HIGHEST, turned.size)), axis=0)
-        both = np.stack([wave.real, wave.imag]) * window[piece]
-        crossed += both @ own[piece]
-        absorbed += both @ slow[piece]
-        gram += [np.sum(both[i] * both[j], axis=1) for i, j in ((0, 0), (1, 1), (0, 1))]
+        waves = _waves(angle[piece], lowest)
+        cosine, sine = np.ascontiguousarray(waves.real), np.ascontiguousarray(waves.imag)
+        products += np.stack([cosine @ columns[piece], sine @ columns[piece]])
+        sine *= cosine
+        mixed += sine @ weights[piece]
+        cosine *= cosine
+        squares += cosine @ weights[piece]
+    crossed, absorbed = products[..., :channels], products[..., channels:]
     # what the parabola does not absorb of cosine and sine, and a grain against what is left of none
+    size = float(np.sum(weights))
+    gram = squares, size - squares, mixed
     a, b, c = (
         gram[k] - np.sum(absorbed[i] * absorbed[j], axis=1)
         for k, (i, j) in enumerate(((0, 0), (1, 1), (0, 1)))
     )
-    size = float(window @ window)
     a, b = a + GRAIN * size, b + GRAIN * size
     x, y = crossed
     shares = (b[:, None] * x**2 - 2.0 * c[:, None] * x * y + a[:, None] * y**2) / (
@@ -109,6 +126,18 @@ def _gained(angle: Vector, rows: Vector) -> Vector:
     count = size**2 / float(np.sum(window**4))
     gain = -0.5 * count * np.log1p(-np.minimum(shares / whole, MOST))
     return np.asarray(np.sum(np.logaddexp(0.0, gain - np.log(count)), axis=1))
+
+
+def _waves(angle: Vector, lowest: int) -> NDArray[np.complex128]:
+    """exp(i n theta) of the orders n from the lowest on, one row each."""
+    orders = HIGHEST + 1 - lowest
+    few = math.isqrt(orders - 1) + 1
+    turn = np.exp(1j * angle)
+    near = np.multiply.accumulate(np.broadcast_to(turn, (few, angle.size)), axis=0)
+    far = np.multiply.accumulate(np.broadcast_to(near[-1], (few, angle.size)), axis=0)
+    base = np.exp(1j * (lowest - 1) * angle)
+    far = np.vstack([base, base * far[:-1]])
+    return (far[:, None] * near).reshape(-1, angle.size)[:orders]
 
 
 def peaks(power: Vector, most: int = PEAKS) -> list[float]:
