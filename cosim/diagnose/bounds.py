@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from ..calibrate.deferred import corrected
 from ..calibrate.fit import CORRECTION, DRAFT, fit
 from ..calibrate.parts import Parameter
@@ -18,7 +16,7 @@ from ..display.html import unit as shown_unit
 from ..errors import CosimError
 from .facts import Value
 from .fitter import Fitter
-from .models import Fitted
+from .models import Fitted, is_open
 
 ROOM = 10.0
 """Times as far from 0 that a bound is opened, or as near: an order of magnitude, in which a device
@@ -34,19 +32,19 @@ def opened(fitter: Fitter, declared: Fitted) -> Fitted | None:
         fitter: fits it; its memo keeps the declared model.
         declared: the fit within the bounds.
     """
-    raw, theta = fitter.raw, declared.estimate.theta
-    wider = [_opened(p, ended(p, declared)) for p in raw.parameters]
-    if wider == list(raw.parameters):
+    raw, problem = fitter.raw, declared.problem
+    wider = [_opened(p, ended(p, declared)) for p in problem.parameters]
+    if wider == list(problem.parameters):
         return None
-    names = declared.problem.names
-    begin = np.array([
-        theta[names.index(p.name)] if p.name in names else p.nominal for p in raw.parameters
-    ])  # fmt: skip
-    simulator = fitter.simulator.of(raw.with_parameters(wider))
+    known = fitter.simulator.of(problem.with_parameters(wider))
     try:
+        found = fit(known, declared.estimate.theta, effort=DRAFT)
+        if is_open(found):  # no rival, and errors of the exchange are small beside what it lacks
+            return fitter.judged(found)
         for effort in (DRAFT, CORRECTION):
-            found = fit(corrected(simulator, begin, raw), begin, effort=effort)
             begin = found.theta
+            simulator = fitter.simulator.of(raw.with_parameters(wider))
+            found = fit(corrected(simulator, begin, raw), begin, effort=effort)
         return fitter.judged(found)
     except CosimError as error:
         fitter.say(f"the declared model with its bounds opened: {error}")
