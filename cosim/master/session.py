@@ -108,6 +108,8 @@ class Session:
             self._blocks = {name: self._block(name) for name in self.targets}
             counting = [i for i in self._run.instances if not i.watched]
             self._counters = [(i.function(WORK), i.address) for i in counting]
+            if isinstance(self._stepper, Compiled):  # FMUs that count do not ask to end in between
+                self._stepper.kernel.sparse(len(counting) == len(self._run.instances))
         except BaseException:
             self._stack.close()
             raise

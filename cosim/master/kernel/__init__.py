@@ -30,7 +30,9 @@ from ..plan import Op
 from . import instructions as made
 from . import structures
 
-SOURCES = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "newton.c", "run.h"))
+SOURCES = tuple(
+    Path(__file__).with_name(name) for name in ("kernel.c", "extrapolation.c", "newton.c", "run.h")
+)
 """Of the library; the first is compiled and includes the others."""
 _TYPES = (
     "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Enumeration",
@@ -269,32 +271,46 @@ class Kernel:
                 [(int(Op.SET_DERIVATIVES), numbers[instance]) for instance, _ in self._told],
             )
 
-    def _fewer(self, calls: list[structures.Call]) -> dict[int, tuple[int, int]]:
+    def _fewer(self, calls: list[structures.Call]) -> dict[int, made.Fetched]:
         """Calls that fetch no more than is read before the same outputs are fetched again.
 
         They are added to `calls`; returned are their numbers by row of `plan.step`.
         """
         bound, found = self._bound, {}
-        for row, slots in made.needed(bound.plan).items():
-            index = int(bound.plan.step[row, 1])
-            instance, block = bound.instances[index], bound.outputs[index]
-            base, first = int(bound.layout.outputs[index, 0]), len(calls)
-            own = [slot - base for slot in slots]
-            for part in block.parts:
-                call = self._call(Op.GET, instance, block, part, base)
-                if call.slots or part.references.size != part.buffer.size:
-                    taken = [call] if own else []
-                else:
-                    taken = []
-                    for begin, end in made.stretches(own):
-                        some = structures.Call.from_buffer_copy(call)
-                        some.references = self._references(part.references[begin:end])
-                        some.buffer = part.buffer[begin:end].ctypes.data
-                        some.n_references = some.n_values = end - begin
-                        taken.append(some)
-                calls += taken
-                self._parts += [(Op.GET, instance, part)] * len(taken)
-            found[row] = (first, len(calls))
+        plan, needed = bound.plan, made.needed(bound.plan)
+        shown = made.shown(plan) if bound.every > 1 else set()
+        for row, (op, index, _) in enumerate(plan.step.tolist()):
+            whole = range(*bound.layout.outputs[index].tolist()) if op == Op.GET else range(0)
+            slots = needed.get(row, list(whole))
+            if len(slots) == len(whole) and shown.isdisjoint(slots):
+                continue
+            spans = []
+            for some in ([s for s in slots if s not in shown], [s for s in slots if s in shown]):
+                first = len(calls)
+                calls += self._some(index, some)
+                spans.append((first, len(calls)))
+            found[row] = made.Fetched(*spans)
+        return found
+
+    def _some(self, index: int, slots: Sequence[int]) -> list[structures.Call]:
+        """Calls that fetch these outputs of an instance, and what must be fetched with them."""
+        instance, block = self._instances[index], self._bound.outputs[index]
+        base = int(self._bound.layout.outputs[index, 0])
+        own, found = [slot - base for slot in slots], []
+        for part in block.parts:
+            call = self._call(Op.GET, instance, block, part, base)
+            if call.slots or part.references.size != part.buffer.size:
+                taken = [call] if own else []
+            else:
+                taken = []
+                for begin, end in made.stretches(own):
+                    some = structures.Call.from_buffer_copy(call)
+                    some.references = self._references(part.references[begin:end])
+                    some.buffer = part.buffer[begin:end].ctypes.data
+                    some.n_references = some.n_values = end - begin
+                    taken.append(some)
+            found += taken
+            self._parts += [(Op.GET, instance, part)] * len(taken)
         return found
 
     def _derivatives(self, derivatives: InputDerivatives) -> dict[tuple[int, int], tuple[int, int]]:
@@ -382,6 +398,10 @@ class Kernel:
     def _enter(self) -> None:
         if self._bound.witness is not None:
             self._bound.witness.enter()
+
+    def sparse(self, sparse: bool) -> None:
+        """Whether what is only recorded is fetched but where it is: nobody looks in between."""
+        self.run.sparse = int(sparse)
 
     def restart(self) -> None:
         """Begin again at the first communication point."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +37,19 @@ class Code(IntEnum):
     WATCHED2 = 17
     WATCHED3 = 18
     MOVE = 19
+    UNSEEN = 20
 
 
 _STEPS = {2: Code.STEP2, 3: Code.STEP3}
 _WATCHED = {2: Code.WATCHED2, 3: Code.WATCHED3}
 """By FMI version."""
+
+
+class Fetched(NamedTuple):
+    """Numbers of calls, first and behind the last: of every step, and of what is only recorded."""
+
+    always: tuple[int, int]
+    shown: tuple[int, int]
 
 
 def instructions(
@@ -50,7 +59,7 @@ def instructions(
     calls: Sequence[structures.Call],
     instances: Sequence[Instance],
     told: Mapping[tuple[int, int], tuple[int, int]],
-    fewer: Mapping[int, tuple[int, int]] | None = None,
+    fewer: Mapping[int, Fetched] | None = None,
 ) -> list[tuple[int, int, int]]:
     """The operations of these rows, in order; neighbours of one kind become one.
 
@@ -64,9 +73,10 @@ def instructions(
         fewer: per row other calls than those of `spans`.
     """
     found: list[tuple[int, int, int]] = []
+    alone = 0  # up to here operations are not joined: an UNSEEN counts them
 
     def add(code: Code, first: int, last: int) -> None:
-        if found and found[-1][0] == code and found[-1][2] == first:
+        if len(found) > alone and found[-1][0] == code and found[-1][2] == first:
             found[-1] = (code, found[-1][1], last)
         else:
             found.append((code, first, last))
@@ -98,11 +108,19 @@ def instructions(
             kind = 2 * instances[a].watched + (instances[a].binding.version == 3)
             found.append((Code.SUBSTEP, a, 4 * b + kind))
         elif op in (Op.SET, Op.GET):
-            for index in range(*(fewer or {}).get(number, spans[op, a])):
-                code = Code.CALL2 if calls[index].version == 2 else Code.CALL3
-                if calls[index].slots:
-                    code = Code.CONVERT_SET if op is Op.SET else Code.CONVERT_GET
-                add(code, index, index + 1)
+            always, shown = (fewer or {}).get(number, Fetched(spans[op, a], (0, 0)))
+            for some in (always, shown):
+                if some is shown and range(*some):
+                    found.append((Code.UNSEEN, 0, 0))
+                    alone = len(found)
+                for index in range(*some):
+                    code = Code.CALL2 if calls[index].version == 2 else Code.CALL3
+                    if calls[index].slots:
+                        code = Code.CONVERT_SET if op is Op.SET else Code.CONVERT_GET
+                    add(code, index, index + 1)
+            if range(*shown):
+                found[alone - 1] = (Code.UNSEEN, len(found) - alone, 0)
+                alone = len(found)
         else:
             found.append((Code[op.name], a, b))
     return found
@@ -155,6 +173,16 @@ def needed(plan: Plan) -> dict[int, list[int]]:
         elif op not in silent:  # a loop reads and fetches what it likes
             live.update(range(int(layout.outputs[-1, 1])))
     return found
+
+
+def shown(plan: Plan) -> set[int]:
+    """Slots of outputs that a recording shows, and that nothing else asks for."""
+    layout = plan.layout
+    outputs = set(range(int(layout.outputs[-1, 1])))
+    if plan.loops:  # a loop reads what it likes
+        return set()
+    asked = {*layout.copy_source.tolist(), *layout.bond_output.tolist()}
+    return outputs - asked - {mean.source for mean in plan.means}
 
 
 def stretches(slots: Sequence[int]) -> list[tuple[int, int]]:

@@ -7,7 +7,7 @@
 
 /* Operations; calls and steps are sorted by FMI version, and by whether numbers are converted. */
 enum { EXTERNAL, RECORD, COPY, SCALE, CALL2, CALL3, CONVERT_SET, CONVERT_GET, STEP2, STEP3, ENERGY,
-       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3, MOVE };
+       SOLVE, NOTE, EXTRAPOLATE, SUBSTEP, HOLD, SET_DERIVATIVES, WATCHED2, WATCHED3, MOVE, UNSEEN };
 /* beyond the statuses of FMI */
 enum { TERMINATED = 1000, NOT_FINITE, UNFIT, UNSETTLED, TOO_LONG, TOO_LARGE, REFUSED, EARLY };
 enum { OUTSIDE = 1001 }; /* why an update was refused, beside UNFIT and statuses of FMI */
@@ -130,6 +130,8 @@ typedef struct {
   int64_t carried;     /* nothing changes outputs between the end of a step and the next record */
   int64_t index;       /* communication step under way */
   int64_t next_record; /* the next one to be kept */
+  int64_t sparse;      /* nobody looks at what is only recorded but where it is its turn, and at `last` */
+  int64_t last;        /* up to where the present call goes */
   const Loop *loops;
   const Mean *means;
   double *history; /* n_means of the sources at the beginning of this step, then of the three before */
