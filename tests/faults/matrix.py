@@ -71,7 +71,10 @@ def _of(
 
 
 EVERY = ("create", "init", "set", "get", "step", "terminate", "free")
-EXIT = r"(ended the process with exit code {}, which an FMU must not|crashed \(signal SIGABRT\))"
+EXIT = (
+    r"(ended the process with exit code {}, which an FMU must not"
+    r"|crashed \(signal SIG(ABRT|SEGV)\))"
+)
 """In a fork of a process with threads, exit() may end in abort(): destructors wait for threads."""
 CRASH = r"crashed \(signal {}"
 FAULTS: tuple[Fault, ...] = (
