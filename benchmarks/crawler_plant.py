@@ -18,6 +18,7 @@ Vector = NDArray[np.float64]
 Motion = tuple[Vector, Vector, Vector]
 STEP = 5e-5
 SAMPLE = 0.02
+BLOCK = 4096  # steps whose commands are held at once
 COUNT = 2 * np.pi / 25600
 MASS, YAW_INERTIA, GRAVITY, LINEAR_BELOW = 15.0, 0.43, 9.81, 1e-3
 MARKERS = np.array([[0.0, 0.0], [0.19, 0.13], [0.19, -0.13], [-0.19, 0.13], [-0.19, -0.13]])
@@ -162,17 +163,12 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     fine = np.arange(steps + 1) * STEP
     left, right = speeds(fine, seconds)
 
-    def driven(values: Vector, ahead: Vector) -> list[Vector]:
-        """Speeds of one side: each column is a run, read ahead by what the encoder is late."""
-        shift = np.rint(ahead / STEP).astype(int)
-        index = np.repeat(np.arange(runs), count)
-        return [values, shift, index]
+    columns = np.repeat(np.arange(runs), count)
 
-    table_l, table_r = driven(left, ahead_l), driven(right, ahead_r)
-
-    def at(table: list[Vector], step: int) -> Vector:
-        values, shift, index = table
-        return np.asarray(values[np.minimum(step + shift, steps), index])
+    def driven(values: Vector, ahead: Vector, first: int) -> Vector:
+        """Speeds of one side, each column of a run, read ahead by what the encoder is late."""
+        rows = np.arange(first, first + BLOCK + 1)[:, None] + np.rint(ahead / STEP).astype(int)
+        return np.asarray(values[np.minimum(rows, steps), columns])
 
     x, y, yaw = starts[..., :3].reshape(runs * count, 3).T
     v_x, v_y, rate = np.zeros(runs * count), np.zeros(runs * count), np.zeros(runs * count)
@@ -180,56 +176,72 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     pulled_l = pulled_r = a_x = a_y = np.zeros(runs * count)
     every = round(SAMPLE / STEP)
     kept: list[Vector] = []
+    any_runout, any_slip, any_cable = np.any(runout), np.any(slip), np.any(pull)
+    any_shift, any_patch = np.any(slope) or np.any(height), np.any(patch)
+    any_fading, any_turning = np.any(fading), np.any(turning)
+    weight = mass * GRAVITY
+    to_x, to_y = push_x[0] + push_x[1], push_y[0] + push_y[1]
+    arm_x, arm_y, cable_x, cable_y = at_x - x_g, at_y - y_g, -0.19 - x_g, -y_g
+    track = np.empty((12, runs * count))
+    cos, sin = np.cos(yaw), np.sin(yaw)
     for step in range(steps + 1):
+        place = step % BLOCK
+        if place == 0:
+            block_l, block_r = driven(left, ahead_l, step), driven(right, ahead_r, step)
         if step % every == 0:
             kept.append(np.array([x, y, yaw]))
-        w_l, w_r = at(table_l, step), at(table_r, step)
+        w_l, w_r = block_l[place], block_r[place]
         t_l, t_r = r * left_radius * w_l, r * w_r
-        if np.any(runout):
+        if any_runout:
             t_l = t_l * (1.0 + runout * np.cos(angle_l + phase))
-        if np.any(slip):
+        if any_slip:
             t_l, t_r = t_l * (1.0 - slip * pulled_l), t_r * (1.0 - slip * pulled_r)
-        cos, sin = np.cos(yaw), np.sin(yaw)
         # velocity of the mass centre is the state, in floor axes; contacts in body axes
         f, s = v_x * cos + v_y * sin + rate * y_g, -v_x * sin + v_y * cos - rate * x_g
-        track = np.concatenate([np.tile(t_l, (6, 1)), np.tile(t_r, (6, 1))])
+        track[:6], track[6:] = t_l, t_r
         u = f - rate * at_y - track
         w = s + rate * at_x
         speed = np.sqrt(u * u + w * w)
         n = load
-        if np.any(slope) or np.any(height):  # what acts on the mass centre shifts the load
+        if any_shift:  # what acts on the mass centre shifts the load
             f_x = HEIGHT * push_x[0] / mass - height * a_x
             f_y = HEIGHT * push_y[0] / mass - height * a_y
             down = (f_x * cos + f_y * sin) / GRAVITY, (-f_x * sin + f_y * cos) / GRAVITY
-            n = np.maximum(loads(mass * GRAVITY, x_g + down[0], y_g + down[1], at_x, half), 0.0)
+            n = np.maximum(loads(weight, x_g + down[0], y_g + down[1], at_x, half), 0.0)
         m = grip
-        if np.any(fading):
+        if any_fading:
             m = m * (1.0 - fading * speed)
-        if np.any(patch):
+        if any_patch:
             there_x = x + at_x * cos - at_y * sin - 0.3
             there_y = y + at_x * sin + at_y * cos - 0.2
             m = m * (1.0 - patch * (there_x**2 + there_y**2 < 0.25))
         share = m * n / np.maximum(speed, LINEAR_BELOW)
         g_x, g_y = -share * u, -share * w * across
         pulled = g_x.reshape(2, 6, -1).sum(axis=1)
-        if np.any(slip):
+        if any_slip:
             held = (mu * load).reshape(2, 6, -1).sum(axis=1)
             pulled_l, pulled_r = pulled / held
         sum_x, sum_y = pulled.sum(axis=0), g_y.sum(axis=0)
-        torque = np.sum((at_x - x_g) * g_y - (at_y - y_g) * g_x, axis=0)
-        torque = torque - turning * np.tanh(rate / 0.02)
-        to_x, to_y = push_x[0] + push_x[1], push_y[0] + push_y[1]
-        arm = -0.19 - x_g, -y_g  # where the cable pulls
-        torque = torque + (arm[0] * (-push_x[1] * sin + push_y[1] * cos)
-                           - arm[1] * (push_x[1] * cos + push_y[1] * sin))  # fmt: skip
+        torque = np.sum(arm_x * g_y - arm_y * g_x, axis=0)
+        if any_turning:
+            torque = torque - turning * np.tanh(rate / 0.02)
+        if any_cable:
+            torque = torque + (cable_x * (-push_x[1] * sin + push_y[1] * cos)
+                               - cable_y * (push_x[1] * cos + push_y[1] * sin))  # fmt: skip
         a_x = (sum_x * cos - sum_y * sin + to_x) / mass
         a_y = (sum_x * sin + sum_y * cos + to_y) / mass
         before = v_x, v_y, rate
         v_x, v_y, rate = v_x + STEP * a_x, v_y + STEP * a_y, rate + STEP * torque / inertia
-        x, y, yaw = _moved((x, y, yaw), before, (v_x, v_y, rate), (x_g, y_g))
-        next_l, next_r = at(table_l, step + 1), at(table_r, step + 1)
-        angle_l = angle_l + 0.5 * STEP * (w_l + next_l)
-        angle_r = angle_r + 0.5 * STEP * (w_r + next_r)
+        # The pose of the body's origin from velocities of the mass centre at both ends of the step:
+        # its own alone is half a step early or late, and a lag of 25 us is a sixth of that of
+        # friction below the sliding speed LINEAR_BELOW, from which mu is known.
+        from_x, from_y = _origin(before, cos, sin, x_g, y_g)
+        yaw = yaw + 0.5 * STEP * (before[2] + rate)
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        till_x, till_y = _origin((v_x, v_y, rate), cos, sin, x_g, y_g)
+        x, y = x + 0.5 * STEP * (from_x + till_x), y + 0.5 * STEP * (from_y + till_y)
+        angle_l = angle_l + 0.5 * STEP * (w_l + block_l[place + 1])
+        angle_r = angle_r + 0.5 * STEP * (w_r + block_r[place + 1])
     poses = np.array(kept)  # (times, 3, runs x benches)
     seen = camera(poses, of("camera_skew"), late("camera_late"), SAMPLE)
     found = {}
@@ -248,21 +260,12 @@ def simulate(benches: list[Bench], seconds: float, starts: Vector) -> dict[str, 
     return found
 
 
-def _moved(pose: Motion, before: Motion, after: Motion, mass_at: tuple[Vector, Vector]) -> Motion:
-    """Pose of the body's origin after a step, from velocities of the mass centre at both its ends.
-
-    Their mean: a step's own velocity alone is half a step early or late, and a lag of 25 us is a
-    sixth of that of friction below the sliding speed `LINEAR_BELOW`, from which mu is known.
-    """
-    (x, y, yaw), (x_g, y_g) = pose, mass_at
-    turned = yaw + 0.5 * STEP * (before[2] + after[2])
-    moves = []
-    for (v_x, v_y, rate), angle in ((before, yaw), (after, turned)):
-        cos, sin = np.cos(angle), np.sin(angle)
-        # the origin of the body moves with its point
-        moves.append((v_x + rate * (x_g * sin + y_g * cos), v_y - rate * (x_g * cos - y_g * sin)))
-    (a_x, a_y), (b_x, b_y) = moves
-    return x + 0.5 * STEP * (a_x + b_x), y + 0.5 * STEP * (a_y + b_y), turned
+def _origin(
+    motion: Motion, cos: Vector, sin: Vector, x_g: Vector, y_g: Vector
+) -> tuple[Vector, Vector]:
+    """Velocity of the body's origin, which moves with its point."""
+    v_x, v_y, rate = motion
+    return v_x + rate * (x_g * sin + y_g * cos), v_y - rate * (x_g * cos - y_g * sin)
 
 
 def _starts(seed: int, benches: list[Bench]) -> Vector:
