@@ -22,6 +22,10 @@ Vector = NDArray[np.float64]
 FOLLOWED, SLIGHT = 20, 0.1
 """Steps of the others (Broyden's end in twice as many as there are directions, D. M. Gay 1979;
 jumps or bends blur ten at most), and the fall of the cost [nats] that ends them."""
+LOST, PATIENT = 80.0, 6
+"""Rise of the cost [nats] at which a parameter has gone astray, ten times the one at which it has
+gone far enough (`valley.SEEN`), and steps in a row that end it there if none has halved the rise:
+one that learns from its steps comes back within few, or not at all."""
 LONGER = 10.0
 """Multiple of a step that promises nothing: rounded derivatives claim to know, and then promise too
 little of, what hardly changes anything."""
@@ -90,6 +94,7 @@ def made_up(run: Point, slopes: Broyden, k: int, change: Vector) -> tuple[Vector
     residuals = run.simulator.residuals(theta, run.purpose)
     cost = run.total(theta, residuals)
     slopes.learn(theta - run.theta, run.residuals, residuals)
+    halved, idle = cost - run.cost, 0
     for _ in range(FOLLOWED):
         normal = slopes.normal(theta, residuals)
         step = undone(normal.matrix, normal.gradient, k)
@@ -100,7 +105,10 @@ def made_up(run: Point, slopes: Broyden, k: int, change: Vector) -> tuple[Vector
         if (after := run.total(there, moved)) < cost:
             last &= cost - after < SLIGHT
             theta, residuals, cost = there, moved, after
-        if last:
+        idle += 1
+        if cost - run.cost < max(0.5 * halved, LOST):
+            halved, idle = cost - run.cost, 0
+        if last or idle == PATIENT:
             break
     run.meet(theta, residuals, cost)
     return theta, cost - run.cost

@@ -15,7 +15,7 @@ from ..errors import FmuCallError
 from .broyden import Broyden
 from .descent import Descent
 from .felt import STUCK
-from .making_up import made_up, undone
+from .making_up import LOST, made_up, undone
 from .normal import KNOWN
 from .problem import Problem
 
@@ -24,10 +24,9 @@ HEAVY = 0.3
 """Weight in a weak direction from which a parameter is moved by itself."""
 FAR = 1.0
 """Spans by which that is done at most."""
-CLAIMED, SURE, SEEN, LOST = 4.0, 0.5, 8.0, 80.0
+CLAIMED, SURE, SEEN = 4.0, 0.5, 8.0
 """Standard deviations by which it is done first, the share of the information claimed that settles
-it, and rises of the cost [nats] at which it has gone far enough, and at which it has gone astray.
-"""
+it, and the rise of the cost [nats] at which it has gone far enough."""
 SHARED = 0.1
 """Share of a step [spans] from which a parameter takes part in it."""
 
