@@ -16,6 +16,7 @@ from .gaps import check_gaps
 from .jumps import check_jumps
 from .lags import check_lags
 from .late import check_late
+from .prior import check_priors
 from .scale import check_scale
 from .smooth import check_smooth, check_stated
 from .spiking import check_commands, check_spikes
@@ -69,7 +70,7 @@ def check_data(problem: Problem) -> list[Finding]:
 
 def check_fit(estimate: Estimate) -> list[Finding]:
     """Problems that show in what a fit leaves; errors that the mapping allows are warnings."""
-    found = [*check_late(estimate), *check_stated(estimate)]
+    found = [*check_late(estimate), *check_stated(estimate), *check_priors(estimate)]
     return passed(found, estimate.problem.source.allow)
 
 

@@ -29,6 +29,7 @@ KINDS = {
     "jump": "a column that goes on from another value",
     "mixed": "a column that two runs have in common",
     "noise": "a column with more noise than it is said to have, or with far less",
+    "prior": "a parameter far from what its prior says",
     "purpose": "no run for a purpose",
     "rate": "a clock that runs fast or slow",
     "reading": "what was assumed in reading",
