@@ -299,7 +299,10 @@ class Bench:
             return group
 
         self.spread(pursued, by_problem(begun))
-        self.failed = {t.probe.candidate.label: t.error for t in begun if t.best is None}
+        # without an error nothing of it is asked for: the residual wants less than `floor`
+        self.failed = {
+            t.probe.candidate.label: t.error for t in begun if t.error and t.best is None
+        }
         return [t.best for t in begun if t.best is not None]
 
     def _hopeful(self, trials: Trials, least: float) -> bool:

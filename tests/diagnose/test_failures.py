@@ -80,6 +80,22 @@ def test_candidates_that_cannot_be_simulated_in_all_runs_are_named(
     assert DRY not in {s.candidate.label for s in found.signatures}
 
 
+def test_what_nothing_is_asked_of_can_be_simulated(problem: Problem) -> None:
+    """Of a delay that was tried far too long less than a tick may be wanted: no failure."""
+    chosen = [c for c in candidates(problem) if c.label in (DRAG, DRY)]
+    search = Search(simulator(problem), only=chosen)
+    base = search.calibrated()
+    bench = search.bench(base, search.fitting)
+    trials = bench.begun(chosen)
+    search.close()
+    assert len(trials) == 2
+    for one in trials:
+        one.best, one.going = None, False
+        one.error = "run stopped" * (one.probe.candidate.label == DRAG)
+    assert bench.followed(trials) == []
+    assert bench.failed == {DRAG: "run stopped"}
+
+
 def test_a_model_that_is_unstable_around_nominal_values_ends_nothing(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
