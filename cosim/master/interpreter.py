@@ -68,6 +68,8 @@ class Interpreter:
         history, past: of extrapolated inputs, newest first, and how many values it has before the
             first step.
         derivatives: derivatives of the inputs that move within a step.
+        sparse: nobody looks at what is only recorded but where it is, and where a call ends; the
+            compiled executor fetches it there only.
         bond_mean: per term of the bonds the mean of its input, -1 where it does not move.
     """
 
@@ -123,7 +125,7 @@ class Interpreter:
         self.held = np.zeros(len(self.layout.bond_input))
         moving = {mean.target: i for i, mean in enumerate(self.plan.means) if mean.moving}
         self.bond_mean = [moving.get(slot, -1) for slot in self.layout.bond_input.tolist()]
-        self.started = False
+        self.started = self.sparse = False
         self._given: dict[int, Mapping[str, Any]] = {}
         self._assignments: dict[int, Assignment] = {}
 

@@ -104,12 +104,12 @@ class Session:
         try:
             self._execution = Execution(outline, self._stack)
             self._run = self._execution.run
+            # FMUs that count their work do not ask to end, for which a last row would be wanted
+            self._run.sparse = not any(i.watched for i in self._run.instances)
             self._stepper = self._execution.prepare()
             self._blocks = {name: self._block(name) for name in self.targets}
             counting = [i for i in self._run.instances if not i.watched]
             self._counters = [(i.function(WORK), i.address) for i in counting]
-            if isinstance(self._stepper, Compiled):  # FMUs that count do not ask to end in between
-                self._stepper.kernel.sparse(len(counting) == len(self._run.instances))
         except BaseException:
             self._stack.close()
             raise

@@ -223,6 +223,7 @@ class Kernel:
             bond_turnover=self._array(bound.bond_turnover),
             n_terms=len(layout.bond_output),
             final=programs is None,
+            sparse=bound.sparse,
             carried=made.carried(plan),
         )  # fmt: skip
         if bound.witness is not None:
@@ -278,7 +279,7 @@ class Kernel:
         """
         bound, found = self._bound, {}
         plan, needed = bound.plan, made.needed(bound.plan)
-        shown = made.shown(plan) if bound.every > 1 else set()
+        shown = made.shown(plan) if bound.sparse and bound.every > 1 else set()
         for row, (op, index, _) in enumerate(plan.step.tolist()):
             whole = range(*bound.layout.outputs[index].tolist()) if op == Op.GET else range(0)
             slots = needed.get(row, list(whole))
@@ -398,10 +399,6 @@ class Kernel:
     def _enter(self) -> None:
         if self._bound.witness is not None:
             self._bound.witness.enter()
-
-    def sparse(self, sparse: bool) -> None:
-        """Whether what is only recorded is fetched but where it is: nobody looks in between."""
-        self.run.sparse = int(sparse)
 
     def restart(self) -> None:
         """Begin again at the first communication point."""
