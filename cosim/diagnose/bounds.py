@@ -36,9 +36,9 @@ def opened(fitter: Fitter, declared: Fitted) -> Fitted | None:
     wider = [_opened(p, ended(p, declared)) for p in problem.parameters]
     if wider == list(problem.parameters):
         return None
-    known = fitter.simulator.of(problem.with_parameters(wider))
+    near = fitter.simulator.of(problem.with_parameters(wider))
     try:
-        found = fit(known, declared.estimate.theta, effort=DRAFT)
+        found = fit(near, declared.estimate.theta, effort=DRAFT)
         if is_open(found):  # no rival, and errors of the exchange are small beside what it lacks
             return fitter.judged(found)
         for effort in (DRAFT, CORRECTION):

@@ -279,14 +279,14 @@ class Kernel:
         """
         bound, found = self._bound, {}
         plan, needed = bound.plan, made.needed(bound.plan)
-        shown = made.shown(plan) if bound.sparse and bound.every > 1 else set()
+        beside = made.only_recorded(plan) if bound.sparse and bound.every > 1 else set()
         for row, (op, index, _) in enumerate(plan.step.tolist()):
             whole = range(*bound.layout.outputs[index].tolist()) if op == Op.GET else range(0)
             slots = needed.get(row, list(whole))
-            if len(slots) == len(whole) and shown.isdisjoint(slots):
+            if len(slots) == len(whole) and beside.isdisjoint(slots):
                 continue
             spans = []
-            for some in ([s for s in slots if s not in shown], [s for s in slots if s in shown]):
+            for some in ([s for s in slots if s not in beside], [s for s in slots if s in beside]):
                 first = len(calls)
                 calls += self._some(index, some)
                 spans.append((first, len(calls)))

@@ -49,7 +49,7 @@ class Fetched(NamedTuple):
     """Numbers of calls, first and behind the last: of every step, and of what is only recorded."""
 
     always: tuple[int, int]
-    shown: tuple[int, int]
+    only_recorded: tuple[int, int] = (0, 0)
 
 
 def instructions(
@@ -81,6 +81,13 @@ def instructions(
         else:
             found.append((code, first, last))
 
+    def called(op: Op, span: tuple[int, int]) -> None:
+        for index in range(*span):
+            code = Code.CALL2 if calls[index].version == 2 else Code.CALL3
+            if calls[index].slots:
+                code = Code.CONVERT_SET if op is Op.SET else Code.CONVERT_GET
+            add(code, index, index + 1)
+
     layout = plan.layout
 
     def extrapolated(number: int) -> set[int]:
@@ -108,17 +115,12 @@ def instructions(
             kind = 2 * instances[a].watched + (instances[a].binding.version == 3)
             found.append((Code.SUBSTEP, a, 4 * b + kind))
         elif op in (Op.SET, Op.GET):
-            always, shown = (fewer or {}).get(number, Fetched(spans[op, a], (0, 0)))
-            for some in (always, shown):
-                if some is shown and range(*some):
-                    found.append((Code.UNSEEN, 0, 0))
-                    alone = len(found)
-                for index in range(*some):
-                    code = Code.CALL2 if calls[index].version == 2 else Code.CALL3
-                    if calls[index].slots:
-                        code = Code.CONVERT_SET if op is Op.SET else Code.CONVERT_GET
-                    add(code, index, index + 1)
-            if range(*shown):
+            always, only_recorded = (fewer or {}).get(number, Fetched(spans[op, a]))
+            called(op, always)
+            if range(*only_recorded):
+                found.append((Code.UNSEEN, 0, 0))
+                alone = len(found)
+                called(op, only_recorded)
                 found[alone - 1] = (Code.UNSEEN, len(found) - alone, 0)
                 alone = len(found)
         else:
@@ -175,7 +177,7 @@ def needed(plan: Plan) -> dict[int, list[int]]:
     return found
 
 
-def shown(plan: Plan) -> set[int]:
+def only_recorded(plan: Plan) -> set[int]:
     """Slots of outputs that a recording shows, and that nothing else asks for."""
     layout = plan.layout
     outputs = set(range(int(layout.outputs[-1, 1])))
