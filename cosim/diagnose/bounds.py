@@ -6,14 +6,16 @@ the declared model that may go on beyond it is a rival of every set of laws.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from ..calibrate.deferred import corrected
 from ..calibrate.fit import CORRECTION, DRAFT, fit
 from ..calibrate.parts import Parameter
+from ..calibrate.problem import Problem
 from ..display.html import unit as shown_unit
-from ..errors import CosimError
+from ..errors import CosimError, UnknownNameError
 from .facts import Value
 from .fitter import Fitter
 from .models import Fitted, is_open
@@ -33,7 +35,7 @@ def opened(fitter: Fitter, declared: Fitted) -> Fitted | None:
         declared: the fit within the bounds.
     """
     raw, problem = fitter.raw, declared.problem
-    wider = [_opened(p, ended(p, declared)) for p in problem.parameters]
+    wider = [_opened(p, ended(p, declared), problem) for p in problem.parameters]
     if wider == list(problem.parameters):
         return None
     near = fitter.simulator.of(problem.with_parameters(wider))
@@ -67,7 +69,8 @@ def beyond(declared: Fitted, found: Fitted) -> tuple[Value, ...]:
             p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]),
             float(estimate.high[i]), p.minimum, p.maximum, bool(estimate.identifiable[i]),
         )
-        for p in declared.problem.parameters if _opened(p, ended(p, declared)) != p
+        for p in declared.problem.parameters
+        if _opened(p, ended(p, declared), declared.problem) != p
         for i in [found.problem.index(p.name)]
     )  # fmt: skip
 
@@ -93,13 +96,28 @@ def told(before: Fitted, after: Fitted) -> Iterable[str]:
         )
 
 
-def _opened(parameter: Parameter, key: str) -> Parameter:
-    """A parameter with more room at one of its bounds, steps as before."""
+def _opened(parameter: Parameter, key: str, problem: Problem) -> Parameter:
+    """A parameter with more room at one of its bounds, as far as FMUs take it; steps as before."""
     low, high = parameter.minimum, parameter.maximum
     if key == "max":
-        high *= ROOM if high > 0.0 else 1.0 / ROOM
+        farther = high * (ROOM if high > 0.0 else 1.0 / ROOM)
+        high = max(high, min([farther, *(top for _, top in _taken(parameter, problem))]))
     elif key == "min":
-        low *= ROOM if low < 0.0 else 1.0 / ROOM
+        farther = low * (ROOM if low < 0.0 else 1.0 / ROOM)
+        low = min(low, max([farther, *(bottom for bottom, _ in _taken(parameter, problem))]))
     if (low, high) == (parameter.minimum, parameter.maximum):
         return parameter
     return replace(parameter, minimum=low, maximum=high, span=parameter.scale)
+
+
+def _taken(parameter: Parameter, problem: Problem) -> Iterator[tuple[float, float]]:
+    """Between which values of a declared parameter what it sets is within the FMUs' bounds."""
+    for name, factor in parameter.targets:
+        try:
+            _, variables = problem.system().variables(name)
+        except UnknownNameError:  # an error of the log, which no FMU bounds
+            continue
+        for variable in variables:
+            low = -math.inf if variable.minimum is None else variable.minimum
+            high = math.inf if variable.maximum is None else variable.maximum
+            yield min(low / factor, high / factor), max(low / factor, high / factor)

@@ -51,3 +51,36 @@ def test_a_bound_in_the_wrong_place_is_told_and_no_law_named_for_it(
     assert all("no worse with J beyond its bound" in hint["why"][0] for hint in found["hints"])
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Look at the bounds" in page
+
+
+@pytest.mark.slow
+def test_a_bound_is_opened_as_far_as_the_fmu_takes_it(tmp_path: Path) -> None:
+    """An efficiency of 1 whose mapping ends at 0.9: ten times that is no efficiency."""
+    folder = disc.write(tmp_path, lambda w, theta, t: 0.0, names=FEW)
+    mapping = folder / "dataset.toml"
+    text = mapping.read_text(encoding="utf-8").replace('"load.tau"', '"gear.tau_a"')
+    fixed, _, drag = text.partition('[[parameter]]\nname = "J"')[2].partition("[[parameter]]")
+    assert 'targets = "load.J"' in fixed
+    mapping.write_text(
+        text.partition("[columns]")[0]
+        + f'[parameters]\n"load.J" = {disc.J}\n"gear.ratio" = 1.0\n"gear.J_a" = 0.0\n\n[columns]'
+        + text.partition("[columns]")[2].partition("[[parameter]]")[0]
+        + '[[parameter]]\nname = "eta"\nunit = "1"\nnominal = 0.8\nmin = 0.6\nmax = 0.9\n'
+        + 'targets = "gear.eta"\n\n[[parameter]]'
+        + drag,
+        encoding="utf-8",
+    )
+    (folder / "system.toml").write_text(
+        'description = "A disc behind a gear."\n'
+        'connections = ["gear.tau_b -> load.tau", "load.w -> gear.w_b",\n'
+        '  "gear.J_b -> load.J_added"]\n'
+        '[instances]\nload = "inertia/disc"\ngear = "gearbox/ratio"\n',
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    told = CliRunner().invoke(app, ["diagnose", str(folder), "--out", str(out)])
+    assert told.exit_code == 0, told.output
+    found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    assert found["verdict"] == "unexplained", found["reason"]
+    low, high = found["bounds_opened"]["eta"]["ci95"]
+    assert low <= 1.0 and high == 1.0
