@@ -62,6 +62,8 @@ this share within 0.5 m around (0.3, 0.2). belt_slip: a track is slower by this 
 times what it pulls over mu N. speed_friction: mu falls by this share per m/s of sliding.
 load_transfer: height of the mass centre [m] over which accelerations move the load.
 """
+CONTAINED = {"mass_shift_x": "payload", "mass_shift_y": "payload"}
+"""Law -> law that contains it: a payload elsewhere moves the mass centre as both do."""
 USUAL: dict[str, float] = {}
 WHOLE: tuple[str, ...] = ()
 SHAPES: dict[str, tuple[float, float]] = {

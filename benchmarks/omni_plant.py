@@ -77,6 +77,8 @@ scrub: the patch of wheel 1 resists turning on the floor by this length times it
 axis 3 sits this much further forward. saturation: drives lose this share of their torque at 10 A.
 soft_creep: c_y is less by this share at twice the mean load.
 """
+CONTAINED = {"mass_shift": "payload"}
+"""Law -> law that contains it: a payload elsewhere moves the mass centre as both do."""
 USUAL: dict[str, float] = {}
 SHAPES: dict[str, tuple[float, float]] = {
     "command_late": (0.25, 8.0), "camera_late": (0.25, 8.0), "mass_shift": (-np.pi, np.pi),

@@ -150,6 +150,7 @@ def judged(
     named = [e["effect"] for e in table["effects"]]
     same = {label.partition(" at ")[0] for e in table["effects"][:1] for label in e["other_places"]}
     rivals = [e.partition(" at ")[0] for a in table["alternatives"] for e in a["effects"][-1:]]
+    others = [_exchanged(named, a) for a in table["alternatives"]]
     covered, away = {}, {}
     for name, entry in table["parameters"].items():
         last = entry.get("after") or entry["before"]
@@ -166,12 +167,20 @@ def judged(
         "truth": effect, "size": size, "verdict": table["verdict"], "named": named,
         "left": round(max(sizes), 3) if sizes else None,
         "right": bool(named) and bool(set(names) & {named[0], *same}),
-        "rival": bool(set(names) & {*named[:1], *rivals}), "covered": covered,
+        "rival": bool(set(names) & {*named[:1], *rivals}), "others": others, "covered": covered,
         "half_intervals_off": away,
         "place": first.label if first else "",
         "placed": (first.instance, first.port) in fits if first and fits else None,
         "wall_s": table["wall_s"],
     }  # fmt: skip
+
+
+def _exchanged(named: list[str], alternative: dict[str, Any]) -> list[str]:
+    """Effects of a set that does as well as the one that is named."""
+    found = list(named)
+    for label in alternative["instead_of"]:
+        found.remove(label.partition(" at ")[0])
+    return found + [label.partition(" at ")[0] for label in alternative["effects"]]
 
 
 def judged_several(
@@ -181,10 +190,14 @@ def judged_several(
     visible = {law.name for law, size in zip(bench.laws, sizes, strict=True) if size >= MATERIAL}
     within = getattr(plant, "CONTAINED", {})
     wanted = [set(plant.EFFECTS[name][1]) for name in visible if within.get(name) not in visible]
-    named = row["named"]
-    right = len(named) == len(wanted) and all(names & set(named) for names in wanted)
+
+    def all_of(named: list[str]) -> bool:
+        return len(named) == len(wanted) and all(names & set(named) for names in wanted)
+
+    right = all_of(row["named"])
     return {
-        **row, "truth": SEVERAL[len(bench.laws)], "right": right, "rival": right,
+        **row, "truth": SEVERAL[len(bench.laws)], "right": right,
+        "rival": right or any(all_of(named) for named in row["others"]),
         "laws": [[law.name, law.size, law.shape] for law in bench.laws], "sizes": sizes,
         "shown": max(sizes),
     }  # fmt: skip
