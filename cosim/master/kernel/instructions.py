@@ -118,10 +118,11 @@ def instructions(
             always, only_recorded = (fewer or {}).get(number, Fetched(spans[op, a]))
             called(op, always)
             if range(*only_recorded):
-                found.append((Code.UNSEEN, 0, 0))
+                later = int(Op.RECORD not in rows[number:, 0])  # by the next step
+                found.append((Code.UNSEEN, 0, later))
                 alone = len(found)
                 called(op, only_recorded)
-                found[alone - 1] = (Code.UNSEEN, len(found) - alone, 0)
+                found[alone - 1] = (Code.UNSEEN, len(found) - alone, later)
                 alone = len(found)
         else:
             found.append((Code[op.name], a, b))

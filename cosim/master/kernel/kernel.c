@@ -341,7 +341,7 @@ moved:
   move(run, in->first, in->last);
   NEXT;
 unseen:
-  if (run->index + 1 != run->next_record && run->index + 1 != run->last) in += in->first;
+  if (run->index + in->last != run->next_record && run->index + 1 != run->last) in += in->first;
   NEXT;
 substepped:
   member = substep(run, members + in->first, in->last, &status);
