@@ -21,7 +21,8 @@ from .problem import Problem
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
-"""Weight in a weak direction from which a parameter is moved by itself."""
+"""Weight in a weak direction, or in what is left of it beside those that were moved, from which a
+parameter is moved by itself."""
 FAR = 1.0
 """Spans by which that is done at most."""
 CLAIMED, SURE, SEEN = 4.0, 0.5, 8.0
@@ -37,7 +38,8 @@ def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
     Several weak directions at once are mixed by rounded derivatives, and none of them is then the
     one along which nothing changes; a parameter that is held elsewhere finds it. It is moved by
     what its interval allows, and twice as far, as long as that costs less than it should: each
-    stretch of such a valley shows better where it goes on.
+    stretch of such a valley shows better where it goes on. What has been moved far enough by others
+    that were found as well known as claimed is not moved again.
 
     Args:
         run: at its minimum.
@@ -48,20 +50,31 @@ def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
     common = np.array([not item.run for item in run.problem.parameters])
     silent = run.drawn & (np.diag(covariance) > KNOWN**2)
     moved = np.flatnonzero((np.any(np.abs(weak) > HEAVY, axis=1) & common) | silent)
+    asked: list[int] = []
     for k in sorted(moved.tolist(), key=lambda k: -covariance[k, k]):
         claimed = math.sqrt(covariance[k, k])
         if silent[k]:  # open up to the bound, which is two deviations away
             told, way = (2.0 / _room(run, k)[1]) ** 2, covariance[:, k] / covariance[k, k]
-        elif claimed > KNOWN:
+        elif claimed > KNOWN or _beside(covariance, asked, k) < HEAVY:
             continue
         elif (found := _followed(run, k, claimed)) is not None:
             told, way = found
         else:
+            asked.append(k)
             continue
         more = 1.0 / told - covariance[k, k]
         if more > 0.0:
             covariance += more * np.outer(way, way)
     return covariance
+
+
+def _beside(covariance: Vector, asked: list[int], k: int) -> float:
+    """Share of a parameter's deviation that is left where others are held."""
+    if not asked:
+        return 1.0
+    across = covariance[k, asked]
+    with_them = float(across @ np.linalg.pinv(covariance[np.ix_(asked, asked)]) @ across)
+    return math.sqrt(max(1.0 - with_them / covariance[k, k], 0.0))
 
 
 def _room(run: Descent, k: int) -> tuple[float, float]:
