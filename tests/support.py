@@ -65,7 +65,9 @@ class Stepper:
         self.periods = np.asarray(self.oracle.functions.periods(self.p)).ravel()
         if not np.all(self.periods > 0):
             raise ValueError(f"clock periods {self.periods} must be positive")
-        self._tick = np.ceil(start / self.periods - EARLY)
+        self._once = np.isinf(self.periods)  # clocks that tick at the start alone
+        self._start = start
+        self._tick = np.where(self._once, 0.0, np.ceil(start / self.periods - EARLY))
 
     def _build_rk4(self) -> ca.Function:
         f = self.oracle.functions.derivatives
@@ -79,16 +81,25 @@ class Stepper:
 
     def _run_ticks(self) -> None:
         """Execute the clocks that are due."""
-        for k, period in enumerate(self.periods):
-            if self._tick[k] * period <= self.t + EARLY * period:
+        for k, late in enumerate(self._early()):
+            if self._times()[k] <= self.t + late:
                 update = self.oracle.functions.updates[k]
                 self.z = np.asarray(update(self.t, self.x, self.z, self.u, self.p)).ravel()
                 self._tick[k] += 1
 
     def _next_tick(self, end: float) -> float:
         """Time of the next tick that lies clearly before `end`, else `end`."""
-        times = self._tick * self.periods
-        return min([end, *times[times < end - EARLY * self.periods]])
+        times = self._times()
+        return min([end, *times[times < end - self._early()]])
+
+    def _times(self) -> np.ndarray:
+        """Of the next tick of each clock."""
+        ticks = np.where(self._once, 0.0, self._tick) * np.where(self._once, 1.0, self.periods)
+        return np.where(self._once, np.where(self._tick > 0, math.inf, self._start), ticks)
+
+    def _early(self) -> np.ndarray:
+        """By how much a tick may come before its time."""
+        return np.where(self._once, 0.0, EARLY * np.where(self._once, 1.0, self.periods))
 
     def _integrate(self, end: float) -> None:
         if self.x.size and end > self.t:

@@ -115,6 +115,8 @@ def check_values(where: str, variables: Sequence[Variable], value: Any) -> list[
 
 def _flat(where: str, name: str, first: Variable, count: int, value: Any) -> list[Any]:
     """The values one by one."""
+    if isinstance(value, np.ndarray) and not value.ndim:
+        value = value.item()
     if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, (str, bytes)):
         return [value] * count
     items = value.tolist() if isinstance(value, np.ndarray) else list(value)

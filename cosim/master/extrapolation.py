@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import need_table
+from ..arguments import need_table, need_whole
 from ..errors import UnknownNameError, ValueRangeError, listing
 from ..fmu.description import Description, Variable
 from ..system.system import System
@@ -51,7 +51,8 @@ def means(
         stepped: instances in the order in which they step, None if they step side by side.
         inner: instances whose inputs do not move and that go several inner steps instead.
     """
-    if order not in (0, 1, 2) or isinstance(order, bool):
+    need_whole("the order of extrapolation", order)
+    if order not in (0, 1, 2):
         raise ValueRangeError(f"extrapolation of order {order!r}: must be 0, 1 or 2")
     position = {name: index for index, name in enumerate(layout.instances)}
     parts = inner or {}

@@ -85,6 +85,7 @@ class Master:
         )
         need_text("the algorithm of a Master", self.algorithm, way)
         need_number("the communication step of a Master", self.step, "give it in seconds")
+        object.__setattr__(self, "step", float(self.step))  # of a fraction, too
         for what, value in (("tolerance", self.tolerance), ("time limit isolate", self.isolate)):
             if value is not None:
                 need_number(f"the {what} of a Master", value)

@@ -14,6 +14,7 @@ from ..data.recording import Recording
 from ..data.signals import Signal
 from ..spec import distribution
 from ..spec.units import usual
+from ..system.inputs import overruled
 from ..system.system import System
 from .invented import invented
 from .plan import Plan
@@ -169,14 +170,14 @@ class Outline:
             bond_turnover=dict(turnover),
             error=error,
             objects=carried,
-            notes=tuple(
-                dict.fromkeys([*notes, *self._unchecked(), *invented(bond_energy, turnover)])
-            ),
+            notes=tuple(dict.fromkeys([*notes, *self._notes(), *invented(bond_energy, turnover)])),
         )
 
-    def _unchecked(self) -> list[str]:
-        """Notes on inputs that are driven in a unit where the FMU declares none."""
-        return [
+    def _notes(self) -> list[str]:
+        """On values that nothing asks for, and units that nothing checks."""
+        given = (f"{m.name}.{key}" for m in self.system.members.values() for key in m.parameters)
+        idle = [overruled(self.system, name, self.signals) for name in given]
+        return [note for note in idle if note] + [
             f"input {name} takes {signal.text} as it is: it is in {signal.unit!r}, and the FMU "
             "declares no unit that could be converted into"
             for name, signal in self.signals.items()

@@ -21,8 +21,16 @@ from numpy.typing import NDArray
 
 from ..arguments import need_number, need_table, need_texts, wrong
 from ..data.recording import Recording
-from ..data.signals import Shifted, Signal
-from ..errors import AlgebraicLoopError, EndRequest, FmuCallError, GraphError, ValueRangeError
+from ..data.signals import Shifted, Signal, as_signal
+from ..errors import (
+    AlgebraicLoopError,
+    EndRequest,
+    FmuCallError,
+    GraphError,
+    UnknownNameError,
+    ValueRangeError,
+    listing,
+)
 from ..fmu.exchange import Block
 from ..fmu.library import WORK
 from ..fmu.values import check_values
@@ -232,6 +240,7 @@ class Session:
             later: driven input, as the run has it -> by how much [s], negative for earlier; those
                 that are not named come in time.
         """
+        need_table("what comes later", later, '{"motor.w_ref": 0.01}')
         wanted = {name: value for name, value in later.items() if value}
         if wanted == self._later:
             return
@@ -247,6 +256,7 @@ class Session:
             later: inputs that come later than what drives them says, as of `shift`.
 
         Raises:
+            UnknownNameError: it is no input that the session drives.
             GraphError: the session shares its inputs with others.
         """
         outline = self._execution.outline
@@ -255,8 +265,18 @@ class Session:
                 "this session shares its inputs with others and can't be driven; make one without "
                 "like="
             )
-        driving = {**outline.signals, **signals}
+        driving = dict(outline.signals)
+        for name in {**signals, **(later or {})}:
+            if name not in driving:
+                raise UnknownNameError(
+                    f"this session does not drive {name!r}, so nothing can be put in the place of "
+                    f"its signal; {listing(driving, name)}"
+                )
+        driving.update({name: as_signal(signal) for name, signal in signals.items()})
         for name, value in (later or {}).items():
+            need_number(f"how late {name} comes", value, "give it in seconds")
+            if not math.isfinite(value):
+                raise ValueRangeError(f"{name} cannot come {value} s later")
             driving[name] = Shifted(driving[name], value, outline.step)
         outline.driven.update(signals, later or {})
         self._run.external[:] = self.master.tabulate(driving, outline.times)

@@ -24,6 +24,7 @@ from ..running.preparation import adjusted
 from ..running.runner import Prepared, find_runs, prepare
 from ..scenario.scenario import Scenario
 from ..spec import distribution
+from ..system.inputs import overruled, spread
 from ..system.provider import Provider
 from .definition import Study
 from .design import Point, points, reference_of
@@ -317,6 +318,8 @@ def _keys(
                     notes.append(f"{name} is left out: {reference} has none")
                     continue
                 system.set(name, value)
+                if note := overruled(system, name, spread(system, prepared.scenario.inputs)):
+                    notes.append(note)
                 present.add(name)
                 kept[name] = value
             keys[index] = _hash({"group": group.digest, "parameters": _plain(kept)})

@@ -27,6 +27,24 @@ Driver = (
 """What drives an input; a sequence has one driver per element of a vector input."""
 
 
+def overruled(system: System, name: str, signals: Mapping[str, Signal]) -> str:
+    """A note on a variable that has been set, and that something drives; "" if nothing does.
+
+    Args:
+        system: in which it is.
+        name: of the variable.
+        signals: that drive inputs of the system, by full scalar name.
+    """
+    for element in system.elements(name):
+        source = system.driver(element) or (element in signals and signals[element].text)
+        if source:
+            return (
+                f"{name} is set, but driven by {source}: what is set counts at most where the "
+                "initialization begins"
+            )
+    return ""
+
+
 def spread(system: System, inputs: Mapping[str, Driver]) -> dict[str, Signal]:
     """Signals by full scalar name.
 

@@ -265,12 +265,18 @@ class System:
             UnknownNameError: with the nearest names.
         """
         instance, dot, variable = name.partition(".")
-        if instance not in self.members or not dot:
+        if instance not in self.members:
             raise UnknownNameError(
                 f"{self.name}: there is no instance {instance!r} (in {name!r}); "
                 f"{listing(self.members, instance)}"
             )
         member = self.members[instance]
+        if not dot:
+            known = [f"{name}.{item}" for item in member.description.variables]
+            raise UnknownNameError(
+                f"{self.name}: {name!r} is an instance, not one of its variables; "
+                f"{listing(known, f'{name}.')}"
+            )
         try:
             return member, member.description.expand(variable)
         except UnknownNameError as error:

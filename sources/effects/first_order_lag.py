@@ -2,9 +2,8 @@
 
     t_lag y' = v - y
 
-It starts settled: the state is y less the signal's value at the first tick of a 1 s clock (at once
-if the run starts at t = 0). A lag that is short against the step of an explicit solver
-(t_lag < solver.step / 2.7) is unstable there; the signal components use an implicit one.
+It starts settled: the state is y less the signal's value at the start of the run. Where t_lag is
+shorter than two steps of a fixed step, the FMU controls its error.
 
 Not modelled: higher order.
 
@@ -17,7 +16,7 @@ import casadi as ca
 
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.history import NEVER
+from ..laws.history import ONCE
 from ..laws.signal_effect import in_unit, sized
 from ..quantity import Quantity
 
@@ -40,6 +39,7 @@ EFFECT = Effect(
     ("signal", "bundle", "pose", "point"),
     T_LAG,
     source="textbook",
+    stiff=True,
 )
 
 
@@ -49,7 +49,7 @@ def law(e: EffectModel) -> None:
     change = e.state(in_unit(e, sized(e, CHANGE)))
     origin = e.discrete(in_unit(e, sized(e, ORIGIN)))
     started = e.discrete(STARTED)
-    clock = e.clock("start", ca.if_else(t_lag > 0, 1.0, NEVER))
+    clock = e.clock("start", ONCE)
     e.update(clock, origin, ca.if_else(started > 0.5, origin, v))
     e.update(clock, started, ca.SX(1.0))
     y_dot = started * (v - origin - change) / ca.if_else(t_lag > 0, t_lag, 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import casadi as ca
@@ -11,8 +12,9 @@ from ..model import Model
 from ..quantity import Quantity
 
 SX = Any
-NEVER = 1e9
-"""Period [s] of a clock that has nothing to do: it ticks at the start and interrupts no solver."""
+NEVER, ONCE = 1e9, math.inf
+"""Periods [s] of clocks that interrupt no solver: one that has nothing to do, and one that ticks at
+the start of a run, whenever that is, and never again."""
 
 PERIOD = Quantity(
     "period",

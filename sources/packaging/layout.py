@@ -89,8 +89,13 @@ def owners(entries: list[Entry]) -> list[int]:
 
 
 def stiff(entries: list[Entry]) -> list[int]:
-    """Value references of the strengths of effects whose states are stiff."""
-    return [index for index, entry in enumerate(entries) if entry.stiff]
+    """Value references of the strengths of effects whose states are stiff, but for `lags`."""
+    return [k for k, entry in enumerate(entries) if entry.stiff and entry.quantity.unit != "s"]
+
+
+def lags(entries: list[Entry]) -> list[int]:
+    """Value references of strengths that are the time constant of their effect's state."""
+    return [k for k, entry in enumerate(entries) if entry.stiff and entry.quantity.unit == "s"]
 
 
 def layout(model: Model) -> list[Entry]:

@@ -23,7 +23,7 @@ from ..function import Functions
 from .c_code import Wanted, Writer
 from .cache import cache_folder, keep
 from .elimination import Block, eliminate
-from .layout import Entry, owners, stiff
+from .layout import Entry, lags, owners, stiff
 from .platforms import PLATFORMS
 
 C_SOURCES = Path(__file__).parent / "c"
@@ -94,6 +94,7 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         "NZ": counts["discrete"],
         "NC": len(functions.updates),
         "NSTIFF": len(stiff(entries)),
+        "NLAGS": len(lags(entries)),
         "NJ": len(functions.jacobian_pattern),
         "NLU": elimination.size,
         "NK": kept,
@@ -131,6 +132,7 @@ def model_source(functions: Functions, entries: list[Entry], identifier: str) ->
         + "};",
         f"static const int OWNER[] = {{{', '.join(map(str, [*owners(entries), 0]))}}};",
         f"static const int STIFF[] = {{{', '.join(map(str, [*stiff(entries), 0]))}}};",
+        f"static const int LAGS[] = {{{', '.join(map(str, [*lags(entries), 0]))}}};",
         f"static const double NOMINAL[] = {{{', '.join(map(_number, [*nominal, 1.0]))}}};",
     ]
     for name, some in (("QUICK", functions.quick_outputs), ("ASKED", functions.coupled_outputs)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import inspect
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +22,7 @@ from ..function import Functions
 from ..model import Model
 from . import c_functions, runtime
 from .elimination import Block, eliminate
-from .layout import Entry, owners, stiff
+from .layout import Entry, lags, owners, stiff
 
 _BINARY = {
     ca.OP_ADD: "{} + {}",
@@ -86,7 +87,7 @@ def function_source(function: ca.Function) -> str:
         operation = function.instruction_id(k)
         inputs, outputs = function.instruction_input(k), function.instruction_output(k)
         if operation == ca.OP_CONST:
-            lines.append(f"    a{outputs[0]} = {function.instruction_constant(k)!r}")
+            lines.append(f"    a{outputs[0]} = {_literal(function.instruction_constant(k))}")
         elif operation == ca.OP_INPUT:
             lines.append(f"    a{outputs[0]} = i{inputs[0]}[{inputs[1]}]")
         elif operation == ca.OP_OUTPUT:
@@ -101,6 +102,11 @@ def function_source(function: ca.Function) -> str:
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"
+
+
+def _literal(value: float) -> str:
+    names = {math.inf: "_math.inf", -math.inf: "-_math.inf"}
+    return "_math.nan" if math.isnan(value) else names.get(value, repr(value))
 
 
 def _below_the_line(module: ModuleType) -> str:
@@ -176,6 +182,7 @@ def equations_source(model: Model, functions: Functions, entries: list[Entry], n
         f"NOMINAL = {nominal!r}",
         f"OWNER = {owners(entries)!r}",
         f"STIFF = {stiff(entries)!r}",
+        f"LAGS = {lags(entries)!r}",
     ]
     factor = ["def f_factor(j, d, w):", *_lines(elimination.factor), "    return"]
     factor = [

@@ -24,6 +24,7 @@ FIXED: Any = None
 NOMINAL: Any = None
 OWNER: Any = None
 STIFF: Any = None
+LAGS: Any = None
 UPDATES: Any = None
 f_outputs: Any = None
 f_derivatives: Any = None
@@ -35,6 +36,8 @@ f_solve: Any = None
 
 # -- run time ---------------------------------------------------------------------------------
 SLACK = 1e-7  # part of its period by which a tick may be early
+SHORTEST = 1e-12  # step of a solver [s]
+FOLLOWED = 2.0  # steps of a time constant that fixed steps follow, see solvers.c
 EPSILON = 2.0**-52  # of doubles
 KEEP = 20  # steps with one Jacobian
 GAMMA = 0.435866521508459  # of ROS34PW2
@@ -44,7 +47,8 @@ TRIALS, TRIALS_PER_STEP = 2e5, 1e3  # over one stretch, and for each solver.step
 
 def _slack(period: float, time: float) -> float:
     """What a tick at a time may be early by."""
-    return SLACK * period + 4.0 * EPSILON * abs(time)
+    early = SLACK * period if period < _math.inf else 0.0
+    return early + 4.0 * EPSILON * abs(time)
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
@@ -90,7 +94,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                     f"{MODEL}: sample clock {k} has period {period:g} s; it must be positive"
                 )
             self.tick[k] = float(_math.ceil((self.v[0] - _slack(period, self.v[0])) / period))
-            self.next[k] = self.tick[k] * period
+            self.next[k] = self.tick[k] * period if period < _math.inf else self.v[0]
         self._refresh()
         self._check(self.IXD, NX)
         self._check(self.IY, NY)
@@ -236,11 +240,16 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- solvers ----------------------------------------------------------------------------------
 
+    def _stiff(self, step: float) -> bool:
+        v = self.v
+        lags = any(0.0 < v[i] < FOLLOWED * step for i in LAGS)
+        return lags or any(v[i] != 0.0 for i in STIFF)
+
     def _integrate(self, t1: float, length: float) -> None:
         v = self.v
         if NX:
             method, step = v[self.IS], v[self.IS + 1]
-            if method <= 2 and not any(v[i] != 0.0 for i in STIFF):
+            if method <= 2 and not self._stiff(min(length, step)):
                 t0 = v[0]
                 n = _math.ceil(length / step * (1 - 1e-9)) if length > step else 1
                 h = length / n
@@ -447,6 +456,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             factor = min(max(factor, SHRINK), GROW)
             if not last or error > 1 or hs * factor > h:
                 h = hs * factor
-            if h < 1e-12 * (1 + abs(t)):
+            if h < SHORTEST + 4.0 * EPSILON * abs(t):
                 raise ValueError(f"{MODEL}: the solver's step fell to {h:g} s at time {t:.9g} s")
         self.h = h

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,58 @@ def test_twin(system) -> None:
     text = "duration of a step must be a number, not '1'"
     with cosim.Twin(Master(system)) as twin, pytest.raises(InputError, match=text):
         twin.step("1")  # type: ignore[arg-type]
+
+
+def test_a_step_may_be_a_fraction(system) -> None:
+    found = Master(system, "jacobi", Fraction(1, 1000)).run(0.01, record=["load.w"])
+    assert found.time[-1] == 0.01
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "options", "text"),
+    [
+        (
+            "jacobi",
+            {"extrapolation": 1.0},
+            "order of extrapolation must be a whole number, not 1.0",
+        ),
+        ("iterated", {"interpolation": True}, "order of interpolation must be a whole number"),
+    ],
+)
+def test_orders_are_whole_numbers(system, algorithm, options, text) -> None:
+    with pytest.raises(InputError, match=text):
+        Master(system, algorithm, options=options).run(0.01)
+
+
+@pytest.mark.parametrize(
+    ("signals", "later", "text"),
+    [
+        ({"load.tua": 1.0}, None, "does not drive 'load.tua'.*did you mean 'load.tau'"),
+        ({"load.J_added": 1.0}, None, "does not drive 'load.J_added'.*did you mean 'load.tau'"),
+        ({"load.tau": [1.0]}, None, "what drives an input must be a signal"),
+        ({}, {"load.tau": float("nan")}, "load.tau cannot come nan s later"),
+        ({}, {"load.tau": "1"}, "how late load.tau comes must be a number"),
+    ],
+)
+def test_what_drives_a_session(system, signals, later, text) -> None:
+    master = Master(system, "jacobi", 1e-3)
+    with Session(master, 0.1, inputs={"load.tau": 0.0}, record=["load.w"]) as session:
+        with pytest.raises(InputError, match=text):
+            session.drive(signals, later)
+        session.drive({"load.tau": 0.16})  # a number is a signal, as for a run
+        assert session.run({"load.b": np.array(0.0)})[1][-1, 0] > 0.0
+
+
+def test_an_instance_is_no_variable(system) -> None:
+    with pytest.raises(InputError, match=r"'load' is an instance, not one of its var.*'load\.w'"):
+        Master(system).run(0.01, record=["load"])
+
+
+def test_what_is_set_and_driven_is_told() -> None:
+    """The twin: an open input that is set is driven by nothing."""
+    one = System("disc", default_provider())
+    one.add("load", "inertia/disc")
+    one.set("load.tau", 3.0)
+    (note,) = Master(one).run(0.01, inputs={"load.tau": 1.0}).notes
+    assert "load.tau is set, but driven by 1" in note
+    assert not Master(one).run(0.01).notes

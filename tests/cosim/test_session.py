@@ -48,7 +48,7 @@ def test_repetition_is_a_new_run(parts, executor) -> None:
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])
 @pytest.mark.parametrize("extrapolation", [0, 1, 2])
 def test_what_is_only_recorded_is_that_of_its_point(algorithm: str, extrapolation: int) -> None:
-    """Outputs that follow inputs at once may be fetched before a point is recorded, or behind it."""
+    """Outputs that follow inputs at once may be fetched before RECORD, or behind it."""
     system = System("drive", default_provider())
     variants = {
         "motor": "dc_motor/ideal", "gearbox": "gearbox/ratio", "load": "inertia/disc",

@@ -390,3 +390,16 @@ def test_no_permitted_parameter_makes_a_loss_a_gain(effect: str) -> None:
         shared = {k: v for k, v in point.items() if k in known}
         lost.append(with_effect.outputs(point)["P_loss"] - without.outputs(shared)["P_loss"])
     assert min(lost) > -1e-9 * max(lost) and max(lost) > 0.0  # rounding
+
+
+@pytest.mark.parametrize("variant", ["adapter/torque+bristle", "screw_axis/elastic+hysteresis"])
+def test_the_state_of_an_absent_effect_rests(variant: str) -> None:
+    """It may be too fast for the solver's step, which is that of the system without it."""
+    model = build_model(variant)
+    (strength,) = model.stiff
+    (state,) = (v.name for v in model.of_role("state") if v.of_effect)
+    moving = {v.name: 1.0 + k for k, v in enumerate(model.of_role("input"))}
+    moving |= {v.name: 2.0 + k for k, v in enumerate(model.of_role("state")) if not v.of_effect}
+    oracle = oracle_of(variant)
+    assert oracle.derivatives({**moving, strength: 0.0})[state] == 0.0
+    assert oracle.derivatives({**moving, strength: 0.1})[state] != 0.0

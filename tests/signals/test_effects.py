@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cosim.data.signals import Function
+from cosim.installation.builder import default_provider
+from cosim.master.master import Master
+from cosim.system.system import System
 from sources.effect import Effect
 from sources.model import ModelError
 from sources.variant import build_model, effects
@@ -161,6 +166,37 @@ def test_first_order_lag_follows_the_exponential_and_starts_settled() -> None:
     read = [stepper.step({"i": 5.0}, 0.01)["i_meas"] for _ in range(5)]
     expected = [5.0 - 2.0 * math.exp(-0.01 * (k + 1) / 0.02) for k in range(5)]
     assert read == pytest.approx(expected, rel=1e-11)  # RK4 with 200 steps per time constant
+
+
+def test_a_lag_starts_settled_whenever_the_run_begins() -> None:
+    def read(start: float) -> Any:
+        system = System("lag", default_provider())
+        system.add("a", "adapter/signal+first_order_lag")
+        master = Master(system, "jacobi", 1e-3)
+        signal = Function(lambda t: np.cos(20.0 * (t - start)))
+        return master.run(1.0, inputs={"a.u": signal}, record=["a.y"], start=start)["a.y"]
+
+    assert read(0.37) == pytest.approx(read(0.0), abs=1e-12)
+    assert read(-0.2) == pytest.approx(read(0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("variant", ["diff_drive/rolling", "mecanum_wheels/rolling"])
+@pytest.mark.parametrize("t_lag", [0.04, 0.02, 0.007, 0.002])
+def test_a_lag_shorter_than_the_solvers_step_is_right(variant: str, t_lag: float) -> None:
+    """Runge-Kutta runs away where it is a 2.8th of the step, and is far off at half of it."""
+    system = System("lag", default_provider())
+    system.add("a", f"{variant}+first_order_lag")
+    strengths = [n for n in system.members["a"].description.variables if n.endswith(".t_lag")]
+    for name in strengths:
+        system.set(f"a.{name}", t_lag)
+    inputs = {name: 1.0 for name in system.open_inputs()}
+    steps = {}
+    for step in (0.02, 1e-4):
+        system.set("a.solver.step", step)
+        steps[step] = Master(system, "jacobi", 0.02).run(0.4, inputs=inputs)
+    for name in steps[0.02].names:
+        fine = steps[1e-4][name]
+        assert steps[0.02][name] == pytest.approx(fine, rel=1e-3, abs=1e-3 * np.ptp(fine) + 1e-9)
 
 
 def test_rate_limit_is_the_digital_acceleration_limiter() -> None:

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arguments import need_whole
 from ...errors import FmuCallError, ValueRangeError
 from ...system.system import System
 from ..algebraic_loops import consistent, find_loops
@@ -60,7 +61,8 @@ def compile_plan(
 ) -> Plan:
     """Compile a system."""
     refuse_without_states(system, "iterated")
-    if interpolation not in (0, 1) or isinstance(interpolation, bool):
+    need_whole("the order of interpolation", interpolation)
+    if interpolation not in (0, 1):
         raise ValueRangeError(f"interpolation of order {interpolation!r}: must be 0 or 1")
     layout = lay_out(system, external, observed)
     loops = find_loops(system, layout)

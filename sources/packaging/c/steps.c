@@ -6,7 +6,9 @@
    that point, as in model exchange. */
 #define SLACK 1e-7
 
-static double slack(double period, double t) { return SLACK * period + 4 * DBL_EPSILON * fabs(t); }
+static double slack(double period, double t) {
+  return (isfinite(period) ? SLACK * period : 0) + 4 * DBL_EPSILON * fabs(t);
+}
 
 static int start_clocks(Instance *c) {
 #if NC
@@ -16,7 +18,7 @@ static int start_clocks(Instance *c) {
     if (!(m->period[k] > 0))
       return report(c, ERROR, "%s: sample clock %d has period %g s; it must be positive", MODEL, k, m->period[k]);
     m->tick[k] = ceil((m->v[0] - slack(m->period[k], m->v[0])) / m->period[k]);
-    m->next[k] = m->tick[k] * m->period[k];
+    m->next[k] = isfinite(m->period[k]) ? m->tick[k] * m->period[k] : m->v[0]; /* at the start alone */
   }
 #else
   (void)c;
@@ -66,7 +68,7 @@ static int integrate(Instance *c, double t1, double length) {
   double *v = c->m.v;
   const double t0 = v[0];
 #if NX
-  if ((v[METHOD] == RK4 || v[METHOD] == RODAS3) && !stiff(&c->m)) {
+  if ((v[METHOD] == RK4 || v[METHOD] == RODAS3) && !stiff(&c->m, fmin(length, v[STEP]))) {
     int n = 1;
     double h = length, e[NX];
     if (length > v[STEP]) {
