@@ -343,12 +343,16 @@ class Joined(MappedLogs):
         """One run."""
         log = self.logs[name]
         starts: dict[str, float] = {}
+        unsure: dict[str, float] = {}
+        sigma = {c.name: c.sigma for c in channels}
         for key, entry in self.table.get("starts", {}).items():
             where = f"{self.path}: [starts] {key}"
             value = self.value(key, name, where)
             first = key.startswith("first:")
             own = self.units.get(key.removeprefix("first:"), "") if first else ""
-            starts.update({n: factor * value for n, factor in self.targets(entry, own, where)})
+            noise = sigma.get(key.removeprefix("first:"), 0.0) if first else 0.0
+            for target, factor in self.targets(entry, own, where):
+                starts[target], unsure[target] = factor * value, abs(factor) * noise
         lead = float(self.table.get("lead", 0.0))
         during = log.time >= 0.0
         data = np.column_stack([self._measured(log, c)[during] for c in channels])
@@ -380,6 +384,7 @@ class Joined(MappedLogs):
             anchor,
             {t: self.conversion(t, c, e)[0] * self.input_noise(c, e)
              for t, c, e in self.drivers()},
+            unsure=unsure,
         )  # fmt: skip
 
     def _measured(self, log: Log, channel: Channel) -> Vector:

@@ -69,7 +69,8 @@ class Huber:
     def cost(self, residual: Vector) -> float:
         """See `Loss`."""
         size = np.abs(residual[np.isfinite(residual)])
-        each = np.where(size <= self.cap, 0.5 * size**2, self.cap * size - 0.5 * self.cap**2)
+        near = np.minimum(size, self.cap)  # squares of what runs away are no numbers
+        each = np.where(size <= self.cap, 0.5 * near**2, self.cap * size - 0.5 * self.cap**2)
         return float(np.sum(each))
 
     def weight(self, residual: Vector) -> Vector:

@@ -261,6 +261,7 @@ class MeasuredRun:
         noisy: driven input -> standard deviation of the noise with which it was logged, in the
             input's unit; negative where the input is its column turned round.
         noise: what that adds to residuals, None if nothing (`input_noise.propagated`).
+        unsure: start value that was read off a column -> deviation of that column's noise.
     """
 
     name: str
@@ -274,6 +275,7 @@ class MeasuredRun:
     anchor: int = 0
     noisy: Mapping[str, float] = field(default_factory=dict)
     noise: InputNoise | None = None
+    unsure: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def interval(self) -> float:

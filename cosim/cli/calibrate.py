@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import InputError
+from ..errors import CosimError, InputError
 from ..files import claimed, json_text, write_text
 from ..installation.builder import default_provider
 from .output import new_table, open_console
@@ -18,6 +18,8 @@ from .progress import Display
 from .streams import print_json
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -100,7 +102,7 @@ def calibrate_command(
             typer.echo(f"warning: {exchange}", err=True)
         unused = validation_residuals(estimate)
         content = calibration_table(estimate, unused, correlation, findings)
-        for line in _far(content["channels"]):
+        for line in _far(content["channels"], lambda: _beside_intervals(estimate, unused)):
             typer.echo(f"warning: {line}", err=True)
         content["exchange"] = exchange.to_dict()
         content["evaluations"] = simulator.evaluations + exchange.evaluations
@@ -127,8 +129,27 @@ def calibrate_command(
                 _print(content)
 
 
-def _far(channels: dict[str, Any]) -> list[str]:
-    """What the model leaves far beyond the noise, in the runs that were fitted and in others."""
+def _beside_intervals(estimate: Estimate, unused: Residuals) -> dict[str, float]:
+    """Residuals of unused runs over the noise, by channel, beside what intervals make of them."""
+    from ..calibrate.estimate import channel_rms
+    from ..calibrate.foretelling import foretold
+
+    try:
+        beside = foretold(estimate, unused)
+    except CosimError:  # it cannot be simulated beside its parameters: as they are, then
+        beside = unused
+    return channel_rms(estimate.problem, beside)
+
+
+def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]]) -> list[str]:
+    """What the model leaves far beyond the noise, in the runs that were fitted and in others.
+
+    Args:
+        channels: of the table.
+        beside: gives what the others leave beside what the parameters' intervals make of them.
+    """
+    from ..calibrate.foretelling import told
+
     fitted, others = (
         {n: (v[purpose] or 0.0) / v["noise_rms"] for n, v in channels.items()}
         for purpose in ("identification", "validation")
@@ -141,7 +162,10 @@ def _far(channels: dict[str, Any]) -> list[str]:
             "that values and intervals make up for; `cosim diagnose` looks for it"
         )
     name = max(others, key=lambda n: others[n] / max(fitted[n], 1.0))
-    if others[name] > FAR * max(fitted[name], 1.0):
+    most = FAR * max(fitted[name], 1.0)
+    if others[name] > most and beside()[name] <= most:
+        said.append(told(name, others[name]))
+    elif others[name] > most:
         said.append(
             f"in runs that were not fitted it leaves {others[name]:.3g} times the noise in {name}, "
             f"in those that were {fitted[name]:.3g}: what was found does not hold there, or these "

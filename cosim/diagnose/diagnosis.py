@@ -44,7 +44,7 @@ from .rounds import Round
 from .search import ROUNDS, Search
 from .second_look import leaves_more
 from .small import small_laws, widen
-from .table import candidates_of, force_of, table_of
+from .table import candidates_of, force_of, table_of, unsure
 from .verdict import above, decide, proposal, unasked
 
 TURNS = 4
@@ -252,6 +252,7 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
             result.bursts = times(sudden, list(search.fitting.runs))
         left_over(result)
         result.warnings += told(base, result.after)
+        result.warnings += unsure(result.table, result.after.labels)
     return result
 
 

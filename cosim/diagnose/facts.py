@@ -147,6 +147,8 @@ class Left:
         slow: these parts over what noise has, likewise (`whiteness.WhitenessTest`).
         p_fast: that noise alone has neighbours so alike.
         p_white: that white noise of any size has such slow parts; 0 if not asked.
+        foretold: whether it is more than noise, and no more than the deviations of the parameters
+            make of it: in runs that were not fitted. All but `rms` is then what is left beside.
     """
 
     channel: str
@@ -157,6 +159,7 @@ class Left:
     slow: float = 1.0
     p_fast: float = 1.0
     p_white: float = 0.0
+    foretold: bool = False
 
     @property
     def white(self) -> bool:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.foretelling import foretold, told
 from ..errors import CosimError
 from .bounds import beyond
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
-from .foretelling import foretold
 from .judge import Judge
 from .linear import BAND
 from .localise import Place, worst
@@ -90,8 +90,8 @@ def table_of(
         opened=_opened(judge, declared),
         bounds=beyond(declared, judge.lifted) if judge.lifted else (),
     )
-    told = [_foretold(judge, table, *pair) for pair in zip(models, fits, strict=True)]
-    table = replace(table, models=(*told, *rough))
+    models = [_foretold(judge, table, *pair) for pair in zip(models, fits, strict=True)]
+    table = replace(table, models=(*models, *rough))
     compared = [
         Comparison(i, k, judge.better(fits[i], fits[k]))
         for i, k in combinations(comparable(table), 2)
@@ -141,32 +141,50 @@ def _opened(judge: Judge, declared: Fitted) -> Model | None:
 
 
 def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model:
-    """A model with slow parts of unused runs beside what its parameters' deviations make of them.
+    """A model with what it leaves of unused runs beside what its parameters' deviations make there.
 
-    Asked only where it matters: of sets that may be named but for these. No slow parts are told
-    where runs may turn unstable: derivatives say little there.
+    Asked only where it matters: of the declared model, and of sets that may be named but for what
+    they leave; and where fitted runs hold nothing but noise, so that deviations are what they are
+    said to be. No slow parts are told where runs may turn unstable: derivatives say little there.
     """
     if judge.raw.unstable:
         return replace(model, left=tuple(replace(x, slow=1.0) for x in model.left))
     late = [x for x in above(model) if x.purpose == judge.purpose]
-    if not judge.unused or not model.laws or not late or doubts(table, model):
+    if not judge.unused or not late or (model.laws and doubts(table, model)):
         return model
-    if any(x.structured for x in late):
+    if any(x.structured for x in model.left if x.purpose != judge.purpose):
         return model
     known = judge.foretold.get(model.labels)
     if known is None or known[0] is not fitted.estimate.theta:
+        stack = judge.checking
+        rows = stack.by_run(judge.check_data - fitted.check)
         try:
-            rest = foretold(fitted, judge.check_data - fitted.check, judge.checking)
+            rest = foretold(fitted.estimate, list(zip(stack.names, rows, strict=True)))
         except CosimError:  # with what its deviations make of them, then
             return model
-        known = judge.foretold[model.labels] = fitted.estimate.theta, rest
+        known = fitted.estimate.theta, stack.vector([values for _, values in rest])
+        judge.foretold[model.labels] = known
     tests = {t.channel: t for t in whiteness_tests(known[1], judge.checking)}
-    left = tuple(
-        replace(x, slow=tests[x.channel].slow, p_value=tests[x.channel].p_value)
-        if x.purpose == judge.purpose else x
-        for x in model.left
-    )  # fmt: skip
-    return replace(model, left=left)
+    left = []
+    for x in model.left:
+        if x.purpose == judge.purpose:
+            t = tests[x.channel]
+            x = replace(x, lasting=t.lasting, slow=t.slow, p_value=t.p_value, p_fast=t.p_fast,
+                        p_white=t.p_white, foretold=x.structured and not t.structured)  # fmt: skip
+        left.append(x)
+    return replace(model, left=tuple(left))
+
+
+def unsure(table: Table, labels: Collection[str]) -> Iterator[str]:
+    """Warnings of channels that are off in unused runs as far as parameters' intervals make it.
+
+    Args:
+        table: of all models.
+        labels: of the laws of the model that the verdict is about.
+    """
+    for model in table.models:
+        if not model.rough and set(model.labels) == set(labels):
+            yield from (told(x.channel, x.rms) for x in model.left if x.foretold)
 
 
 def force_of(place: Place) -> Force:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cosim.calibrate import read_problem
+from cosim.calibrate.checks.examine import examine
 from cosim.calibrate.checks.finding import Finding
 from cosim.calibrate.checks.starts import check_starts
 from cosim.calibrate.problem import Problem
+from tests.diagnose import disc
 from tests.problems import simulator
 
 OFF = {"speed": 9.0, "current": 2.0, "voltage": 2.0, "angle": 1.0}
@@ -86,3 +90,24 @@ def test_a_speed_that_most_runs_begin_with_is_told_beside_angles_that_differ(
     means = moving["stairs"][:5].mean(axis=0)
     for name in ("speed", "angle"):
         assert f"{name} {means[names.index(name)]:.4g} instead of " in error.text
+
+
+@pytest.mark.parametrize(("column", "alone"), [("theta", False), ("w", False), ("w", True)])
+def test_a_start_value_with_noise_is_told_where_it_is_felt(
+    tmp_path: Path, column: str, alone: bool
+) -> None:
+    """An angle stays off; a speed fades within a sixth of the run, but the angle drifts with it."""
+    folder = disc.write(tmp_path, lambda w, theta, t: 0.0, names=("sweep", "check"))
+    mapping = folder / "dataset.toml"
+    variable, size = {"theta": ("load.angle", "1"), "w": ("load.speed", "9.3")}[column]
+    text = mapping.read_text(encoding="utf-8")
+    if alone:  # no angle is measured
+        before, _, after = text.partition("[channels.theta]")
+        text = before + "[[parameter]]" + after.partition("[[parameter]]")[2]
+    entry = f'[starts]\n"first:{column}" = "{variable}"\n\n[columns]'
+    mapping.write_text(text.replace("[columns]", entry), encoding="utf-8")
+    told = [f.text for f in examine(simulator(read_problem(folder))) if f.kind == "start"]
+    assert len(told) == (not alone)
+    if told:
+        assert f"{variable} begins with the first value of a column whose noise (0.0" in told[0]
+        assert f"moves theta by {size} times its own: estimate it" in told[0]

@@ -196,14 +196,19 @@ def test_what_does_not_hold_in_other_runs_is_said() -> None:
     def channel(fitted: float, unused: float | None) -> dict[str, float | None]:
         return {"noise_rms": 0.1, "identification": fitted, "validation": unused}
 
-    assert _far({"a": channel(0.11, 0.12), "b": channel(0.1, None)}) == []
-    [line] = _far({"a": channel(0.11, 0.12), "b": channel(0.1, 0.9)})
+    def same() -> dict[str, float]:
+        return {"a": 12.0, "b": 9.0}
+
+    assert _far({"a": channel(0.11, 0.12), "b": channel(0.1, None)}, same) == []
+    [line] = _far({"a": channel(0.11, 0.12), "b": channel(0.1, 0.9)}, same)
     assert line.startswith(
         "in runs that were not fitted it leaves 9 times the noise in b, in those"
     )
-    [line] = _far({"a": channel(0.5, 0.6), "b": channel(0.1, 0.1)})
+    [line] = _far({"a": channel(0.5, 0.6), "b": channel(0.1, 0.1)}, same)
     assert line.startswith("the model leaves 5 times the noise in a: it lacks something")
-    assert len(_far({"a": channel(0.5, 1.5), "b": channel(0.1, 0.1)})) == 2
+    assert len(_far({"a": channel(0.5, 1.5), "b": channel(0.1, 0.1)}, same)) == 2
+    [line] = _far({"a": channel(0.1, 0.3), "b": channel(0.1, 0.1)}, lambda: {"a": 1.0, "b": 1.0})
+    assert line.startswith("in runs that were not fitted a is off by 3 times its noise, which is")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnose.foretelling import foretold
+from cosim.calibrate.foretelling import foretold
 from cosim.diagnose.whiteness import UNNAMED, whiteness_tests
 from tests.diagnose import built
 
@@ -36,7 +36,8 @@ def test_errors_of_the_parameters_are_taken_off_and_others_stay(tmp_path: Path, 
             (run,) = search.checking.runs
             wave = np.tile(np.sin(7.0 * run.times)[:, None], (1, 2))
             residual = residual + search.checking.vector([wave])
-        rest = foretold(known, residual, search.checking)
+        rows = zip(search.checking.names, search.checking.by_run(residual), strict=True)
+        rest = search.checking.vector([v for _, v in foretold(known.estimate, list(rows))])
         slow = max(t.slow for t in whiteness_tests(residual, search.checking))
         left = max(t.slow for t in whiteness_tests(rest, search.checking))
         assert (slow > UNNAMED) == (error != "none")

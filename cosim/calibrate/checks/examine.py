@@ -12,6 +12,7 @@ from ...errors import CosimError
 from .clipped import check_clipped
 from .copies import check_columns, check_copies, check_repeated
 from .finding import Finding, passed, quantity
+from .first_values import check_first_values
 from .gaps import check_gaps
 from .jumps import check_jumps
 from .lags import check_lags
@@ -59,7 +60,11 @@ def check_data(problem: Problem) -> list[Finding]:
     """Problems of the logs alone."""
     found = list(problem.source.findings)
     if not problem.chosen("identification"):
-        found.append(Finding("error", "purpose", "", "", "no run is for identification"))
+        text = (
+            "no run is for identification: give those that are to be fitted purpose = "
+            '"identification" in [[run]] or in set.toml'
+        )
+        found.append(Finding("error", "purpose", "", "", text))
     for check in (
         check_times, check_still, check_gaps, check_copies, check_columns, check_repeated,
         check_smooth, check_commands,
@@ -112,6 +117,7 @@ def check_model(simulator: Simulator, theta: Vector | None = None) -> list[Findi
     found += check_inputs(simulator, models, theta)
     if not any(f.severity == "error" for f in found):
         found += check_starts(simulator, models)
+        found += check_first_values(simulator, theta, models)
     return found
 
 

@@ -80,7 +80,10 @@ def law_from_data(
     maker, trials, law = begun.maker, begun.trials, begun.law
     result = LawFromData(site, False, "", search, base, maker)
     if not trials:
-        result.reason = f"No signal of {site.label} moves, so a law there would be a constant."
+        result.reason = (
+            f"No signal that a law at {site.label} could follow is recorded and moves, so it would "
+            "be a constant."
+        )
         return result
     result.needed = math.log(len(trials) / LEVEL)
     if law is None:
