@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.foretelling import foretold
 from ..calibrate.loss import loss_for, typical
 from ..calibrate.normal import cost_of
 from ..calibrate.problem import Problem
@@ -18,7 +20,7 @@ from .facts import Gain, Law, Value
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
 from .models import GATE, GATE_Z, Fitted, Gate, compare, is_open, more_general
-from .whiteness import whiteness_tests
+from .whiteness import UNNAMED, whiteness_tests
 
 Vector = NDArray[np.float64]
 ALIKE = 1e-5
@@ -43,8 +45,8 @@ class Judge:
     def __init__(self, problem: Problem, check: str) -> None:
         self.purpose = check
         self.memo = Memo()
-        self.foretold: dict[frozenset[str], tuple[Vector, Vector]] = {}
-        """Parameters of sets, and what these leave of unused runs (`foretelling.foretold`)."""
+        self._beside: dict[frozenset[str], tuple[Vector, Vector]] = {}
+        """Parameters of sets, and what `beside` them is left of unused runs."""
         self.lifted: Fitted | None = None
         """The declared model with bounds opened (`bounds.opened`), if it was fitted."""
         self._measured(problem)
@@ -192,6 +194,25 @@ class Judge:
     def lacking(self, fitted: Fitted) -> bool:
         """Whether a channel still exceeds its noise."""
         return any(s.structured for s in whiteness_tests(self.fit_data - fitted.fit, self.fitting))
+
+    def beside(self, fitted: Fitted) -> Vector:
+        """What a model leaves of unused runs beside what its parameters' deviations make there.
+
+        As it is where it is noise, where runs may turn unstable (a deviation is then no small
+        change), and where it cannot be simulated beside its parameters.
+        """
+        rest, stack = self.check_data - fitted.check, self.checking
+        if self.raw.unstable or not self.unused:
+            return rest
+        if not any(s.structured or s.slow > UNNAMED for s in whiteness_tests(rest, stack)):
+            return rest
+        known = self._beside.get(fitted.labels)
+        if known is None or known[0] is not fitted.estimate.theta:
+            rows = list(zip(stack.names, stack.by_run(rest), strict=True))
+            with suppress(CosimError):
+                rest = stack.vector([values for _, values in foretold(fitted.estimate, rows)])
+            known = self._beside[fitted.labels] = fitted.estimate.theta, rest
+        return known[1]
 
     def accepted(self, base: Fitted, fitted: Fitted) -> bool:
         """Whether unused runs want it, and it is worth a cause."""

@@ -13,10 +13,10 @@ from .whiteness import WhitenessTest, structured, whiteness_tests
 
 
 def tests_of(search: Search, fitted: Fitted, purpose: str) -> list[WhitenessTest]:
-    """Tests on what a model leaves in the runs of a purpose."""
+    """Tests on what a model leaves in the runs of a purpose; see `Judge.beside` of unused ones."""
     if purpose == PURPOSES[0]:
         return whiteness_tests(search.fit_data - fitted.fit, search.fitting)
-    return whiteness_tests(search.check_data - fitted.check, search.checking)
+    return whiteness_tests(search.beside(fitted), search.checking)
 
 
 def leaves_law(search: Search, fitted: Fitted) -> bool:

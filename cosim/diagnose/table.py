@@ -9,8 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.foretelling import foretold, told
-from ..errors import CosimError
+from ..calibrate.foretelling import told
 from .bounds import beyond
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .judge import Judge
@@ -144,33 +143,27 @@ def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model
     """A model with what it leaves of unused runs beside what its parameters' deviations make there.
 
     Asked only where it matters: of the declared model, and of sets that may be named but for what
-    they leave; and where fitted runs hold nothing but noise, so that deviations are what they are
-    said to be. No slow parts are told where runs may turn unstable: derivatives say little there.
+    they leave. Where fitted runs hold more than noise, deviations are not what they are said to be,
+    and slow parts alone are asked. None are told where runs may turn unstable: derivatives say
+    little there.
     """
     if judge.raw.unstable:
         return replace(model, left=tuple(replace(x, slow=1.0) for x in model.left))
     late = [x for x in above(model) if x.purpose == judge.purpose]
     if not judge.unused or not late or (model.laws and doubts(table, model)):
         return model
-    if any(x.structured for x in model.left if x.purpose != judge.purpose):
+    calm = not any(x.structured for x in model.left if x.purpose != judge.purpose)
+    if not calm and any(x.structured for x in late):
         return model
-    known = judge.foretold.get(model.labels)
-    if known is None or known[0] is not fitted.estimate.theta:
-        stack = judge.checking
-        rows = stack.by_run(judge.check_data - fitted.check)
-        try:
-            rest = foretold(fitted.estimate, list(zip(stack.names, rows, strict=True)))
-        except CosimError:  # with what its deviations make of them, then
-            return model
-        known = fitted.estimate.theta, stack.vector([values for _, values in rest])
-        judge.foretold[model.labels] = known
-    tests = {t.channel: t for t in whiteness_tests(known[1], judge.checking)}
+    tests = {t.channel: t for t in whiteness_tests(judge.beside(fitted), judge.checking)}
     left = []
     for x in model.left:
         if x.purpose == judge.purpose:
-            t = tests[x.channel]
-            x = replace(x, lasting=t.lasting, slow=t.slow, p_value=t.p_value, p_fast=t.p_fast,
-                        p_white=t.p_white, foretold=x.structured and not t.structured)  # fmt: skip
+            t, before = tests[x.channel], x.structured
+            x = replace(x, slow=t.slow, p_value=t.p_value)
+            if calm:
+                x = replace(x, lasting=t.lasting, p_fast=t.p_fast, p_white=t.p_white,
+                            foretold=before and not t.structured)  # fmt: skip
         left.append(x)
     return replace(model, left=tuple(left))
 

@@ -1,4 +1,4 @@
-"""Slow parts of unused runs count beside what the parameters' deviations make of them."""
+"""Unused runs count beside what the parameters' deviations make of them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.calibrate import read_problem
 from cosim.calibrate.foretelling import foretold
+from cosim.diagnose import diagnose
 from cosim.diagnose.whiteness import UNNAMED, whiteness_tests
-from tests.diagnose import built
+from tests.diagnose import built, pendulum
 
 
 def nothing(w: float, theta: float, t: float) -> float:
@@ -44,3 +46,16 @@ def test_errors_of_the_parameters_are_taken_off_and_others_stay(tmp_path: Path, 
         assert (left > UNNAMED) == (error == "law")
         # nothing is taken off that is not there, but its share of noise: half a nat each
         assert abs(rest @ rest - residual @ residual) < 2.0 * theta.size or error != "none"
+
+
+@pytest.mark.slow
+def test_a_run_that_magnifies_deviations_is_no_lack(tmp_path: Path) -> None:
+    """A pendulum that goes over the top in its unused run; the twin is a law, above."""
+    problem = read_problem(pendulum.write(tmp_path))
+    found = diagnose(problem, law=False).to_dict()
+    assert found["verdict"] == "nothing_missing", found["reason"]
+    phi = found["channels"]["phi"]
+    assert phi["before"]["identification"] < 1.1 * phi["noise_rms"]
+    assert phi["before"]["validation"] > 1.5 * phi["noise_rms"]
+    told = [w for w in found["warnings"] if "no more than the intervals of the parameters" in w]
+    assert any("phi is off by" in w for w in told)
