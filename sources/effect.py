@@ -156,9 +156,9 @@ class Effect:
         contains: effects that its law becomes for some values of its parameters: a bristle that
             does not give way is Coulomb friction. Data that do not tell the two apart have it.
         first: whether it acts before the other effects of its balance, which see what it leaves.
-        stiff: whether its state may be faster than a solver's fixed step: while it is present (if
-            its strength is its time constant: while that is shorter than two steps), the FMU steps
-            by `rodas3_adaptive` in place of `rk4` and `rodas3`.
+        stiff: whether its state may be faster than a solver's fixed step: while it is present, the
+            FMU steps by `rodas3_adaptive` in place of `rk4` and `rodas3`. A strength in seconds is
+            taken for the state's time constant: while that is shorter than two steps.
     """
 
     name: str

@@ -32,6 +32,8 @@ def foretold(
     Raises:
         CosimError: it cannot be simulated beside its parameters.
     """
+    if not residuals:
+        return []
     names = [name for name, _ in residuals]
     good = [np.isfinite(rows).ravel() for _, rows in residuals]
 
@@ -89,6 +91,6 @@ def told(channel: str, size: float) -> str:
     """
     return (
         f"in runs that were not fitted {channel} is off by {size:.3g} times its noise, which is no "
-        "more than the intervals of the parameters make of it there: fit such a run, too, to know "
-        "them better"
+        "more than the intervals of the parameters make of it there: fit such a run, too, and the "
+        "parameters are better known"
     )

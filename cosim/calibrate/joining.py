@@ -344,7 +344,7 @@ class Joined(MappedLogs):
         log = self.logs[name]
         starts: dict[str, float] = {}
         unsure: dict[str, float] = {}
-        sigma = {c.name: c.sigma for c in channels}
+        sigma = {self.columns[c.name]: c.sigma / abs(self.converted[c.name][0]) for c in channels}
         for key, entry in self.table.get("starts", {}).items():
             where = f"{self.path}: [starts] {key}"
             value = self.value(key, name, where)

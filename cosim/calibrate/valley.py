@@ -21,8 +21,10 @@ from .problem import Problem
 
 Vector = NDArray[np.float64]
 HEAVY = 0.3
-"""Weight in a weak direction, or in what is left of it beside those that were moved, from which a
-parameter is moved by itself."""
+"""Weight in a weak direction from which a parameter is moved by itself."""
+ITS_OWN = 0.3
+"""Share of its deviation that others which were moved must leave a parameter to be moved, too: of
+less, a tenth of its variance at most is not theirs, which intervals do not show."""
 FAR = 1.0
 """Spans by which that is done at most."""
 CLAIMED, SURE, SEEN = 4.0, 0.5, 8.0
@@ -55,13 +57,17 @@ def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
         claimed = math.sqrt(covariance[k, k])
         if silent[k]:  # open up to the bound, which is two deviations away
             told, way = (2.0 / _room(run, k)[1]) ** 2, covariance[:, k] / covariance[k, k]
-        elif claimed > KNOWN or _beside(covariance, asked, k) < HEAVY:
+        elif (
+            claimed > KNOWN
+            or _beside(covariance, asked, k) < ITS_OWN
+            or (found := _followed(run, k, claimed)) is None
+        ):
             continue
-        elif (found := _followed(run, k, claimed)) is not None:
-            told, way = found
         else:
-            asked.append(k)
-            continue
+            told, way = found
+            if told >= SURE / claimed**2:
+                asked.append(k)
+                continue
         more = 1.0 / told - covariance[k, k]
         if more > 0.0:
             covariance += more * np.outer(way, way)
@@ -96,7 +102,7 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
         claimed: its standard deviation according to the derivatives there [spans].
 
     Returns:
-        None where it cannot be moved, or has been found as well known as claimed.
+        None where it cannot be moved, or goes astray at once.
     """
     p = run.problem
     stuck = STUCK**2 * sum(np.isfinite(r).sum() for _, r in run.residuals)
@@ -126,7 +132,7 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
         if length >= room:
             break
         before, length = rise, min(2.0 * length, room)
-    return (told, best) if told < SURE / claimed**2 else None
+    return (told, best) if math.isfinite(told) else None
 
 
 def stretch(problem: Problem, theta: Vector, way: Vector) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import time
 from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -100,9 +102,10 @@ def calibrate_command(
                 guess = first_guess(estimate) if figures else {}
         if not exchange.small:
             typer.echo(f"warning: {exchange}", err=True)
-        unused = validation_residuals(estimate)
+        settled, unused = validation_residuals(estimate)
         content = calibration_table(estimate, unused, correlation, findings)
-        for line in _far(content["channels"], lambda: _beside_intervals(estimate, unused)):
+        beside = None if problem.unstable else partial(_beside_intervals, settled, unused)
+        for line in _far(content["channels"], beside):
             typer.echo(f"warning: {line}", err=True)
         content["exchange"] = exchange.to_dict()
         content["evaluations"] = simulator.evaluations + exchange.evaluations
@@ -129,24 +132,26 @@ def calibrate_command(
                 _print(content)
 
 
-def _beside_intervals(estimate: Estimate, unused: Residuals) -> dict[str, float]:
+def _beside_intervals(unused: Estimate, residuals: Residuals) -> dict[str, float]:
     """Residuals of unused runs over the noise, by channel, beside what intervals make of them."""
     from ..calibrate.estimate import channel_rms
     from ..calibrate.foretelling import foretold
 
     try:
-        beside = foretold(estimate, unused)
+        beside = foretold(unused, residuals)
     except CosimError:  # it cannot be simulated beside its parameters: as they are, then
-        beside = unused
-    return channel_rms(estimate.problem, beside)
+        beside = residuals
+    return channel_rms(unused.problem, beside)
 
 
-def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]]) -> list[str]:
+def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]] | None) -> list[str]:
     """What the model leaves far beyond the noise, in the runs that were fitted and in others.
 
     Args:
         channels: of the table.
-        beside: gives what the others leave beside what the parameters' intervals make of them.
+        beside: gives what the others leave beside what the parameters' intervals make of them; not
+            asked where fitted runs hold more than noise, for intervals then make up for that. None
+            where a deviation is no small change (`Problem.unstable`).
     """
     from ..calibrate.foretelling import told
 
@@ -156,22 +161,27 @@ def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]]) -> li
     )
     said = []
     name = max(fitted, key=lambda n: fitted[n])
-    if fitted[name] > FAR:
+    calm = fitted[name] <= FAR
+    if not calm:
         said.append(
             f"the model leaves {fitted[name]:.3g} times the noise in {name}: it lacks something "
             "that values and intervals make up for; `cosim diagnose` looks for it"
         )
-    name = max(others, key=lambda n: others[n] / max(fitted[n], 1.0))
-    most = FAR * max(fitted[name], 1.0)
-    if others[name] > most and beside()[name] <= most:
-        said.append(told(name, others[name]))
-    elif others[name] > most:
-        said.append(
-            f"in runs that were not fitted it leaves {others[name]:.3g} times the noise in {name}, "
-            f"in those that were {fitted[name]:.3g}: what was found does not hold there, or these "
-            "logs are of another kind"
-        )
-    return said
+    over = {n: size / max(fitted[n], 1.0) for n, size in others.items()}
+    far = [n for n in sorted(over, key=lambda n: -over[n]) if over[n] > FAR]
+    if not far:
+        return said
+    rest = beside() if calm and beside is not None else others
+    lasting = [n for n in far if rest[n] > FAR * max(fitted[n], 1.0)]
+    if not lasting:
+        return [*said, told(far[0], others[far[0]])]
+    name = lasting[0]
+    return [
+        *said,
+        f"in runs that were not fitted it leaves {others[name]:.3g} times the noise in {name}, "
+        f"in those that were {fitted[name]:.3g}: what was found does not hold there, or these "
+        "logs are of another kind",
+    ]
 
 
 def _usable(problem: Problem, findings: list[Finding]) -> list[Finding]:
@@ -256,16 +266,16 @@ def _add_first_guess(
             row[purpose] = _scaled(found.get(c.name), c.sigma)
 
 
-def validation_residuals(estimate: Estimate) -> Residuals:
-    """Residuals over sigma on the runs that were not fitted, their own values fitted."""
+def validation_residuals(estimate: Estimate) -> tuple[Estimate, Residuals]:
+    """Residuals over sigma on the runs that were not fitted, and the estimate with their values."""
     from ..calibrate.nuisance import settled
 
     problem = estimate.problem
     names = [run.name for run in problem.runs if run.purpose == "validation"]
     if not names:
-        return []
+        return estimate, []
     theta = settled(estimate.simulator, estimate.theta, names)
-    return list(estimate.simulator.residuals(theta, names))
+    return replace(estimate, theta=theta), list(estimate.simulator.residuals(theta, names))
 
 
 def _scaled(value: float | None, sigma: float) -> float | None:

@@ -45,8 +45,6 @@ class Judge:
     def __init__(self, problem: Problem, check: str) -> None:
         self.purpose = check
         self.memo = Memo()
-        self._beside: dict[frozenset[str], tuple[Vector, Vector]] = {}
-        """Parameters of sets, and what `beside` them is left of unused runs."""
         self.lifted: Fitted | None = None
         """The declared model with bounds opened (`bounds.opened`), if it was fitted."""
         self._measured(problem)
@@ -54,6 +52,8 @@ class Judge:
     def _measured(self, problem: Problem) -> None:
         """What is judged by."""
         self.raw = problem
+        self._beside: dict[frozenset[str], tuple[Vector, Vector]] = {}
+        """Parameters of sets, and what `beside` them is left of unused runs."""
         self.fitting = SampleStack(problem, problem.chosen("identification"))
         checks = problem.chosen(self.purpose) or problem.chosen("identification")
         self.checking = SampleStack(problem, checks)
@@ -198,11 +198,11 @@ class Judge:
     def beside(self, fitted: Fitted) -> Vector:
         """What a model leaves of unused runs beside what its parameters' deviations make there.
 
-        As it is where it is noise, where runs may turn unstable (a deviation is then no small
-        change), and where it cannot be simulated beside its parameters.
+        As it is where it is noise, where runs may turn unstable or be cut (a deviation is then no
+        small change), and where it cannot be simulated beside its parameters.
         """
         rest, stack = self.check_data - fitted.check, self.checking
-        if self.raw.unstable or not self.unused:
+        if self.raw.unstable or self.raw.late or not self.unused:
             return rest
         if not any(s.structured or s.slow > UNNAMED for s in whiteness_tests(rest, stack)):
             return rest

@@ -428,7 +428,7 @@ def _hints(table: Table) -> tuple[Hint, ...]:
     shares = [
         (i, model, share) for i, model in enumerate(table.models[1:], 1)
         if model.laws and (share := _explained(table, model, declared)) >= LEAST
-        and all(law.size.value != law.absent for law in model.laws)  # the fit came lower without it
+        and all(law.size.value != law.absent for law in model.laws)  # else it is none
     ]  # fmt: skip
     for i, model, explained in sorted(shares, key=lambda x: (x[1].rough, -x[1].score)):
         if any(m.labels < model.labels and share > explained - LEAST for _, m, share in shares):

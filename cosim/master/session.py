@@ -259,6 +259,7 @@ class Session:
             UnknownNameError: it is no input that the session drives.
             GraphError: the session shares its inputs with others.
         """
+        need_table("signals of a session", signals, '{"motor.w_ref": 20.0}')
         outline = self._execution.outline
         if not self._run.external.flags.writeable:
             raise GraphError(

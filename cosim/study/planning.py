@@ -9,7 +9,8 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -24,8 +25,9 @@ from ..running.preparation import adjusted
 from ..running.runner import Prepared, find_runs, prepare
 from ..scenario.scenario import Scenario
 from ..spec import distribution
-from ..system.inputs import overruled, spread
+from ..system.inputs import overruled
 from ..system.provider import Provider
+from ..system.system import System
 from .definition import Study
 from .design import Point, points, reference_of
 
@@ -301,6 +303,7 @@ def _keys(
         prepared = group.prepare(provider)
         group = replace(group, parts=group.fingerprint(prepared))
         system = prepared.master.system
+        driven = _driven(system, prepared.scenario.inputs)
         for name in (name for name in prepared.record if name in signals):
             elements = system.elements(name)  # a vector's distance is taken
             common_unit({item: system.unit(item) for item in elements}, elements)
@@ -318,7 +321,7 @@ def _keys(
                     notes.append(f"{name} is left out: {reference} has none")
                     continue
                 system.set(name, value)
-                if note := overruled(system, name, spread(system, prepared.scenario.inputs)):
+                if note := overruled(system, name, driven):
                     notes.append(note)
                 present.add(name)
                 kept[name] = value
@@ -328,6 +331,15 @@ def _keys(
         if name not in present:
             raise unknown
     return keys, [details[index] for index in range(len(everything))]
+
+
+def _driven(system: System, inputs: Iterable[str]) -> set[str]:
+    """Full scalar names that inputs of a scenario drive; a run says which are wrong."""
+    found: set[str] = set()
+    for name in inputs:
+        with suppress(UnknownNameError):
+            found.update(system.first_name(element) for element in system.elements(name))
+    return found
 
 
 # -- hashes ----------------------------------------------------------------------------------------

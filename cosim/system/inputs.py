@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,22 +27,22 @@ Driver = (
 """What drives an input; a sequence has one driver per element of a vector input."""
 
 
-def overruled(system: System, name: str, signals: Mapping[str, Signal]) -> str:
-    """A note on a variable that has been set, and that something drives; "" if nothing does.
+def overruled(system: System, name: str, driven: Collection[str]) -> str:
+    """A note on a variable that has been set, and that is driven with all its elements; "" if not.
 
     Args:
         system: in which it is.
         name: of the variable.
-        signals: that drive inputs of the system, by full scalar name.
+        driven: full scalar names of what signals drive.
     """
-    for element in system.elements(name):
-        source = system.driver(element) or (element in signals and signals[element].text)
-        if source:
-            return (
-                f"{name} is set, but driven by {source}: what is set counts at most where the "
-                "initialization begins"
-            )
-    return ""
+    elements = [system.first_name(element) for element in system.elements(name)]
+    if not all(system.driver(element) or element in driven for element in elements):
+        return ""
+    source = system.driver(elements[0]) or "an input of the run"
+    return (
+        f"{name} is set, but driven by {source}: what is set counts at most where the "
+        "initialization begins"
+    )
 
 
 def spread(system: System, inputs: Mapping[str, Driver]) -> dict[str, Signal]:

@@ -52,7 +52,7 @@ def law(e: EffectModel) -> None:
     v, z = e.signal("velocity"), e.state(sized(e, Z))
     h = 1 + p.r * ca.exp(-((v / p.v_s) ** 2))
     z_dot, a = bristle(v, z, h, p.x_0)
-    e.derivative(z, ca.if_else(p.f_c > 0, z_dot, 0.0))  # absent, it may be too fast to follow
+    e.derivative(z, ca.if_else(p.f_c > 0, z_dot, 0.0))  # it rests while the effect is absent
     damping = p.t_d * (1 - a) * v / p.x_0
     e.add(-p.f_c * (z + damping))
     e.stored_energy(p.f_c * p.x_0 * z**2 / 2)

@@ -42,7 +42,7 @@ def law(e: EffectModel) -> None:
     p, x_dot = e.parameters(t_h=TAU_H, x_h=X_H), e.signal("rate")
     z = e.state(sized(e, Z))
     z_dot, a = bristle(x_dot, z, ca.SX(1), p.x_h)
-    e.derivative(z, ca.if_else(p.t_h > 0, z_dot, 0.0))  # absent, it may be too fast to follow
+    e.derivative(z, ca.if_else(p.t_h > 0, z_dot, 0.0))  # it rests while the effect is absent
     e.add(-p.t_h * z)
     e.stored_energy(p.t_h * p.x_h * z**2 / 2)
     e.loss(p.t_h * a * z**2 * ca.fabs(x_dot))

@@ -33,7 +33,7 @@ class Entry:
         quantity: declaration (unit, bounds, text).
         start: start value.
         strength: name of the strength of the effect that it belongs to, "" if to none.
-        stiff: whether it is the strength of an effect whose state is stiff.
+        stiff: whether it is the strength of an effect whose state may be stiff (`Effect.stiff`).
     """
 
     name: str

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cosim.calibrate import Problem
+from cosim.calibrate import Problem, read_problem
+from cosim.calibrate.calibration import calibrated
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding
+from cosim.calibrate.checks.late import check_late
 from cosim.calibrate.checks.scale import check_scale
 from cosim.calibrate.checks.times import check_times
+from tests.diagnose import disc
+from tests.problems import simulator
 
 
 def of_kind(problem: Problem, kind: str) -> list[Finding]:
@@ -114,3 +119,24 @@ def test_a_scale_that_is_wrong_names_the_clock_where_samples_are_far_apart(
     problem = problem.with_data(data).changed(step=problem.runs[0].interval / factor)
     [found] = check_scale(problem, models, index)
     assert ("4000 communication steps apart: if the clock counts" in found.text) == (factor > 1e3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_inputs_that_are_late_beside_something_else_are_a_warning(
+    tmp_path: Path, friction: float
+) -> None:
+    """What else is wrong draws the shift, so that no figure can be given for sure."""
+    late = 6
+    folder = disc.write(
+        tmp_path, lambda w, theta, t: friction * np.tanh(w / 0.02), names=("sweep", "check")
+    )
+    for file in folder.glob("*.csv"):
+        rows = np.loadtxt(file, delimiter=",", skiprows=1)
+        rows[:, 1] = np.concatenate([np.zeros(late), rows[:-late, 1]])
+        np.savetxt(file, rows, delimiter=",", fmt="%.7g", header="time,tau,w,theta", comments="")
+    estimate, _ = calibrated(simulator(read_problem(folder)))
+    (found,) = check_late(estimate)
+    assert (found.severity, found.kind) == ("warning" if friction else "error", "clock")
+    assert "after what it causes" in found.text
+    assert ("once it is known what else is wrong" in found.text) == bool(friction)

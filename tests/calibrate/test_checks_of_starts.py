@@ -101,6 +101,7 @@ def test_a_start_value_with_noise_is_told_where_it_is_felt(
     mapping = folder / "dataset.toml"
     variable, size = {"theta": ("load.angle", "1"), "w": ("load.speed", "9.3")}[column]
     text = mapping.read_text(encoding="utf-8")
+    text = text.replace("[channels.w]\n", '[channels.speed]\ncolumn = "w"\n')
     if alone:  # no angle is measured
         before, _, after = text.partition("[channels.theta]")
         text = before + "[[parameter]]" + after.partition("[[parameter]]")[2]

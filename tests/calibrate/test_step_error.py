@@ -207,8 +207,16 @@ def test_what_does_not_hold_in_other_runs_is_said() -> None:
     [line] = _far({"a": channel(0.5, 0.6), "b": channel(0.1, 0.1)}, same)
     assert line.startswith("the model leaves 5 times the noise in a: it lacks something")
     assert len(_far({"a": channel(0.5, 1.5), "b": channel(0.1, 0.1)}, same)) == 2
-    [line] = _far({"a": channel(0.1, 0.3), "b": channel(0.1, 0.1)}, lambda: {"a": 1.0, "b": 1.0})
+    explained = {"a": 1.0, "b": 5.0}
+    [line] = _far({"a": channel(0.1, 0.3), "b": channel(0.1, 0.1)}, lambda: explained)
     assert line.startswith("in runs that were not fitted a is off by 3 times its noise, which is")
+    [line] = _far({"a": channel(0.1, 0.9), "b": channel(0.1, 0.5)}, lambda: explained)
+    assert line.startswith("in runs that were not fitted it leaves 5 times the noise in b, in")
+    # where fitted runs hold more than noise, or runs turn unstable, intervals say nothing of it
+    lines = _far({"a": channel(0.4, 2.0), "b": channel(0.1, 0.1)}, lambda: explained)
+    assert lines[0].startswith("the model leaves 4 times") and "another kind" in lines[1]
+    [line] = _far({"a": channel(0.1, 0.3), "b": channel(0.1, 0.1)}, None)
+    assert "another kind" in line
 
 
 @pytest.mark.parametrize(

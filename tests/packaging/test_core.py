@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -225,3 +227,27 @@ def test_outputs_do_not_depend_on_which_of_them_were_fetched_before() -> None:
     # the same operations in another order of calls: not one bit may differ
     np.testing.assert_array_equal(run(states, others), run(others, states))
     assert len({tuple(row) for row in run(states, others)}) == 20
+
+
+@pytest.mark.parametrize("start", [0.0, 0.37])
+@pytest.mark.parametrize("t_lag", [0.05, 0.015, 0.002])
+def test_a_lag_is_the_same_in_all_builds(t_lag: float, start: float) -> None:
+    """Above and below two steps of 0.01 s, and its tick at the start of a run alone."""
+
+    def run(kind: str, fmi: int) -> list[list[float]]:
+        path = fmu("adapter/signal+first_order_lag", kind, fmi)
+        values = {"first_order_lag.t_lag": t_lag, "u": 1.0}
+        with Slave(path, values, start=start) as slave:
+            rows = []
+            for k in range(30):
+                slave.set({"u": 1.0 + 0.5 * (k // 7)})
+                slave.step(start + 0.01 * k, 0.01)
+                rows.append(slave.get(["y"]))
+            return rows
+
+    native = run("native", 2)
+    np.testing.assert_array_equal(run("python", 2), native)
+    np.testing.assert_array_equal(run("native", 3), native)
+    assert native[6] == [1.0]  # settled, until the step in the signal
+    lagged = 1.5 - 0.5 * math.exp(-0.01 / t_lag)
+    assert native[7][0] == pytest.approx(lagged, abs=1e-3)

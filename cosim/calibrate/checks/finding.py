@@ -39,7 +39,7 @@ KINDS = {
     "simulation": "a model that does not run",
     "smoothed": "columns without the noise that they are said to have",
     "spikes": "single samples that stand out",
-    "start": "a run that begins where the model does not",
+    "start": "a run that begins where the model does not, or with a value that has noise",
     "step": "a communication step that does not divide the sample interval, or the period",
     "swapped": "columns that are exchanged",
     "undriven": "an input that no column drives, though one may be it",

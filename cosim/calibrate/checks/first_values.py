@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..simulator import Simulator
 
 Vector = NDArray[np.float64]
-FELT = 0.5
+SHOWS = 0.5
 """RMS over the noise, in some channel of a run, that one deviation of a start value must make: the
 residual is then an eighth larger in mean square than the noise, and counts as the model's lack."""
 
@@ -33,14 +33,17 @@ def check_first_values(
         models: what it makes of them, by run.
     """
     problem = simulator.problem
-    known = {name for p in (*problem.parameters, *problem.late) for name, _ in p.targets}
     worst: dict[str, tuple[float, float, str, str]] = {}
     for run in problem.runs:
+        known = {
+            name for p in (*problem.parameters, *problem.late) if p.run in ("", run.name)
+            for name, _ in p.targets
+        }  # fmt: skip
         for name, sigma in run.unsure.items():
             if not sigma or name in known or name not in run.starts:
                 continue
-            size, channel = _felt(simulator, theta, run.name, name, sigma, models[run.name])
-            if size > max(FELT, worst.get(name, (0.0,))[0]):
+            size, channel = _shown(simulator, theta, run.name, name, sigma, models[run.name])
+            if size > max(SHOWS, worst.get(name, (0.0,))[0]):
                 worst[name] = size, sigma, run.name, channel
     for name, (size, sigma, run_name, channel) in worst.items():
         unit = problem.system().unit(name)
@@ -53,7 +56,7 @@ def check_first_values(
         yield Finding("warning", "start", run_name, "", text)
 
 
-def _felt(
+def _shown(
     simulator: Simulator, theta: Vector, run_name: str, name: str, sigma: float, model: Vector
 ) -> tuple[float, str]:
     """RMS over the noise in the channel that a deviation of a start value moves most."""
@@ -61,7 +64,7 @@ def _felt(
     run = problem.run(run_name)
     moved = replace(run, starts={**run.starts, name: run.starts[name] + sigma})
     try:
-        other = simulator.of(problem.changed(runs=[moved])).simulate(theta, moved)
+        other = simulator.simulate(theta, moved)
     except CosimError:  # what cannot be simulated there says nothing
         return 0.0, ""
     change = np.where(np.isfinite(run.data), (other - model) / problem.sigma, np.nan)
