@@ -41,10 +41,10 @@ SOME = "--clean 0 --repeats 0 --pairs {} --triples {}"
 WITHHELD = "--clean 0 --repeats 1 --withheld"
 SERIES = (
     *(Series("motor", "one", 140005 + i, ONE.format(7)) for i in range(5)),
-    *(Series("motor", "several", 140103 + i, SOME.format(10, 5)) for i in range(4)),
+    *(Series("motor", "several", 140104 + i, SOME.format(10, 5)) for i in range(4)),
     *(Series("motor", "withheld", 140202 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141002 + i, ONE.format(6)) for i in range(2)),
-    *(Series("crawler", "several", 141101 + i, SOME.format(10, 4)) for i in range(2)),
+    *(Series("crawler", "several", 141102 + i, SOME.format(10, 4)) for i in range(2)),
     Series("crawler", "withheld", 141201, WITHHELD),
     Series("omni", "one", 142003, ONE.format(6)),
     Series("omni", "several", 142101, SOME.format(8, 2)),
