@@ -82,7 +82,7 @@ def _deviations(estimate: Estimate, names: Sequence[str]) -> list[tuple[Vector, 
     return found
 
 
-def told(channel: str, size: float) -> str:
+def within_intervals(channel: str, size: float) -> str:
     """What is said of a channel that is off by no more than that in runs that were not fitted.
 
     Args:

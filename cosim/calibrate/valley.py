@@ -22,9 +22,6 @@ from .problem import Problem
 Vector = NDArray[np.float64]
 HEAVY = 0.3
 """Weight in a weak direction from which a parameter is moved by itself."""
-ITS_OWN = 0.3
-"""Share of its deviation that others which were moved must leave a parameter to be moved, too: of
-less, a tenth of its variance at most is not theirs, which intervals do not show."""
 FAR = 1.0
 """Spans by which that is done at most."""
 CLAIMED, SURE, SEEN = 4.0, 0.5, 8.0
@@ -40,8 +37,7 @@ def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
     Several weak directions at once are mixed by rounded derivatives, and none of them is then the
     one along which nothing changes; a parameter that is held elsewhere finds it. It is moved by
     what its interval allows, and twice as far, as long as that costs less than it should: each
-    stretch of such a valley shows better where it goes on. What has been moved far enough by others
-    that were found as well known as claimed is not moved again.
+    stretch of such a valley shows better where it goes on.
 
     Args:
         run: at its minimum.
@@ -52,35 +48,20 @@ def profiled(run: Descent, covariance: Vector, weak: Vector) -> Vector:
     common = np.array([not item.run for item in run.problem.parameters])
     silent = run.drawn & (np.diag(covariance) > KNOWN**2)
     moved = np.flatnonzero((np.any(np.abs(weak) > HEAVY, axis=1) & common) | silent)
-    asked: list[int] = []
     for k in sorted(moved.tolist(), key=lambda k: -covariance[k, k]):
         claimed = math.sqrt(covariance[k, k])
         if silent[k]:  # open up to the bound, which is two deviations away
             told, way = (2.0 / _room(run, k)[1]) ** 2, covariance[:, k] / covariance[k, k]
-        elif (
-            claimed > KNOWN
-            or _beside(covariance, asked, k) < ITS_OWN
-            or (found := _followed(run, k, claimed)) is None
-        ):
+        elif claimed > KNOWN:
             continue
-        else:
+        elif (found := _followed(run, k, claimed)) is not None:
             told, way = found
-            if told >= SURE / claimed**2:
-                asked.append(k)
-                continue
+        else:
+            continue
         more = 1.0 / told - covariance[k, k]
         if more > 0.0:
             covariance += more * np.outer(way, way)
     return covariance
-
-
-def _beside(covariance: Vector, asked: list[int], k: int) -> float:
-    """Share of a parameter's deviation that is left where others are held."""
-    if not asked:
-        return 1.0
-    across = covariance[k, asked]
-    with_them = float(across @ np.linalg.pinv(covariance[np.ix_(asked, asked)]) @ across)
-    return math.sqrt(max(1.0 - with_them / covariance[k, k], 0.0))
 
 
 def _room(run: Descent, k: int) -> tuple[float, float]:
@@ -102,7 +83,7 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
         claimed: its standard deviation according to the derivatives there [spans].
 
     Returns:
-        None where it cannot be moved, or goes astray at once.
+        None where it cannot be moved, or has been found as well known as claimed.
     """
     p = run.problem
     stuck = STUCK**2 * sum(np.isfinite(r).sum() for _, r in run.residuals)
@@ -132,7 +113,7 @@ def _followed(run: Descent, k: int, claimed: float) -> tuple[float, Vector] | No
         if length >= room:
             break
         before, length = rise, min(2.0 * length, room)
-    return (told, best) if math.isfinite(told) else None
+    return (told, best) if told < SURE / claimed**2 else None
 
 
 def stretch(problem: Problem, theta: Vector, way: Vector) -> float:

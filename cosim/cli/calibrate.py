@@ -153,7 +153,7 @@ def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]] | None
             asked where fitted runs hold more than noise, for intervals then make up for that. None
             where a deviation is no small change (`Problem.unstable`).
     """
-    from ..calibrate.foretelling import told
+    from ..calibrate.foretelling import within_intervals
 
     fitted, others = (
         {n: (v[purpose] or 0.0) / v["noise_rms"] for n, v in channels.items()}
@@ -174,7 +174,7 @@ def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]] | None
     rest = beside() if calm and beside is not None else others
     lasting = [n for n in far if rest[n] > FAR * max(fitted[n], 1.0)]
     if not lasting:
-        return [*said, told(far[0], others[far[0]])]
+        return [*said, within_intervals(far[0], others[far[0]])]
     name = lasting[0]
     return [
         *said,

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.foretelling import told
+from ..calibrate.foretelling import within_intervals
 from .bounds import beyond
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .judge import Judge
@@ -177,7 +177,7 @@ def unsure(table: Table, labels: Collection[str]) -> Iterator[str]:
     """
     for model in table.models:
         if not model.rough and set(model.labels) == set(labels):
-            yield from (told(x.channel, x.rms) for x in model.left if x.foretold)
+            yield from (within_intervals(x.channel, x.rms) for x in model.left if x.foretold)
 
 
 def force_of(place: Place) -> Force:
