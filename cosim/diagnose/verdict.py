@@ -185,16 +185,16 @@ def above(model: Model) -> tuple[Left, ...]:
 def stands(table: Table, place: int) -> bool:
     """Whether what a set leaves is noise, or nothing that another law could explain.
 
-    That is: it is white; or its RMS is a tenth of what was explained, and no more
-    in unused runs than in fitted ones, and no free force at a port would have left less of the
-    declared model's rest, nor explains half of its own.
+    That is: it is white, if need be with laws that are too small for a name (`_left`); or its RMS
+    is a tenth of what was explained, and no more in unused runs than in fitted ones, and no free
+    force at a port would have left less of the declared model's rest, nor explains half of its own.
 
     Args:
         table: of all models.
         place: of the set in it.
     """
     model, declared = table.models[place], table.models[0]
-    if all(x.white for x in above(model)):
+    if all(x.white for x in _left(table, model)):
         return True
     if not model.forces or _most(model.forces).explained >= HALF:
         return False
@@ -203,6 +203,27 @@ def stands(table: Table, place: int) -> bool:
     left = _excess(table, model)
     # what was explained counts in full, also where runs may turn unstable
     return left <= TENTH**2 * (max(_excess(table, declared), declared.squares) - left)
+
+
+def _left(table: Table, model: Model) -> tuple[Left, ...]:
+    """What is `above` noise, of a set that leaves what is not white the least beside small laws.
+
+    That is: in a set of the same laws and of some that unused runs want, each too small for a name.
+    They are there all the same, and what they do is no objection to the set that is named.
+    """
+    larger = [
+        m for m in table.models
+        if not m.rough and m.labels > model.labels and wanted(m.gain, table.candidates)
+        and all(
+            law.there and wanted(law.missed, table.candidates)
+            and law.missed is not None and law.missed.change <= MATERIAL
+            for law in m.laws if law.label not in model.labels
+        )
+    ]  # fmt: skip
+    return min(
+        (sum(not x.white for x in left), len(m.laws), sorted(m.labels), left)
+        for m in (model, *larger) for left in [above(m)]
+    )[-1]  # fmt: skip
 
 
 def beaten(table: Table, place: int) -> int | None:
@@ -408,7 +429,7 @@ def _named(table: Table, best: int) -> Verdict:
         tuple(others[k] for k in order),
         tuple(replaced[k] for k in order),
         {label: tuple(sorted(found)) for label, found in places.items() if found},
-        above(model),
+        _left(table, model),
         force=model.forces[0] if model.forces else None,
         ended=table.ended,
     )

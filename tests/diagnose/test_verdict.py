@@ -562,6 +562,27 @@ def test_a_set_that_leaves_slow_parts_has_no_name(slow: float, p_value: float, n
         assert "leave speed at slow parts of 1.5 times its noise's" in verdict.reason
 
 
+@pytest.mark.parametrize(
+    ("change", "gain", "named"), [(0.1, 90.0, True), (0.1, 5.0, False), (0.2, 90.0, False)]
+)
+def test_what_a_law_too_small_for_a_name_does_is_not_left(
+    change: float, gain: float, named: bool
+) -> None:
+    """Beside it a set is judged; not beside one that unused runs do not want, or a larger one."""
+    one, small = law("coulomb", "motor.shaft"), law(gain=gain, fitted=50.0, change=change)
+    rest = (
+        replace(left(1.05), p_value=1e-9, slow=1.24), left(1.0, "current"),
+        left(1.0, purpose="identification"),
+    )  # fmt: skip
+    alone = replace(model(one, rms=1.05), left=rest)
+    both = model(replace(one, missed=None), small)
+    both = replace(both, gain=alone.gain)
+    verdict = decide(table(FAR, alone, both))
+    assert (verdict.kind == "effect_found") == named
+    if named:
+        assert [x.label for x in verdict.laws] == [one.label] and not verdict.left
+
+
 def test_slow_parts_of_a_model_without_laws_are_no_ground_for_one() -> None:
     """Noise may be slow itself: silence asks for less than a name."""
     rest = tuple(replace(x, p_value=1e-9, slow=1.5) for x in CLEAN.left)
