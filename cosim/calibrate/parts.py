@@ -34,6 +34,7 @@ CLOCK, DRIFT = "clock:", "drift:"
 how late the clock of a channel, or of the column that drives an input, is [s]; and what follows
 where it is how much later it becomes in a run, per time: `clock:drift:CHANNEL`."""
 COLUMN, GAIN, BIAS = "column:", "gain:", "bias:"
+ZERO_DRIFT = "zero_drift:"
 WAVE, CYCLES, PHASE = "wave:", "cycles:", "phase:"
 """The same for what a recorder makes of a column: `column:gain:CHANNEL`, `column:bias:CHANNEL`."""
 LOGGED = (CLOCK, COLUMN)
@@ -163,14 +164,19 @@ class Channel:
             mean = np.interp(times, recorded, integral) - np.interp(first, recorded, integral)
             result = np.where(times > first, mean / width, values[0])
         gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
-        offset = self.offset + errors.get(BIAS + self.name, 0.0)
-        reading = gain * result + offset
+        reading = gain * result + self._zero(sampler, errors)
         return np.asarray(reading + self._wave(reading, errors), dtype=np.float64)
 
     @property
     def angle(self) -> float:
         """One of its unit, where that is one of angles [rad]; 1 where nobody says it."""
         return parse(self.unit).factor if self.unit else 1.0
+
+    def _zero(self, sampler: Sampler, errors: Mapping[str, float]) -> Vector | float:
+        """What is read where there is nothing."""
+        zero = self.offset + errors.get(BIAS + self.name, 0.0)
+        rate = errors.get(ZERO_DRIFT + self.name, 0.0)
+        return zero + rate * (sampler.times - sampler.begin) if rate else zero
 
     def _wave(self, reading: Vector, errors: Mapping[str, float]) -> Vector | float:
         """What repeats with the reading of an angle."""
@@ -179,17 +185,20 @@ class Channel:
         turns, phase = errors.get(CYCLES + self.name, 1.0), errors.get(PHASE + self.name, 0.0)
         return np.asarray(size * np.sin(turns * self.angle * reading + phase), dtype=np.float64)
 
-    def meant(self, data: Vector, errors: Mapping[str, float] = NO_ERRORS) -> Vector:
+    def meant(
+        self, sampler: Sampler, data: Vector, errors: Mapping[str, float] = NO_ERRORS
+    ) -> Vector:
         """Values of the signal for which the channel reads this; of `sample` channels.
 
         Args:
+            sampler: of the run.
             data: as logged.
             errors: of the log, see `Problem.log_errors`; a wave is taken where the reading is, so
                 what it misses is of second order in its size.
         """
         gain = self.gain * (1.0 + errors.get(GAIN + self.name, 0.0))
-        offset = self.offset + errors.get(BIAS + self.name, 0.0)
-        return np.asarray((data - self._wave(data, errors) - offset) / gain, dtype=np.float64)
+        read = data - self._wave(data, errors) - self._zero(sampler, errors)
+        return np.asarray(read / gain, dtype=np.float64)
 
 
 class Sampler:

@@ -1,7 +1,10 @@
-"""What a recorder makes of a column: targets `column:gain:NAME`, `column:bias:NAME` and, of an
-angle, `column:wave:NAME` with `column:cycles:NAME` and `column:phase:NAME`.
+"""What a recorder makes of a column: targets `column:gain:NAME`, `column:bias:NAME`,
+`column:zero_drift:NAME` and, of an angle, `column:wave:NAME` with `column:cycles:NAME` and
+`column:phase:NAME`.
 
-    reading = (1 + error) truth + bias,   column = reading + A sin(n reading + psi)
+    reading = (1 + error) truth + bias + rate (t - t_0),   column = reading + A sin(n reading + psi)
+
+t_0 is the run's first sample.
 
 Where a system takes a reading for the truth, since no sensor of it stands between, what is wrong
 with that sensor is in the log only: no loop sees it, and nothing moves otherwise. An angle's
@@ -9,7 +12,7 @@ reading is wrong once per turn where a disc or a magnet is off its centre (a com
 twice where two windings of a resolver differ in size or are not square to each other.
 
 The same quantity has two roles: declared, it is a parameter of the mapping; undeclared, it is the
-effect `gain`, `bias` or `angle_ripple` at a column of the log (`Reading`).
+effect `gain`, `bias`, `zero_drift` or `angle_ripple` at a column of the log (`Reading`).
 
 Not modelled: further harmonics.
 
@@ -28,8 +31,8 @@ import numpy as np
 
 from ..errors import UnknownNameError, listing
 from ..spec.hints import NO_HINTS, SearchHints
-from ..spec.units import Unit, parse
-from .parts import BIAS, COLUMN, CYCLES, GAIN, PHASE, WAVE, Parameter
+from ..spec.units import Unit, parse, per_second
+from .parts import BIAS, COLUMN, CYCLES, GAIN, PHASE, WAVE, ZERO_DRIFT, Parameter
 
 if TYPE_CHECKING:
     from .problem import Problem
@@ -40,7 +43,8 @@ which is no sensor's error but another column."""
 TRIED_GAIN = 0.02
 """Error of a gain that is tried: sensors of currents and speeds are right to a few per cent."""
 BIAS_REACH = 1000.0
-"""Greatest bias, over the noise: where more shows, a column has another zero."""
+"""Greatest bias, over the noise, and what a drift of the zero gains at most in the longest run:
+where more shows, a column has another zero."""
 GREATEST_WAVE, TRIED_WAVE = 1.0, 0.01
 """Amplitude of an angle's wave at most [rad], from which the reading goes back while the shaft goes
 on, and the one that is tried: half a degree, of a disc some tenths of a millimetre off its centre.
@@ -48,7 +52,7 @@ on, and the one that is tried: half a degree, of a disc some tenths of a millime
 FEWEST, MOST_CYCLES, WINDING = 0.1, 200.0, 100.0
 """Cycles per turn, of the slow side of a gear or of all lines that an absolute track has, and the
 phase [rad], which winds without changing anything."""
-KINDS = (GAIN, BIAS, WAVE, CYCLES, PHASE)
+KINDS = (GAIN, BIAS, ZERO_DRIFT, WAVE, CYCLES, PHASE)
 """Errors of a column."""
 UNITS = {GAIN: "1", CYCLES: "1", PHASE: "rad"}
 """Units of those that have not their channel's."""
@@ -60,11 +64,11 @@ class Reading:
 
     Attributes:
         channel: the column.
-        effect: `gain` or `bias`, as in the system, or `angle_ripple`.
+        effect: `gain`, `bias` or `zero_drift`, as in the system, or `angle_ripple`.
     """
 
     channel: str
-    effect: Literal["gain", "bias", "angle_ripple"]
+    effect: Literal["gain", "bias", "zero_drift", "angle_ripple"]
 
     def added_to(self, problem: Problem, prefix: str) -> Problem:
         """The problem with the error as a parameter, 0 at its nominal value.
@@ -82,7 +86,7 @@ class Reading:
             targets = ((COLUMN + target + self.channel, 1.0),)
             return Parameter(
                 prefix + name, unit, start, low, high, targets, "effect",
-                strength=target in (GAIN, BIAS, WAVE), span=span, text=text, hints=hints,
+                strength=target not in (CYCLES, PHASE), span=span, text=text, hints=hints,
             )  # fmt: skip
 
         if self.effect == "gain":
@@ -92,6 +96,12 @@ class Reading:
             most = BIAS_REACH * own.sigma
             added = [free("bias", BIAS, -most, most, span=own.sigma, unit=own.unit,
                           text="constant error, 0 = absent")]  # fmt: skip
+        elif self.effect == "zero_drift":
+            span = own.sigma / max(float(run.times[-1] - run.times[0]) for run in problem.runs)
+            most = BIAS_REACH * span
+            added = [free("rate", ZERO_DRIFT, -most, most, span=span,
+                          unit=per_second(own.unit) if own.unit else "",
+                          text="error gained per time, 0 = absent")]  # fmt: skip
         else:
             most, tried = GREATEST_WAVE / own.angle, TRIED_WAVE / own.angle
             cycle = self._one_cycle(problem, own.angle)
@@ -115,7 +125,7 @@ class Reading:
 
 
 def recorded(parameters: Iterable[Parameter]) -> set[str]:
-    """`gain:CHANNEL`, `bias:CHANNEL`, `wave:CHANNEL` for what a parameter sets."""
+    """`gain:CHANNEL`, `bias:CHANNEL` and so on for what a parameter sets."""
     return {
         n.removeprefix(COLUMN) for p in parameters for n, _ in p.targets if n.startswith(COLUMN)
     }
@@ -136,7 +146,7 @@ def check_column(target: str, channels: Iterable[str], where: str) -> None:
 
 
 def column_unit(target: str, columns: Mapping[str, str]) -> Unit | None:
-    """Of an error of a column; of a bias and a wave its channel's, None where nobody says it.
+    """Of an error of a column; None where it hangs on its channel's, and nobody says that.
 
     Args:
         target: `column:KIND:NAME`.
@@ -146,4 +156,6 @@ def column_unit(target: str, columns: Mapping[str, str]) -> Unit | None:
     if kind + ":" in UNITS:
         return parse(UNITS[kind + ":"])
     unit = columns.get(name, "")
-    return parse(unit) if unit else None
+    if not unit:
+        return None
+    return parse(per_second(unit) if kind + ":" == ZERO_DRIFT else unit)

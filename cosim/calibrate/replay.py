@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..data.comparison import Reference
 from ..data.recording import Recording
 from ..data.signals import Shifted
@@ -50,14 +52,15 @@ def replay(problem: Problem, theta: Vector, run: MeasuredRun) -> tuple[Recording
         every=every,
         start=first if abs(first) > COINCIDENT * interval else 0.0,
     )
+    sampler = Sampler(run.times, run.times)
     measured = [
         Reference(
             (channel.signal,),
-            Sampler(run.times, run.times).drifted(
+            sampler.drifted(
                 channel.shift - errors.get(channel.name, 0.0),
                 errors.get(DRIFT + channel.name, 0.0),
             ),
-            channel.meant(run.data[:, [column]], errors),
+            channel.meant(sampler, run.data[:, column], errors)[:, np.newaxis],
             "",
             f"{run.name}: {channel.name}",
         )

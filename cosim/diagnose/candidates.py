@@ -1,7 +1,7 @@
 """What could be missing: every effect of the catalogue that fits a balance of the system.
 
 Besides, fidelities of which a declared one is a limit, clocks of the log's columns that are late or
-drift, and gains and biases of columns for which the system has no sensor.
+drift, and gains and zeros of columns for which the system has no sensor.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ giver takes its own friction off before."""
 SHOWS = "Late sensor or clock of what was logged."
 FOLLOWS = "Late response to what was logged; negative: what was logged is late itself."
 DRIFTS = "Clock that runs slow against that of the inputs; negative: fast."
-READS: dict[Literal["gain", "bias", "angle_ripple"], tuple[str, str]] = {
+READS: dict[Literal["gain", "bias", "zero_drift", "angle_ripple"], tuple[str, str]] = {
     "gain": ("gain", "Gain error of what was logged: nothing else reads it."),
     "bias": ("bias", "Constant error of what was logged: nothing else reads it."),
+    "zero_drift": ("zero_drift", "Error of what was logged that grows steadily."),
     "angle_ripple": ("wave", "Error of a logged angle that repeats with it."),
 }
 """Errors of columns: what targets call them, and what they are."""
@@ -205,7 +206,7 @@ def drifts(problem: Problem) -> list[Candidate]:
 
 
 def misread(problem: Problem) -> list[Candidate]:
-    """Gains and biases of columns that show what no sensor of the system gives, waves of angles.
+    """Gains and zeros of columns that show what no sensor of the system gives, waves of angles.
 
     Sensors of the system may be wrong themselves, for the log and for what reads them. What a
     mapping declares is not asked again.

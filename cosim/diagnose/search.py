@@ -461,7 +461,8 @@ class Search(LateValueFitter):
         """Replace the first few quick fits by thorough ones.
 
         Where unused runs want none of them, those that gain most on the others: a quick fit may
-        still be too far from its minimum to be of use elsewhere.
+        still be too far from its minimum to be of use elsewhere; and the best of those that change
+        too little to be named, whose strength along a valley may be far from its own, too.
 
         Args:
             base: model without the effects.
@@ -480,6 +481,8 @@ class Search(LateValueFitter):
             sizes = [self.gain(base, f) for f in gains]
             least = max(SLIGHT * max(sizes, default=0.0), GATE)
             near = [f for f, gain in zip(gains, sizes, strict=True) if gain > least][:UNWANTED]
+        elif not good:  # too small for a name, as far as a quick fit tells
+            near = [f for f in current.fitted if f.gate is not None and f.gate.passed][:1]
         better = {
             id(f): self.refined(base, f if alone else self.sharpened(f, base, DRAFT)) for f in near
         }

@@ -130,6 +130,21 @@ def parse(symbol: str) -> Unit:
     return Unit(symbol, tuple(total), factor, offset)
 
 
+def per_second(symbol: str) -> str:
+    """The unit of what a quantity of this unit gains per time; of `any`, `any`.
+
+    Raises:
+        UnitError: an unknown symbol.
+    """
+    unit, text = parse(symbol), _ALIASES.get(symbol.strip(), symbol.strip())
+    if text == ANY:
+        return ANY
+    if text in ("", "-") or unit.offset:  # degrees Celsius change by kelvins
+        text = unit.dimension()
+    above, _, below = text.partition("/")
+    return f"{above}/({below.strip('()')}.s)" if below else f"{above}/s"
+
+
 def conversion(source: Unit, target: Unit) -> tuple[float, float]:
     """Gain and offset of `target_value = gain * source_value + offset`; 1 and 0 to or from `any`.
 

@@ -4,7 +4,7 @@
 
 A vector signal has a `share` for each element, so that one joint or axis alone can be wrong.
 
-Not modelled: drift.
+Not modelled: drift (`zero_drift`).
 
 Source: textbook.
 """

@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from cosim.spec.units import per_second
+
 from ..effect_model import EffectModel
 from ..quantity import Quantity
 from ..units import base_exponents, coherent
@@ -19,6 +21,11 @@ SHARE = Quantity("share", "1", "part of the effect that each element of the sign
 def in_unit(e: EffectModel, quantity: Quantity) -> Quantity:
     """A quantity declared with the unit of the balance."""
     return replace(quantity, unit=e.unit)
+
+
+def per_time(e: EffectModel, quantity: Quantity) -> Quantity:
+    """A quantity declared with the unit of the balance per second."""
+    return replace(quantity, unit=per_second(e.unit))
 
 
 def per_unit(e: EffectModel, quantity: Quantity) -> Quantity:

@@ -69,6 +69,12 @@ def test_a_bias_of_a_column_is_converted_to_what_its_channel_reads(tmp_path: Pat
     np.testing.assert_allclose(found - plain, np.degrees(0.1), rtol=1e-9)
 
 
+def test_a_drift_of_a_column_grows_from_its_first_sample_on(tmp_path: Path) -> None:
+    found, plain = turned(tmp_path, "column:zero_drift:phi", "rad/s", 0.01)
+    wanted = np.degrees(0.01) * (TIMES - TIMES[0])
+    np.testing.assert_allclose(found - plain, wanted, rtol=0, atol=1e-9)  # of tens of degrees
+
+
 def test_a_wave_of_a_column_repeats_with_the_turn_whatever_its_unit(tmp_path: Path) -> None:
     found, plain = turned(tmp_path, "column:wave:phi", "rad", 0.02)
     wanted = np.degrees(0.02) * np.sin(np.radians(plain))

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from cosim.errors import UnitError
-from cosim.spec.units import conversion, parse
+from cosim.spec.units import conversion, parse, per_second
 
 
 @pytest.mark.parametrize(
@@ -52,3 +52,15 @@ def test_incompatible_units_name_both_and_their_dimension() -> None:
 def test_unknown_unit(symbol: str) -> None:
     with pytest.raises(UnitError, match="unit"):
         parse(symbol)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "rate"),
+    [
+        ("rad", "rad/s"), ("m/s", "m/(s.s)"), ("V/(A.s)", "V/(A.s.s)"), ("1", "1/s"), ("-", "1/s"),
+        ("U/min", "rpm/s"), ("degC", "K/s"), ("any", "any"),
+    ],
+)  # fmt: skip
+def test_what_a_unit_is_per_second(symbol: str, rate: str) -> None:
+    assert per_second(symbol) == rate
+    parse(rate)

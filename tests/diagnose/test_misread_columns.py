@@ -57,6 +57,24 @@ def test_a_yaw_that_reads_too_much_is_named_with_its_error(tmp_path: Path, error
     assert table["variants"] == {} and not any("column:" in name for name in table["values"])
 
 
+@pytest.mark.parametrize("rate", [0.004, -0.01])
+def test_a_heading_that_drifts_is_named_with_its_rate(tmp_path: Path, rate: float) -> None:
+    """As a gyro's does."""
+    problem = written(tmp_path, 0.0)
+    data = {}
+    for run in problem.runs:
+        rows = run.data.copy()
+        rows[:, YAW] += rate * (run.times - run.times[0])
+        data[run.name] = rows
+    problem = problem.with_data(data)
+    _, winner = found(problem, misread(problem))
+    assert winner is not None and winner.effects[-1].label == "zero_drift at log.yaw"
+    place = winner.problem.index("log.yaw.zero_drift.rate")
+    assert winner.estimate.low[place] < rate < winner.estimate.high[place]
+    assert winner.problem.parameters[place].unit == "rad/s"
+    assert 2.0 * winner.estimate.robust < 1.2 * winner.estimate.count
+
+
 def test_a_path_of_the_same_unit_is_no_sensor(tmp_path: Path) -> None:
     """A base whose turn may be wrong has no gyro for that."""
     problem = written(tmp_path, 0.0)

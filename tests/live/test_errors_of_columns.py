@@ -94,6 +94,7 @@ def agree(
     ("target", "value", "unknown"),
     [
         ("column:bias:phi", 0.1, 0), ("column:gain:w", 0.05, 0),
+        ("column:zero_drift:phi", 0.05, 0),
         ("clock:phi", 0.1, 10), ("clock:phi", -0.03, 0), ("clock:phi", 0.013, 2),
         ("clock:drift:phi", 0.02, 0), ("clock:drift:phi", -0.01, 0),
         ("clock:load.tau", 0.02, 0), ("clock:load.tau", -0.035, 0),
@@ -103,7 +104,9 @@ def test_a_twin_corrects_columns_as_a_calibration_does(
     tmp_path: Path, target: str, value: float, unknown: int
 ) -> None:
     plain = rig(tmp_path / "plain")
-    unit = {"gain": "1", "bias": "rad", "drift": "1"}.get(target.split(":")[1], "s")
+    unit = {"gain": "1", "bias": "rad", "zero_drift": "rad/s", "drift": "1"}.get(
+        target.split(":")[1], "s"
+    )
     reading = changed(
         tmp_path / "disc", "[[run]]", ERROR.format(value=value, target=target, unit=unit)
     )

@@ -149,6 +149,21 @@ def test_clock_skew_loses_time_in_proportion() -> None:
     assert t[-1] - read[-1] > 0.8 * skew * t[-1]
 
 
+def test_a_zero_drifts_from_the_start_of_a_run_on() -> None:
+    stepper = Stepper("current_sensor/ideal+zero_drift", {"zero_drift.rate": 0.2})
+    read = [stepper.step({"i": 3.0}, 0.5)["i_meas"] for _ in range(4)]
+    assert read == pytest.approx([3.1, 3.2, 3.3, 3.4], rel=1e-14)  # a constant is integrated
+
+
+@pytest.mark.parametrize(
+    ("variant", "unit"), [("pose_sensor/ideal", "m/s"), ("adapter/signal", "any")]
+)
+def test_a_drift_has_the_unit_of_its_signal_per_second(variant: str, unit: str) -> None:
+    model = build_model(f"{variant}+zero_drift")
+    (rate,) = [v for v in model.of_role("parameter") if v.name.endswith("zero_drift.rate")]
+    assert rate.quantity.unit == unit
+
+
 def test_held_commands_equal_the_sample_and_hold_effect() -> None:
     signal = smooth(0.001, 100)
     link = command("held", {"T": 0.01}, signal, 0.001)
