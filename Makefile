@@ -52,16 +52,17 @@ wheel: $(RUNS)
 	$(BIN)/python -m sources.distribution --platform $(PLATFORM)
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir dist .
 
-# what runs, builds FMUs and diagnoses; the tools of the tests are three times as much
+# what runs, builds FMUs and diagnoses; the tools of the tests are three times as much. Modules are
+# compiled when they are first imported: most of what is installed never is, and it took a minute
 $(RUNS): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[build]"
+	$(BIN)/python -m pip install --quiet --no-compile --editable ".[build]"
 	touch $(RUNS)
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[build,control,docs,gym,live,logs,study,tables,validate,test,check]"
+	$(BIN)/python -m pip install --quiet --no-compile --upgrade pip
+	$(BIN)/python -m pip install --quiet --no-compile --editable ".[build,control,docs,gym,live,logs,study,tables,validate,test,check]"
 	touch $(RUNS) $(STAMP)
 
 clean:

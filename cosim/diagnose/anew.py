@@ -21,8 +21,7 @@ def asked_anew(search: Search, proposed: Fitted) -> Fitted | None:
         search: its memo has the set without each of its laws, unless it cannot be simulated.
         proposed: the set, thoroughly fitted.
     """
-    declared = search.memo.get(frozenset())
-    assert declared is not None
+    declared = search.memo.declared
     begun = {stage.base.labels for stage in search.rounds if not stage.scored_elsewhere}
     gains = [(law.label, search.law(proposed, law).missed) for law in proposed.effects]
     order = sorted((g.fitted + g.unused, label) for label, g in gains if g is not None)

@@ -23,6 +23,7 @@ from .anew import asked_anew
 from .answer import Verdict
 from .bounds import opened, told
 from .bursts import bursts, times
+from .by_run import by_run
 from .candidates import candidates
 from .carriers import leave_fmus
 from .course import Course, asked_everywhere, asked_single
@@ -231,6 +232,9 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
             _completed(result, search, current, wide)
         assert result.after is not None
         enough = result.answer.white or (result.answer.bounds and not result.answer.beyond)
+        if result.verdict == "unexplained" and not enough and asked is None:
+            result.by_run = by_run(search, base)
+            enough = any(not item.left for item in result.by_run)
         if asked or (task.law and result.verdict == "unexplained" and not enough):
             if asked is None and not search.raw.late:
                 asked_everywhere(result)
@@ -296,8 +300,7 @@ def _judged(result: Diagnosis, search: Search, current: Fitted, wide: list[Estim
     rounds, ended = search.rounds, result.ended
     forces = {frozenset[str](): result.located} if result.located else {}
     current = examined(search, current, candidates_of(rounds))
-    declared = search.memo.get(frozenset())
-    assert declared is not None
+    declared = search.memo.declared
     if search.lifted is None:
         search.lifted = opened(search, declared)
     simple: set[frozenset[str]] = set()

@@ -33,6 +33,11 @@ class Memo:
     def __iter__(self) -> Iterator[Fitted]:
         return iter(self._fits.values())
 
+    @property
+    def declared(self) -> Fitted:
+        """The fit without effects, which is made before all others."""
+        return self._fits[frozenset()]
+
     def get(self, labels: Labels) -> Fitted | None:
         """The fit of a set, None if there is none."""
         return self._fits.get(labels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from ..calibrate.nuisance import late_values
 from ..calibrate.problem import Problem
 from .adding import made_of
 from .answer import Verdict
+from .by_run import ByRun
 from .facts import Table
 from .foreign import Adapter
 from .foreign_words import said
@@ -47,6 +49,7 @@ class Diagnosis:
         structure: (`before`/`after`, purpose) -> tests.
         power: see `power.power`.
         small: laws that show beside the model of the answer, too small to be named.
+        by_run: declared parameters that may differ between runs, of a machine that is unexplained.
         withheld: effects that were left out of the catalogue.
         experiment: proposed to separate rivals.
         ended: run -> time from which it does not count: what happens there hangs on small changes
@@ -73,6 +76,7 @@ class Diagnosis:
     structure: dict[tuple[str, str], list[WhitenessTest]] = field(default_factory=dict)
     power: dict[str, dict[str, Any]] = field(default_factory=dict)
     small: list[Small] = field(default_factory=list)
+    by_run: list[ByRun] = field(default_factory=list)
     experiment: dict[str, Any] | None = None
     ended: dict[str, float] = field(default_factory=dict)
     further: list[Further] = field(default_factory=list)
@@ -99,9 +103,15 @@ class Diagnosis:
     @property
     def reason(self) -> str:
         """The verdict in sentences."""
-        parts = ["" if self.asked else self.answer.reason, self.inside]
+        parts = ["" if self.asked else self.answer.reason, *self._by_run(), self.inside]
         parts += [self.law.reason] if self.law is not None else []
         return " ".join(part for part in parts if part) or self.answer.reason
+
+    def _by_run(self) -> Iterator[str]:
+        """What is said of parameters that may differ between runs."""
+        yield from (item.sentence for item in self.by_run[:1])
+        if others := [item.parameter for item in self.by_run[1:]]:
+            yield f"The data do not tell it from {' and '.join(others)}."
 
     @property
     def inside(self) -> str:
@@ -145,6 +155,7 @@ class Diagnosis:
             "law_from_data": None if self.law is None else self.law.to_dict(),
             "power": self.power,
             "small_laws": [law.to_dict() for law in self.small],
+            "by_run": [item.to_dict() for item in self.by_run],
             "proposed_experiment": self.experiment,
             "channels": {},
             "further_runs": [item.to_dict() for item in self.further],

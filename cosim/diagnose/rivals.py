@@ -157,8 +157,7 @@ def elsewhere(search: LateValueFitter, fitted: Fitted, rounds: Sequence[Round]) 
         fitted: the set, thoroughly fitted.
         rounds: that found it, or one that asks beside it; that one is of all places.
     """
-    declared = search.memo.get(frozenset())
-    assert declared is not None
+    declared = search.memo.declared
     least = HOPEFUL * search.total(declared, fitted)
     for effect in fitted.effects:
         hidden = {

@@ -309,8 +309,7 @@ class Search(LateValueFitter):
             None if a law that explains as much as any there is in that model, none is better, or
             nothing can be simulated there.
         """
-        declared = self.memo.get(frozenset())
-        assert declared is not None
+        declared = self.memo.declared
         start = self.unfitted(declared)
         if start is None:
             return None

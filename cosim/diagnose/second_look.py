@@ -47,8 +47,7 @@ def around_nominal(search: Search, current: Fitted) -> Round | None:
     nearly what the right one does. Nor where start values that decide when casters turn over hide
     first orders.
     """
-    declared = search.memo.get(frozenset())
-    assert declared is not None
+    declared = search.memo.declared
     beyond = current.estimate.robust - 0.5 * current.estimate.count
     explained = declared.estimate.robust - current.estimate.robust
     if current.effects and beyond <= TENTH**2 * explained:

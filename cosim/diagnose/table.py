@@ -48,8 +48,7 @@ def table_of(
         forces: what free forces explain of what a set of effects leaves.
         ended, stopped: see `Table`.
     """
-    declared = judge.memo.get(frozenset())
-    assert declared is not None
+    declared = judge.memo.declared
     fits = [declared, *(f for f in judge.memo if f.effects)]
     least = RIVALS * max(judge.total(declared, f) for f in fits)
     fits = [
@@ -68,7 +67,7 @@ def table_of(
                 f.complexity,
                 -judge.fitting.cost(judge.fit_data - f.fit),
                 -judge.checking.cost(judge.check_data - f.check) if unused else 0.0,
-                _left(judge, f),
+                left_of(judge, f),
                 judge.better(declared, f) if f.effects else None,
                 tuple(map(force_of, forces[f.labels])) if f.labels in forces else None,
                 _excess(judge, f, run),
@@ -116,7 +115,8 @@ def _beyond(residual: Vector) -> float:
     return float(residual @ residual) - residual.size
 
 
-def _left(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
+def left_of(judge: Judge, fitted: Fitted) -> tuple[Left, ...]:
+    """What a model leaves of each channel, in fitted runs and in unused ones."""
     found = []
     parts = [("identification", judge.fitting, judge.fit_data - fitted.fit)]
     if judge.unused:
@@ -136,7 +136,7 @@ def _opened(judge: Judge, declared: Fitted) -> Model | None:
         return None
     unused = -judge.checking.cost(judge.check_data - f.check) if judge.unused else 0.0
     return Model((), f.complexity, -judge.fitting.cost(judge.fit_data - f.fit), unused,
-                 _left(judge, f), judge.better(declared, f))  # fmt: skip
+                 left_of(judge, f), judge.better(declared, f))  # fmt: skip
 
 
 def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model:

@@ -93,8 +93,7 @@ def together(
         located: where a free force explains most, first.
         only: places whose laws are asked, as candidates name them; all if not given.
     """
-    declared = search.memo.get(frozenset())
-    assert declared is not None
+    declared = search.memo.declared
     among = [] if only else sorted(balances(declared.problem))
     places = [(p.instance, p.port) for p in located if p.evidence > 0.0]
     if not places or search.raw.late:

@@ -8,7 +8,7 @@ lacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +69,7 @@ RUNS = {
     "sweep": "identification", "steps": "identification", "slow": "identification",
     "check": "validation", "again": "validation",
 }  # fmt: skip
+NO_OTHERS: Mapping[str, float] = {}
 SWING = 14.0
 """Of a run `swing` that a test may ask for, which has one frequency [rad/s]."""
 
@@ -88,7 +89,9 @@ def torque(name: str, t: Vector) -> Vector:
     return np.asarray(0.3 * np.sign(np.sin(1.2 * t)) + 0.2 * np.sin(3.0 * t))
 
 
-def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Vector]:
+def run(
+    name: str, law: Law, seconds: float, friction: float = B
+) -> tuple[Vector, Vector, Vector, Vector]:
     """Time, torque, speed and angle of a run without noise."""
     time = np.arange(round(seconds / INTERVAL) + 1) * INTERVAL
     tau, h = torque(name, time), INTERVAL / SPLIT
@@ -97,7 +100,7 @@ def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Ve
     def rate(t: float, speed: float, angle: float) -> float:
         k = min(int(t / INTERVAL), time.size - 2)
         drive = tau[k] + (tau[k + 1] - tau[k]) * (t / INTERVAL - k)
-        return float((drive - B * speed - law(speed, angle, t)) / J)
+        return float((drive - friction * speed - law(speed, angle, t)) / J)
 
     speed = angle = 0.0
     for i in range(1, time.size):
@@ -113,14 +116,20 @@ def run(name: str, law: Law, seconds: float) -> tuple[Vector, Vector, Vector, Ve
 
 
 def write(
-    folder: Path, law: Law, seed: int = 3, seconds: float = 4.0, names: Iterable[str] = RUNS
-) -> Path:
-    """The data set of a disc with this law, of all runs or of those that are named."""
+    folder: Path, law: Law, seed: int = 3, seconds: float = 4.0, names: Iterable[str] = RUNS,
+    frictions: Mapping[str, float] = NO_OTHERS,
+) -> Path:  # fmt: skip
+    """The data set of a disc with this law, of all runs or of those that are named.
+
+    Args:
+        folder, law, seed, seconds, names: see above.
+        frictions: viscous friction in runs where it is another one.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     text = MAPPING
     for name in names:
-        time, tau, w, theta = run(name, law, seconds)
+        time, tau, w, theta = run(name, law, seconds, frictions.get(name, B))
         columns = [time, tau, w + SIGMA["w"] * random.standard_normal(w.size),
                    theta + SIGMA["theta"] * random.standard_normal(w.size)]  # fmt: skip
         np.savetxt(folder / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.7g",
