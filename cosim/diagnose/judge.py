@@ -272,6 +272,14 @@ class Judge:
         """Log likelihood gained on all runs."""
         return self.gains(base, other)[0]
 
+    def enough(self, best: Fitted, other: Fitted) -> float:
+        """Cost on fitted runs [nats] from which another model may do as well as the best one.
+
+        As far as unused runs like it better, it may be behind on fitted ones.
+        """
+        unused = compare(self.check_data, best.check, other.check, self.checking).gain
+        return best.estimate.robust + max(unused, 0.0) + GATE
+
     def apart(self, first: Fitted, second: Fitted) -> bool:
         """Whether the runs tell two models apart."""
 

@@ -15,7 +15,7 @@ from ..errors import CosimError
 from .facts import one_law
 from .late_values import LateValueFitter
 from .memo import Labels
-from .models import GATE, Fitted, compare
+from .models import Fitted
 
 CLOSE = 0.95
 """Share of what a law gains from which others in its place are fitted as far as it: rough fits end
@@ -55,9 +55,7 @@ def to_minimum(search: LateValueFitter, trial: Fitted, goal: Fitted, base: Fitte
         goal: another one that does better.
         base: what gains count from.
     """
-    unused = compare(search.check_data, goal.check, trial.check, search.checking).gain
-    enough = goal.estimate.robust + max(unused, 0.0) + GATE
-    return search.sharpened(trial, base, MINIMUM, enough)
+    return search.sharpened(trial, base, MINIMUM, search.enough(goal, trial))
 
 
 def _close(

@@ -464,8 +464,7 @@ class Search(LateValueFitter):
         too little to be named, whose strength along a valley may be far from its own, too.
 
         Args:
-            base: model without the effects.
-            current: round whose fits are replaced.
+            base, current: model without the effects, and the round whose fits are replaced.
             share: of the best gain, below which a quick fit stays one.
             uncorrected: whether quick fits have errors of the exchange in them.
         """
@@ -477,14 +476,15 @@ class Search(LateValueFitter):
         alone = bool(good) and not near[1:] and not uncorrected
         if not good and self.lacking(base):
             gains = sorted(current.fitted, key=lambda f: -self.gain(base, f))
-            sizes = [self.gain(base, f) for f in gains]
-            least = max(SLIGHT * max(sizes, default=0.0), GATE)
-            near = [f for f, gain in zip(gains, sizes, strict=True) if gain > least][:UNWANTED]
+            least = max(SLIGHT * max((self.gain(base, f) for f in gains), default=0.0), GATE)
+            near = [f for f in gains if self.gain(base, f) > least][:UNWANTED]
         elif not good:  # too small for a name, as far as a quick fit tells
             near = [f for f in current.fitted if f.gate is not None and f.gate.passed][:1]
-        better = {
-            id(f): self.refined(base, f if alone else self.sharpened(f, base, DRAFT)) for f in near
-        }
+        better: dict[int, Fitted] = {}
+        for f in near:  # the best first; others as far as their derivatives lead to it
+            goal = self.enough(better[id(near[0])], f) if good and better else np.inf
+            sharp = f if alone else self.sharpened(f, base, DRAFT, goal)
+            better[id(f)] = self.refined(base, sharp)
         if near and not good:
             best = max(better, key=lambda k: self.gain(base, better[k]))
             if not self.accepted(base, better[best]):  # but at its minimum

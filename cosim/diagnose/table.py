@@ -17,7 +17,7 @@ from .linear import BAND
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
-from .verdict import above, doubts, threshold
+from .verdict import above, doubts, threshold, with_small
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -143,14 +143,17 @@ def _foretold(judge: Judge, table: Table, model: Model, fitted: Fitted) -> Model
     """A model with what it leaves of unused runs beside what its parameters' deviations make there.
 
     Asked only where it matters: of the declared model, and of sets that may be named but for what
-    they leave. Where fitted runs hold more than noise, deviations are not what they are said to be,
-    and slow parts alone are asked. None are told where runs may turn unstable: derivatives say
-    little there.
+    they leave, or for small laws besides. Where fitted runs hold more than noise, deviations are
+    not what they are said to be, and slow parts alone are asked. None are told where runs may turn
+    unstable: derivatives say little there.
     """
     if judge.raw.unstable:
         return replace(model, left=tuple(replace(x, slow=1.0) for x in model.left))
     late = [x for x in above(model) if x.purpose == judge.purpose]
-    if not judge.unused or not late or (model.laws and doubts(table, model)):
+    if not judge.unused or not late:
+        return model
+    able = [m for m in table.models if m.laws and not doubts(table, m)]
+    if model.laws and model not in able and not any(with_small(table, m, model) for m in able):
         return model
     calm = not any(x.structured for x in model.left if x.purpose != judge.purpose)
     if not calm and any(x.structured for x in late):

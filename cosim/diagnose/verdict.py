@@ -205,24 +205,29 @@ def stands(table: Table, place: int) -> bool:
     return left <= TENTH**2 * (max(_excess(table, declared), declared.squares) - left)
 
 
-def _left(table: Table, model: Model) -> tuple[Left, ...]:
-    """What is `above` noise, of a set that leaves what is not white the least beside small laws.
+def with_small(table: Table, model: Model, larger: Model) -> bool:
+    """Whether a set is another one with laws that unused runs want, each too small for a name.
 
-    That is: in a set of the same laws and of some that unused runs want, each too small for a name.
     They are there all the same, and what they do is no objection to the set that is named.
     """
-    larger = [
-        m for m in table.models
-        if not m.rough and m.labels > model.labels and wanted(m.gain, table.candidates)
+    return (
+        not larger.rough
+        and larger.labels > model.labels
+        and wanted(larger.gain, table.candidates)
         and all(
-            law.there and wanted(law.missed, table.candidates)
-            and law.missed is not None and law.missed.change <= MATERIAL
-            for law in m.laws if law.label not in model.labels
+            law.there and law.missed is not None and wanted(law.missed, table.candidates)
+            and law.missed.change <= MATERIAL
+            for law in larger.laws if law.label not in model.labels
         )
-    ]  # fmt: skip
+    )  # fmt: skip
+
+
+def _left(table: Table, model: Model) -> tuple[Left, ...]:
+    """What is `above` noise, of a set or of one with small laws besides, whichever leaves less."""
+    sets = [model, *(m for m in table.models if with_small(table, model, m))]
     return min(
         (sum(not x.white for x in left), len(m.laws), sorted(m.labels), left)
-        for m in (model, *larger) for left in [above(m)]
+        for m in sets for left in [above(m)]
     )[-1]  # fmt: skip
 
 
