@@ -62,11 +62,11 @@ class ByRun:
         """What is said of it."""
         least, most = (end(self.values, key=self.values.__getitem__) for end in (min, max))
         unit = f" {self.unit}" if self.unit not in ("", "1", "-") else ""
-        rest = f"leaves more than noise in {over(self.left)}" if self.left else "leaves noise"
+        rest = f"leave more than noise in {over(self.left)}" if self.left else "leave noise"
         return (
-            f"Fitted to each run, {self.parameter} goes from {self.values[least]:.4g} in {least} "
-            f"to {self.values[most]:.4g}{unit} in {most}, explains {percent(self.explained)} and "
-            f"{rest}: look for what differs between the runs."
+            f"One value of {self.parameter} for each run, from {self.values[least]:.4g} in {least} "
+            f"to {self.values[most]:.4g}{unit} in {most}, would explain {percent(self.explained)} "
+            f"and {rest}: look for what differs between the runs."
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -35,9 +35,9 @@ def test_a_friction_that_differs_between_runs_is_said(tmp_path: Path) -> None:
     assert first.explained == pytest.approx(1.0, abs=0.01)
     for run, friction in FRICTIONS.items():
         assert first.values[run] == pytest.approx(friction, rel=0.03)  # a per cent is its deviation
-    assert "Fitted to each run, b goes from 0.0" in result.reason
+    assert "One value of b for each run, from 0.0" in result.reason
     assert " in sweep to 0.04" in result.reason and " N.m.s/rad in check" in result.reason
-    assert "leaves noise: look for what differs between the runs." in result.reason
+    assert "and leave noise: look for what differs between the runs." in result.reason
     assert result.to_dict()["by_run"][0]["values"] == first.values
 
 
