@@ -105,6 +105,15 @@ KINDS: dict[str, Kind] = {
             normal="normal force [N]",
         ),
     ),
+    "across": Kind(
+        "m/s",
+        "",
+        _names(
+            value="the undisturbed speed across the base",
+            along="speed along the base [m/s]",
+            turning="yaw rate of the base [rad/s]",
+        ),
+    ),
     "body": Kind(
         "",
         "",
@@ -128,10 +137,10 @@ KINDS: dict[str, Kind] = {
     "bundle": Kind("", "", _names(value="signals of several units that travel together")),
     "gravity": Kind("m/s2", "", _names(value="gravity, in axes taken as level [m/s2], 3")),
 }
-"""Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; a `body`
-takes a wrench (force and moment at the reference point, body axes) and additional mass. `pose`,
-`point` and `bundle` are signals with more structure or less than `signal`, whose elements all have
-the unit of the balance."""
+"""Kinds of balances. A `pivot` is a torque balance about the vertical of a floor contact; `across`
+is the speed across a base whose wheels roll; a `body` takes a wrench (force and moment at the
+reference point, body axes) and additional mass. `pose`, `point` and `bundle` are signals with more
+structure or less than `signal`, whose elements all have the unit of the balance."""
 
 
 @dataclass(frozen=True)

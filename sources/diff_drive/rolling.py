@@ -3,7 +3,7 @@
     v = r (w_r + w_l)/2,   w_z = r (w_r - w_l)/track
     x' = v cos phi,   y' = v sin phi,   phi' = w_z
 
-Not modelled: forces, slip (effects on `speed_left`, `speed_right`, `forward`, `turn`).
+Not modelled: forces, slip (effects on `speed_left`, `speed_right`, `forward`, `turn`, `across`).
 
 Source: e.g. Siciliano et al., Robotics, 2009, ch. 11.
 """
@@ -29,8 +29,9 @@ def equations(m: Model) -> None:
     v, w_z = p.r * (w_r + w_l) / 2, p.r * (w_r - w_l) / p.track
     v += m.balance("forward", "signal", unit="m/s", value=v).effort
     w_z += m.balance("turn", "signal", unit="rad/s", value=w_z).effort
-    m.derivative(x.pose_x, v * ca.cos(x.pose_phi))
-    m.derivative(x.pose_y, v * ca.sin(x.pose_phi))
+    across = m.balance("across", "across", value=0, along=v, turning=w_z).effort
+    m.derivative(x.pose_x, v * ca.cos(x.pose_phi) - across * ca.sin(x.pose_phi))
+    m.derivative(x.pose_y, v * ca.sin(x.pose_phi) + across * ca.cos(x.pose_phi))
     m.derivative(x.pose_phi, w_z)
     for quantity, value in (
         (qs.X, x.pose_x),

@@ -7,7 +7,7 @@
 the angle of one wheel in the middle of the front axle, to which Ackermann's geometry turns the two
 real ones; `l` is the distance of the axles.
 
-Not modelled: forces, slip, play of the steering (effects on `steer` and `speed`).
+Not modelled: forces, slip, play of the steering (effects on `steer`, `speed` and `across`).
 
 Source: e.g. Siciliano et al., Robotics, 2009, ch. 11.
 """

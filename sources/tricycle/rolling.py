@@ -3,7 +3,7 @@
     delta = ratio steer,   v = r w cos delta,   w_z = r w sin delta/l
     x' = v cos phi,   y' = v sin phi,   phi' = w_z
 
-Not modelled: forces, slip, play of the steering (effects on `steer` and `speed`).
+Not modelled: forces, slip, play of the steering (effects on `steer`, `speed` and `across`).
 
 Source: e.g. Siciliano et al., Robotics, 2009, ch. 11.
 """
@@ -42,8 +42,9 @@ def wheel(m: Model) -> Wheel:
 def output_pose(m: Model, v: SX, w_z: SX) -> None:
     """Integrate the pose of the middle of the fixed axle and output it."""
     x = m.states(qs.POSE_X, qs.POSE_Y, qs.POSE_PHI)
-    m.derivative(x.pose_x, v * ca.cos(x.pose_phi))
-    m.derivative(x.pose_y, v * ca.sin(x.pose_phi))
+    across = m.balance("across", "across", value=0, along=v, turning=w_z).effort
+    m.derivative(x.pose_x, v * ca.cos(x.pose_phi) - across * ca.sin(x.pose_phi))
+    m.derivative(x.pose_y, v * ca.sin(x.pose_phi) + across * ca.cos(x.pose_phi))
     m.derivative(x.pose_phi, w_z)
     for quantity, value in (
         (qs.X, x.pose_x),
