@@ -20,7 +20,7 @@ from ..calibrate.parts import Parameter
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .answer import over, percent
-from .facts import Left
+from .facts import Left, Value
 from .models import GATE_Z, Fitted, compare
 from .search import Search
 from .table import left_of
@@ -45,7 +45,7 @@ class ByRun:
     Attributes:
         parameter, unit: which.
         explained: share of what the declared model leaves beyond noise.
-        values: by run.
+        values: by run, with their intervals; as wide as bounds where a run does not tell.
         left: what stays above noise.
         cost: half the sum of squares over the noise that it leaves in all runs [nats].
     """
@@ -53,19 +53,20 @@ class ByRun:
     parameter: str
     unit: str
     explained: float
-    values: dict[str, float]
+    values: dict[str, Value]
     left: tuple[Left, ...]
     cost: float
 
     @property
     def sentence(self) -> str:
         """What is said of it."""
-        least, most = (end(self.values, key=self.values.__getitem__) for end in (min, max))
+        told = {run: v.value for run, v in self.values.items() if v.determined}
+        least, most = (end(told, key=told.__getitem__) for end in (min, max))
         unit = f" {self.unit}" if self.unit not in ("", "1", "-") else ""
         rest = f"leave more than noise in {over(self.left)}" if self.left else "leave noise"
         return (
-            f"One value of {self.parameter} for each run, from {self.values[least]:.4g} in {least} "
-            f"to {self.values[most]:.4g}{unit} in {most}, would explain {percent(self.explained)} "
+            f"One value of {self.parameter} for each run, from {told[least]:.4g} in {least} "
+            f"to {told[most]:.4g}{unit} in {most}, would explain {percent(self.explained)} "
             f"and {rest}: look for what differs between the runs."
         )
 
@@ -73,7 +74,11 @@ class ByRun:
         """As in the JSON."""
         return {
             "parameter": self.parameter, "unit": self.unit, "explained": self.explained,
-            "values": self.values, "left": list(dict.fromkeys(x.channel for x in self.left)),
+            "values": {
+                run: {"value": v.value, "ci95": [v.low, v.high], "identifiable": v.identifiable}
+                for run, v in self.values.items()
+            },
+            "left": list(dict.fromkeys(x.channel for x in self.left)),
         }  # fmt: skip
 
 
@@ -129,8 +134,8 @@ def _promising(search: Search, base: Fitted) -> list[Parameter]:
 
 def _all_runs(
     search: Search, simulator: Simulator, start: Vector, unused: list[str], effort: Effort
-) -> tuple[Vector, Estimate]:
-    """A fit, and its parameters with those of unused runs fitted to them, all others held."""
+) -> tuple[Vector, list[Estimate]]:
+    """Parameters of a fit, those of unused runs fitted to these with all others held; both fits."""
     problem = simulator.problem
     estimate = fit(simulator, start, effort=effort)
     kept = {
@@ -141,7 +146,7 @@ def _all_runs(
     begin = np.array([v for n, v in zip(problem.names, start, strict=True) if n not in kept])
     later = fit(inner, begin, unused, effort=effort)
     search.evaluations += estimate.evaluations + later.evaluations
-    return np.array([{**kept, **later.values}[name] for name in problem.names]), estimate
+    return np.array([{**kept, **later.values}[name] for name in problem.names]), [estimate, later]
 
 
 def _fitted(search: Search, base: Fitted, parameter: Parameter) -> ByRun | None:
@@ -157,15 +162,14 @@ def _fitted(search: Search, base: Fitted, parameter: Parameter) -> ByRun | None:
         [np.delete(base.estimate.theta, place), np.repeat(base.estimate.theta[place], len(own))]
     )
     unused = [run.name for run in search.checking.runs]
-    theta, estimate = _all_runs(search, base.simulator.of(wide), start, unused, CLOSELY)
+    theta, _ = _all_runs(search, base.simulator.of(wide), start, unused, CLOSELY)
     simulator = search.simulator.of(search.raw.with_parameters(wide.parameters))
     simulator = corrected(simulator, theta, search.raw)
-    theta, estimate = _all_runs(search, simulator, theta, unused, CORRECTION)
+    theta, fits = _all_runs(search, simulator, theta, unused, CORRECTION)
     fitted, checked = (
-        exact(estimate.simulator, theta, search.raw, stack)
-        for stack in (search.fitting, search.checking)
+        exact(simulator, theta, search.raw, stack) for stack in (search.fitting, search.checking)
     )
-    found = Fitted((), replace(estimate, theta=theta), Values(fitted, checked))
+    found = Fitted((), fits[0], Values(fitted, checked))
     gate = compare(search.check_data, base.check, checked, search.checking)
     costs = [
         search.fitting.cost(search.fit_data - f.fit)
@@ -177,8 +181,18 @@ def _fitted(search: Search, base: Fitted, parameter: Parameter) -> ByRun | None:
     need = threshold(len(problem.parameters)) + len(unused)  # a nat for each value
     if gate.gain < need or gate.z < GATE_Z:
         return None
-    sizes = {p.run: float(theta[wide.index(p.name)]) for p in own}
+    values = {p.run: _value(p, fits[p.run in unused]) for p in own}
+    if sum(v.determined for v in values.values()) < 2:
+        return None
     left = sorted((x for x in left_of(search, found) if x.structured), key=lambda x: -x.rms)
     if left and explained < 1.0 - TENTH**2:  # a law that acts otherwise in each run shows so, too
         return None
-    return ByRun(parameter.name, parameter.unit, min(explained, 1.0), sizes, tuple(left), costs[1])
+    return ByRun(parameter.name, parameter.unit, min(explained, 1.0), values, tuple(left), costs[1])
+
+
+def _value(parameter: Parameter, estimate: Estimate) -> Value:
+    """A value of one run."""
+    i, p = estimate.problem.index(parameter.name), parameter
+    return Value(p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]),
+                 float(estimate.high[i]), p.minimum, p.maximum,
+                 bool(estimate.identifiable[i]))  # fmt: skip

@@ -34,11 +34,14 @@ def test_a_friction_that_differs_between_runs_is_said(tmp_path: Path) -> None:
     assert first.parameter == "b" and not others and not first.left
     assert first.explained == pytest.approx(1.0, abs=0.01)
     for run, friction in FRICTIONS.items():
-        assert first.values[run] == pytest.approx(friction, rel=0.03)  # a per cent is its deviation
+        value = first.values[run]
+        assert value.low <= friction <= value.high and value.determined
+        assert value.value == pytest.approx(friction, rel=0.03)  # a per cent is its deviation
     assert "One value of b for each run, from 0.0" in result.reason
     assert " in sweep to 0.04" in result.reason and " N.m.s/rad in check" in result.reason
     assert "and leave noise: look for what differs between the runs." in result.reason
-    assert result.to_dict()["by_run"][0]["values"] == first.values
+    told = result.to_dict()["by_run"][0]["values"]["check"]
+    assert told["ci95"] == [first.values["check"].low, first.values["check"].high]
 
 
 def test_a_law_that_is_missing_does_not_differ_between_runs(tmp_path: Path) -> None:
