@@ -75,7 +75,8 @@ class ByRun:
         return {
             "parameter": self.parameter, "unit": self.unit, "explained": self.explained,
             "values": {
-                run: {"value": v.value, "ci95": [v.low, v.high], "identifiable": v.identifiable}
+                run: {"value": v.value, "unit": v.unit, "ci95": [v.low, v.high],
+                      "identifiable": v.identifiable}
                 for run, v in self.values.items()
             },
             "left": list(dict.fromkeys(x.channel for x in self.left)),

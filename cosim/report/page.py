@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..diagnose.story.facts import Facts
-from ..diagnose.story.verdicts import Story, label, likely_place, told
+from ..diagnose.story.unexplained import likely_place
+from ..diagnose.story.verdicts import Story, label, told
 from ..display.document import document, links
 from ..display.html import Html, join, tag, words
 from ..drawing.svg import svg

@@ -101,6 +101,7 @@ def table(verdict: str) -> dict[str, Any]:
             "eta": {"unit": "-", "before": unknown, "after": unknown},
         },
         "clocks": {}, "start_values": {}, "bursts": {}, "unstable_from": {}, "small_laws": [],
+        "by_run": [],
         "bounds_opened": {}, "left_white": False,
         "structure": {
             f"{which} {purpose}": structured(*([] if which == "after" and after < 1.1

@@ -102,6 +102,25 @@ def test_a_search_that_was_stopped_claims_nothing() -> None:
     assert "leaves noise" in told(Facts(content)).headline
 
 
+def test_a_parameter_that_differs_between_runs_is_told_with_its_values() -> None:
+    one = {"unit": "N.m.s/rad", "ci95": [0.02, 0.05], "identifiable": True}
+    values = {
+        "cold": {**one, "value": 0.045}, "warm": {**one, "value": 0.0271},
+        "still": {**one, "value": 0.3, "identifiable": False},
+    }  # fmt: skip
+    item = {"parameter": "b", "unit": "N.m.s/rad", "explained": 0.998, "values": values, "left": []}
+    content = table("unexplained") | {"by_run": [item, item | {"parameter": "J"}]}
+    story = told(Facts(content))
+    said = Marked("".join(story.meaning))
+    assert "One value of b for each run would take away 99.8 % of what exceeds" in said.text
+    assert "in cold and" in said.text and "still" not in said.text
+    assert "The data do not tell it from J." in said.text
+    for fact, texts in said.facts.items():
+        assert set(texts) == {expected(content, fact)}, fact
+    assert "what differs between the runs" in Marked(str(story.steps[0])).text
+    assert "One value of" not in "".join(told(Facts(table("unexplained"))).meaning)
+
+
 def test_white_leftovers_are_told_as_noise() -> None:
     content = table("unexplained")
     assert "What is left" not in told(Facts(content)).label

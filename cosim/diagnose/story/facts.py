@@ -217,3 +217,13 @@ def interval(entry: Mapping[str, Any]) -> str:
 def named_unit(of: str) -> str:
     """A unit in a column of its own."""
     return unit(of) or "–"
+
+
+def misses(facts: Facts, which: str) -> Html:
+    """How far a model is off, in its worst channel."""
+    return facts.ratio("channels", facts.worst, which, facts.purpose)
+
+
+def some(items: list[Html]) -> list[Html]:
+    """Those that say something."""
+    return [item for item in items if item]

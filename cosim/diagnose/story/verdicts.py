@@ -12,7 +12,8 @@ from typing import Any
 
 from ...calibrate.checks.finding import LASTING
 from ...display.html import Html, command, join, quantity, tag, words
-from .facts import Facts, inside, place_label, sentence
+from .facts import Facts, inside, misses, sentence, some
+from .unexplained import compare, unexplained, white
 
 ADVICE = Path(__file__).parent / "advice.toml"
 LABELS = {
@@ -55,11 +56,11 @@ def told(facts: Facts) -> Story:
     """The story of a diagnosis."""
     write = {
         "effect_found": _effect_found, "nothing_missing": _nothing_missing,
-        "confounded": _confounded, "unexplained": _unexplained, "bad_data": _bad_data,
-        "stopped": _stopped, "white": _white,
+        "confounded": _confounded, "unexplained": unexplained, "bad_data": _bad_data,
+        "stopped": _stopped, "white": white,
     }  # fmt: skip
-    white = facts.verdict == "unexplained" and facts.table.get("left_white")
-    kind = "stopped" if facts.table.get("stopped") else "white" if white else facts.verdict
+    only_white = facts.verdict == "unexplained" and facts.table.get("left_white")
+    kind = "stopped" if facts.table.get("stopped") else "white" if only_white else facts.verdict
     headline, meaning, steps = write[kind](facts)
     return Story(LABELS[kind], headline, tuple(meaning), tuple(steps))
 
@@ -96,11 +97,6 @@ def size(facts: Facts, number: int) -> Html:
     return join(facts.value(*path), " (95 %: ", facts.interval(*path), ")")
 
 
-def _misses(facts: Facts, which: str) -> Html:
-    """How far a model is off, in its worst channel."""
-    return facts.ratio("channels", facts.worst, which, facts.purpose)
-
-
 def _meant(effect: str, text: str) -> Html:
     return join(advice().get(effect, {}).get("means", f"{sentence(text)}."))
 
@@ -118,8 +114,8 @@ def _before_after(facts: Facts) -> Html:
         return Html("")
     return join(
         "On ", facts.runs_in_words, ", the declared model misses ", tag("b", worst), " by ",
-        _misses(facts, "before"), " its sensor's noise; with what was found, by ",
-        _misses(facts, "after"), ". 1× is the best that any model can do.",
+        misses(facts, "before"), " its sensor's noise; with what was found, by ",
+        misses(facts, "after"), ". 1× is the best that any model can do.",
     )  # fmt: skip
 
 
@@ -208,7 +204,7 @@ def _effect_found(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     )  # fmt: skip
     steps += _add(facts)
     steps.append(_again("with new logs after a repair; the effect should be gone"))
-    return headline, _some(meaning), steps
+    return headline, some(meaning), steps
 
 
 def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
@@ -242,7 +238,7 @@ def _confounded(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         steps.append(join(in_words(None).capitalize(), ": measure what only one of them changes."))
     steps += [_check(facts, e) for e in causes]
     steps += _add(facts)
-    return headline, _some(meaning), steps
+    return headline, some(meaning), steps
 
 
 def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
@@ -252,7 +248,7 @@ def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     )
     meaning = [
         join("After calibration, the worst channel, ", tag("b", facts.worst), ", is missed by ",
-             _misses(facts, "after"), " its sensor's noise on ", facts.runs_in_words,
+             misses(facts, "after"), " its sensor's noise on ", facts.runs_in_words,
              ". 1× is the best that any model can do.")
         if facts.worst else Html(""),
         join("The catalogue was not asked for effects that make it better." if not facts.asked
@@ -285,7 +281,7 @@ def _nothing_missing(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
         join(tag("b", "If you still suspect something"), ": measure runs that would show it "
              "(faster, slower, loaded, reversing), and diagnose them.")
     )  # fmt: skip
-    return headline, _some(meaning), steps
+    return headline, some(meaning), steps
 
 
 def _smallest(facts: Facts) -> Html:
@@ -309,141 +305,11 @@ def _smallest(facts: Facts) -> Html:
     return join(" (", words(shown), ")") if shown else Html("")
 
 
-CREDIBLE = 0.5
-"""Share of what exceeds the noise from which an unknown input at a place is said to explain it."""
-
-
-def likely_place(facts: Facts) -> Mapping[str, Any] | None:
-    """The place at which an unknown input explains most of what is missing, if there is one."""
-    places = facts.at("localisation")
-    where: Mapping[str, Any] | None = places[0] if places else None
-    return where if where and best_curve(where)[1]["explained"] >= CREDIBLE else None
-
-
-def best_curve(place: Mapping[str, Any]) -> tuple[int, Mapping[str, Any]]:
-    """Number and content of the curve of greatest evidence at a place."""
-    curves = place["curves"]
-    number = max(range(len(curves)), key=lambda n: float(curves[n]["evidence_nats"]))
-    return number, curves[number]
-
-
-def _unexplained(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
-    where = likely_place(facts)
-    at = place_label(where) if where else ""
-    driver, law = "", facts.table.get("law_from_data") or {}
-    likely = str(law["place"]) if law.get("made") else at
-    headline = join(
-        "The machine does something that ",
-        "neither the model nor the catalogue knows" if facts.asked else "the model does not know",
-        ": the model misses ", tag("b", facts.worst), " by ", _misses(facts, "after"),
-        " its sensor's noise",
-        join("; what is missing enters most likely ", facts.in_words(likely)) if likely else "",
-        ".",
-    )  # fmt: skip
-    left = words([tag("b", name) for name in facts.left])
-    meaning = [
-        join("The catalogue was not asked; calibration alone leaves more than noise in ", left, ".")
-        if not facts.asked else
-        join("Calibration and every effect of the catalogue were tried; ",
-             join("none explains what is left of ", left, " on unused runs.") if facts.judged
-             else join("no run was kept unused to judge by, so none is named for what is left of ",
-                       left, ".")),
-    ]  # fmt: skip
-    bounds = words([tag("code", name) for name in facts.table.get("bounds_opened", {})])
-    if bounds:
-        meaning.append(
-            join("Calibration ended at the bound that the mapping gives ", bounds, "; with more "
-                 "room the model itself does better on unused runs. That may be all.")
-        )  # fmt: skip
-    if law.get("made"):
-        meaning.append(
-            join("A law made from the data says more: ", tag("code", law["formula"]), " at ",
-                 tag("code", law["place"]), " holds on unused runs; " if facts.judged
-                 else " explains the fitted runs, and none was kept unused to judge it; ",
-                 tag("a", "its curve, and what it leaves", href="#law"), ".")
-        )  # fmt: skip
-    if where is not None:
-        number, best = best_curve(where)
-        driver = best["driver"].replace("_", " ")
-        meaning.append(
-            join("An unknown input at ", tag("code", at), ", free in its course over ",
-                 tag("b", driver), ", would take away ",
-                 facts.percent("localisation", 0, "curves", number, "explained"),
-                 " of what exceeds the noise in the run that shows it most. ",
-                 tag("a", "Its curve", href="#where"), " is what the missing law looks like.")
-        )  # fmt: skip
-    elif facts.at("localisation") and not law.get("made"):
-        meaning.append(
-            join("No unknown input at a single place that was probed explains half of it (",
-                 tag("a", "places", href="#where"), "): the cause may lie elsewhere, or in several "
-                 "places.")
-        )  # fmt: skip
-    meaning.append(join(facts.table.get("inside", "")))
-    steps = _compare(facts)
-    if bounds:
-        steps.insert(
-            0,
-            join(
-                tag("b", "Look at the bounds"),
-                " of ",
-                bounds,
-                " in the mapping. If "
-                "the machine may be beyond them, widen them and diagnose again.",
-            ),
-        )
-    if not facts.asked:
-        steps.append(
-            join(tag("b", "Ask the catalogue"), ": the same command without ",
-                 tag("code", "--law-from-data"), ".")
-        )  # fmt: skip
-    if law.get("made"):
-        at, driver = str(law["place"]), str(law["depends_on"])
-    if at:
-        steps.append(
-            join(tag("b", "Look"), " ", facts.in_words(at), ": what there depends on ",
-                 tag("b", driver.replace("_", " ")), "?")
-        )  # fmt: skip
-    steps += [
-        join(tag("b", "Repeat"), " the run that shows it most, once slower and once with another "
-             "load: what changes tells what it hangs on."),
-        join(tag("b", "Write the law"), " as an effect (one file with its equation), or use a "
-             "finer variant of the component, and diagnose again."),
-    ]  # fmt: skip
-    return headline, _some(meaning), steps
-
-
-def _white(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
-    names = words([tag("b", name) for name in facts.left])
-    headline = join("The model misses ", tag("b", facts.worst), " by ", _misses(facts, "after"),
-                    " its sensor's stated noise, and what it misses is white.")  # fmt: skip
-    meaning = [
-        join("Samples of what is left of ", names, " do not know of each other, neither neighbours "
-             "nor over long times. A force or a law of motion does not do that: the noise is "
-             "larger than the mapping says, or the sensor errs otherwise from sample to sample."),
-    ]  # fmt: skip
-    steps = [
-        join(tag("b", "Look at the figure"), " of ", names, " (", tag("code", "sigma"),
-             " in the mapping): a log at rest shows the noise. Correct it and diagnose again."),
-        join(tag("b", "If the figure is right"), ", look at what differs from sample to sample: "
-             "rounding, times of the samples, interference."),
-    ]  # fmt: skip
-    return headline, _some(meaning), steps
-
-
-def _compare(facts: Facts) -> list[Html]:
-    if not facts.table.get("hints"):
-        return []
-    return [
-        join(tag("b", "Compare"), " with the ", tag("a", "nearest laws", href="#hints"),
-             ": what they would take, and what they leave.")
-    ]  # fmt: skip
-
-
 def _stopped(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     why = str(facts.at("stopped"))
     rest = (
         join("the calibrated model misses ", tag("b", facts.worst), " by ",
-             _misses(facts, "after"), " its sensor's noise")
+             misses(facts, "after"), " its sensor's noise")
         if facts.left else Html("the calibrated model leaves noise")
     )  # fmt: skip
     headline = join(f"The search was stopped {why}: so far, ", rest, ".")
@@ -453,7 +319,7 @@ def _stopped(facts: Facts) -> tuple[Html, list[Html], list[Html]]:
     ]  # fmt: skip
     steps = [
         join(tag("b", "Let it go on"), " for longer: the same command with more simulated runs."),
-        *_compare(facts),
+        *compare(facts),
     ]
     return headline, meaning, steps
 
@@ -489,7 +355,3 @@ def _found_in(finding: Mapping[str, str]) -> Html:
     where = ", ".join(part for part in (run, finding["column"]) if part)
     said = sentence(finding["text"].partition("; ")[0])
     return join(f"{where[:1].upper()}{where[1:]}: " if where else "", said)
-
-
-def _some(items: list[Html]) -> list[Html]:
-    return [item for item in items if item]
