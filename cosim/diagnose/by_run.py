@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.deferred import corrected
+from ..calibrate.differences import jacobian
 from ..calibrate.estimate import Estimate
 from ..calibrate.fit import CORRECTION, Effort, fit
 from ..calibrate.parts import Parameter
@@ -21,6 +22,7 @@ from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .answer import over, percent
 from .facts import Left, Value
+from .linear import Absorber
 from .models import GATE_Z, Fitted, compare
 from .search import Search
 from .table import left_of
@@ -111,26 +113,39 @@ def by_run(search: Search, base: Fitted) -> list[ByRun]:
 
 
 def _promising(search: Search, base: Fitted) -> list[Parameter]:
-    """Those that explain most of what is left to first order, the best first."""
-    stack, problem = search.fitting, base.problem
-    absorber = search.absorber(base, stack)
-    slopes = {item.run: item for item in base.estimate.jacobian}
-    matrix = stack.matrix([slopes[n] for n in stack.names], problem.scale)
-    rest = absorber.rest(search.fit_data - base.fit)
-    beyond = 0.5 * (float(rest @ rest) - rest.size)
-    gains: dict[str, float] = {}
-    for i, p in enumerate(problem.parameters):
-        if p.role != "declared" or p.run:
-            continue
-        own = [absorber.rest(matrix[:, i] * (stack.run == k)) for k in range(len(stack.runs))]
-        ways, sizes, _ = np.linalg.svd(np.column_stack(own), full_matrices=False)
-        shares = ways[:, sizes > 1.0].T @ rest  # less than the noise over the whole span: nothing
-        gains[p.name] = 0.5 * float(shares @ shares)
+    """Those that explain most of what is left to first order, the best first.
+
+    In unused runs, too, where nothing makes up for a value but the runs' own ones.
+    """
+    problem, theta = base.problem, base.estimate.theta
+    declared = [i for i, p in enumerate(problem.parameters) if p.role == "declared" and not p.run]
+    names = search.checking.names
+    own = [i for i, p in enumerate(problem.parameters) if p.run in names]
+    known = {item.run: item for item in base.estimate.jacobian}
+    known |= {
+        item.run: item
+        for item in jacobian(base.simulator, theta, names, columns=[*declared, *own], central=False)
+    }
+    gains, beyond = dict.fromkeys(declared, 0.0), 0.0
+    for stack, left in (
+        (search.fitting, search.fit_data - base.fit),
+        (search.checking, search.check_data - base.check),
+    ):
+        matrix = stack.matrix([known[n] for n in stack.names], problem.scale)
+        taken = matrix
+        if stack is search.checking:
+            taken = matrix * np.isin(np.arange(theta.size), own)
+        absorber = Absorber(taken, problem, base.estimate.at_bound)
+        rest = absorber.rest(left)
+        beyond += max(0.5 * (float(rest @ rest) - rest.size), 0.0)
+        for i in declared:
+            ways = [absorber.rest(matrix[:, i] * (stack.run == k)) for k in range(len(stack.runs))]
+            vectors, sizes, _ = np.linalg.svd(np.column_stack(ways), full_matrices=False)
+            shares = vectors[:, sizes > 1.0].T @ rest  # less than the noise over the whole span
+            gains[i] += 0.5 * float(shares @ shares)
     best = max(gains.values(), default=0.0)
-    chosen = sorted((n for n in gains if gains[n] >= CLOSE * best), key=lambda n: -gains[n])
-    if best < HALF * beyond:
-        return []
-    return [problem.parameters[problem.index(name)] for name in chosen[:MOST]]
+    chosen = sorted((i for i in gains if gains[i] >= CLOSE * best), key=lambda i: -gains[i])
+    return [problem.parameters[i] for i in chosen[:MOST]] if best >= HALF * beyond else []
 
 
 def _all_runs(

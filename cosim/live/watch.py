@@ -426,12 +426,14 @@ class Watch:
     def summary(self) -> dict[str, Any]:
         """What there was to see; closes the folder."""
         names = [channel.name for channel in self.reading.problem.channels]
-        rms = np.sqrt(self._square / np.maximum(self._count, 1.0))
+        with np.errstate(invalid="ignore"):  # nothing was compared: no figure
+            rms = np.sqrt(self._square / self._count)
         found = {
             "event": "end",
             **asdict(self.counts),
             "lateness_s": self.lateness.to_dict() if self.settings.pace > 0.0 else None,
             "residual_rms": dict(zip(names, map(_plain, rms), strict=True)),
+            "not_compared": [n for n, k in zip(names, self._count, strict=True) if not k],
             "alarms": {f"{channel} {kind}": n for (channel, kind), n in self.raised.items()},
             "tests": self.alarms.tests,
             "false_alarms_per_hour": self.settings.rate,

@@ -16,7 +16,7 @@ these, a change that is undone later, or two changes, would count as scatter.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -45,13 +45,13 @@ class Profile:
     Attributes:
         kind: see above.
         first: index of the first log that differs.
-        values: by log; 1 for a step, an outlier and a spell, days for a creep.
+        values: by log; 1 for a step, an outlier and a spell, days for a creep; the rest tells them.
         last: index of the first log that is as before again; None if none is.
     """
 
     kind: Kind
     first: int
-    values: Vector
+    values: Vector = field(compare=False)
     last: int | None = None
 
     def alike(self, other: Profile) -> bool:

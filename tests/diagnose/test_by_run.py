@@ -44,6 +44,16 @@ def test_a_friction_that_differs_between_runs_is_said(tmp_path: Path) -> None:
     assert told["ci95"] == [first.values["check"].low, first.values["check"].high]
 
 
+def test_a_friction_that_is_another_in_the_unused_run_alone_is_found(tmp_path: Path) -> None:
+    frictions = {"sweep": disc.B, "steps": disc.B, "check": 1.2 * disc.B}
+    folder = disc.write(tmp_path, nothing, names=frictions, frictions=frictions)
+    search = Search(simulator(read_problem(folder), 1), only=[])
+    (item,) = by_run(search, search.calibrated())
+    search.close()
+    assert item.parameter == "b" and not item.left
+    assert item.values["check"].value == pytest.approx(1.2 * disc.B, rel=0.03)
+
+
 def test_a_law_that_is_missing_does_not_differ_between_runs(tmp_path: Path) -> None:
     """It acts in each of them as it does in the others, and a friction per run explains half."""
     folder = disc.write(tmp_path, lambda w, theta, t: 0.1 * float(np.sign(w) * abs(w) ** 0.3))

@@ -291,6 +291,17 @@ targets = "load.speed"
     assert followed.summary["residual_rms"]["phi"] == 0.0
 
 
+def test_a_column_that_never_comes_is_no_perfect_channel(reading) -> None:
+    given = [
+        json.dumps({k: v for k, v in json.loads(line).items() if k != "phi"}).encode()
+        for line in lines(reading, 100)
+    ]
+    summary = Followed(reading, given).summary
+    assert summary["not_compared"] == ["phi"] and summary["residual_rms"]["phi"] is None
+    assert summary["residual_rms"]["w"] is not None
+    assert Followed(reading, lines(reading, 100)).summary["not_compared"] == []
+
+
 def test_a_stream_without_the_begin_of_a_run_says_what_it_needs(reading) -> None:
     followed = Followed(reading, lines(reading, 100)[1:])
     assert followed.summary["ignored"] == 100

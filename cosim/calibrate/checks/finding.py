@@ -160,7 +160,7 @@ def lines(findings: Iterable[Finding]) -> list[str]:
         alike.setdefault((finding.severity, finding.kind, finding.column), []).append(finding)
     found = []
     for group in alike.values():
-        runs = list(dict.fromkeys(finding.run for finding in group))
+        runs = list(dict.fromkeys(finding.run for finding in group if finding.run))
         if len(runs) <= FEW:
             found += [str(finding) for finding in group]
         else:

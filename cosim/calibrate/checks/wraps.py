@@ -28,7 +28,7 @@ def check_wraps(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Find
     """
     for index, channel in enumerate(problem.channels):
         try:
-            unit = parse(channel.unit or "rad")
+            unit = parse(channel.unit or problem.system().variables(channel.signal)[1][0].symbol)
         except UnitError:
             continue
         if unit.exponents != parse("rad").exponents:
