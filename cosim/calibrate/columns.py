@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ..data.logs import Log
 from ..errors import ScenarioError, UnitError
-from ..spec.units import Unit, parse
+from ..spec.units import Unit, parse, per_second
 from .parts import COINCIDENT
-from .scales import known, per_second, scaled, zeroed
+from .scales import known, scaled, zeroed
 from .stamps import Clocks, apart, check_rising, check_span, with_times
 
 Vector = NDArray[np.float64]
@@ -204,7 +204,7 @@ def _units(
         target = (said or own) if plain else ""
     source = known(said, where) if said and target else None
     if source is not None and entry.get("derivative", False):
-        source = per_second(said)
+        source = parse(per_second(said)) if said else None
     return source, known(target, where) if target else None
 
 
@@ -283,6 +283,8 @@ def _column(
                 f"{where}: unwrap = true takes a turn of {turn:.6g}, but its values span "
                 f"{spanned:.6g}; say its unit (from = 'deg'), or the number at which it begins anew"
             )
+        if entry["unwrap"] is not True:
+            _check_count(values[good], spanned, turn, where)
         values = values.copy()
         values[good] = np.unwrap(values[good], period=turn)
     same = name == clocks.main and not entry.get("late", 0.0) and time is clock
@@ -290,6 +292,22 @@ def _column(
         return values
     longest = float(entry["gap"]) if "gap" in entry else None
     return _resampled(time, own, values, longest=longest, hold=bool(entry.get("hold", False)))
+
+
+def _check_count(values: Vector, spanned: float, turn: float, where: str) -> None:
+    """Refuse a number at which a column cannot begin anew.
+
+    Values that it begins anew at are not farther apart; a count of n bits that shows both 0 and
+    2^n - 1 begins anew at 2^n.
+    """
+    bits = np.log2(turn + 1.0)
+    count = spanned == turn and bits == np.rint(bits) and bool(np.all(values == np.rint(values)))
+    if count or spanned > TURNS * turn:
+        more = f"; counts from {values.min():g} to {values.max():g} begin anew at {turn + 1.0:g}"
+        raise ScenarioError(
+            f"{where}: unwrap = {turn:g} is said to be where it begins anew, but its values span "
+            f"{spanned:.6g}{more * count}"
+        )
 
 
 def _wraps(values: Vector, turn: float) -> bool:

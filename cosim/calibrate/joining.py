@@ -15,7 +15,7 @@ from ..data.signals import Table
 from ..errors import ScenarioError, UnitError, UnknownNameError, listing, within
 from ..files import flatten
 from ..master.master import Master
-from ..spec.units import Unit
+from ..spec.units import Unit, parse, per_second
 from ..system.provider import Provider, get_ready
 from ..system.toml import SystemFile
 from .between import Parts, between
@@ -31,7 +31,7 @@ from .named import named, readings
 from .parts import CLOCK, COINCIDENT, COLUMN, Channel, MeasuredRun, Parameter, check_parameters
 from .problem import Problem
 from .recorder import check_column, column_unit
-from .scales import known, per_second, scaled, zeroed
+from .scales import known, scaled, zeroed
 from .stamps import apart
 from .steps import steps
 
@@ -201,7 +201,7 @@ class Joined(MappedLogs):
         )
         signal = self._unit(str(entry["signal"]), where)
         if signal is not None and entry.get("transform") == "difference":
-            signal = per_second(signal.symbol)
+            signal = parse(per_second(signal.symbol)) if signal.symbol else None
         gain, offset = scaled(
             signal, here, entry.get("gain"), where, "gain",
             f"convert the column in [columns], to unit = {signal.symbol if signal else ''!r}",
@@ -427,7 +427,7 @@ class Joined(MappedLogs):
         unit, factor = str(entry.get("unit", "")), entry.get("gain")
         source = known(own, f"{where}: column {column}") if own else None
         if source is not None and entry.get("interpolation") == "slope":
-            source = per_second(own)
+            source = parse(per_second(own)) if own else None
         way = f"convert the column {column} in [columns]"
         if unit:
             return *scaled(source, known(unit, where), factor, where, "gain", way), unit

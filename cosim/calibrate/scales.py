@@ -24,16 +24,6 @@ DIGITS = 1e-12
 """Share by which two ways to compute a conversion differ, and more."""
 
 
-def per_second(unit: str) -> Unit | None:
-    """Unit of the derivative in time; None of an unknown one."""
-    if not unit:
-        return None
-    whole = parse(unit)
-    exponents = list(whole.exponents)
-    exponents[2] -= 1
-    return Unit(f"({unit})/s", tuple(exponents), whole.factor)
-
-
 @lru_cache(maxsize=None)
 def known(unit: str, where: str) -> Unit:
     """A unit.

@@ -333,6 +333,16 @@ def test_an_angle_that_begins_anew(noisy) -> None:
     assert found and {f.column for f in found} == {"angle"} and "unwrap = true" in found[0].text
 
 
+def test_a_current_without_a_unit_is_no_angle(noisy) -> None:
+    """It may jump by 6.3 A, for the voltage that drives it does."""
+    problem = changed(noisy(0), "current", lambda x: np.mod(x, 2 * np.pi))
+    plain = [replace(c, unit="") for c in problem.channels]
+    assert not of_kind(problem.changed(channels=plain), "wrapped")
+    angle = changed(noisy(0), "angle", lambda x: np.mod(x, 2 * np.pi))
+    plain = [replace(c, unit="") for c in angle.channels]
+    assert {f.column for f in of_kind(angle.changed(channels=plain), "wrapped")} == {"angle"}
+
+
 def test_a_clock_at_another_rate(noisy) -> None:
     problem = noisy(0).changed(source=Source(rate=1010.0))
     found = of_kind(problem, "rate")
@@ -444,7 +454,10 @@ def test_inputs_that_come_after_what_they_cause(noisy) -> None:
 
 def test_many_runs_with_one_finding_are_one_line() -> None:
     found = [Finding("warning", "gaps", f"r{k}", "x", f"lacks {k} %") for k in range(9)]
-    assert lines(found) == ["warning: run r0 x: lacks 0 % (so, too, in 8 other runs: r1, …, r8)"]
+    said = "warning: run r0 x: lacks 0 % (so, too, in 8 other runs: r1, …, r8)"
+    assert lines(found) == [said]
+    of_all = replace(found[0], run="")
+    assert lines([*found, of_all]) == [said]  # what is said of all runs is no run
     assert len(lines(found[:3])) == 3
 
 

@@ -302,6 +302,19 @@ def test_an_angle_is_unwrapped_in_its_own_unit(tmp_path: Path) -> None:
         read(tmp_path, log, COLUMNS='a = { source = "w", unwrap = true }', INPUT='"a"')
 
 
+def test_a_count_begins_anew_where_its_values_may(tmp_path: Path) -> None:
+    """Eight bits begin anew at 256: at 255 the count would lose one per turn, without a word."""
+    count = 7.0 * np.arange(SIZE)
+    log = written("time,tau,w", ",", TIMES, TORQUE, np.mod(count, 256.0))
+    entry = 'a = {{ source = "w", unwrap = {} }}'
+    problem = read(tmp_path, log, COLUMNS=entry.format(256), INPUT='"a"')
+    np.testing.assert_allclose(problem.run("one").inputs["load.tau"].at(TIMES), count, atol=1e-6)
+    with pytest.raises(ScenarioError, match=r"unwrap = 255 .* span 255; counts from 0 to 255 beg"):
+        read(tmp_path, log, COLUMNS=entry.format(255), INPUT='"a"')
+    with pytest.raises(ScenarioError, match=r"unwrap = 128 .* but its values span 255$"):
+        read(tmp_path, log, COLUMNS=entry.format(128), INPUT='"a"')
+
+
 def test_quaternions_of_any_one_length(tmp_path: Path) -> None:
     yaw = 0.3 * TIMES
     sign = np.where(np.arange(SIZE) % 7 < 3, -1.0, 1.0)  # the same turn

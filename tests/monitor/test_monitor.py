@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -147,6 +148,14 @@ def test_a_small_change_beside_a_large_one_is_told(tmp_path: Path) -> None:
     assert [(c.direction.name, c.profile.first) for c in found.changes if c.direction] == [
         ("b", 5), ("offset of theta", 12)
     ]  # fmt: skip
+
+
+def test_ways_to_change_are_compared_whoever_made_them() -> None:
+    """Weighed again, a change may have the same way as another object; its values are an array."""
+    one = profiles(np.arange(9.0))[0]
+    same = replace(one, values=one.values.copy())
+    other = replace(one, first=one.first + 1)
+    assert one == same and one != other and [(1, one)] == [(1, same)]
 
 
 def test_limits_come_from_logs_without_the_change(tmp_path: Path) -> None:
