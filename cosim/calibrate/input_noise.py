@@ -8,7 +8,8 @@ input's sample k over their noise, the residuals of a right model have the covar
 
 and `whitening` makes them white. A is taken once, at the declared system's nominal values, and is
 the same for all models that are compared: the determinant of C cancels. Inputs that one column
-drives share its noise: they are moved at once.
+drives share its noise: they are moved at once. What the anchor of relative poses adds (`anchored`)
+is the same for all samples of a run, and counts beside it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.signals import Table
+from .anchored import anchor_noise
 from .between import Parts
 from .checks.finding import Finding
 from .whitening import LEAST, InputNoise
@@ -41,7 +43,7 @@ LARGE = 10.0
 
 
 def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
-    """The simulator of a problem that counts the noise of its inputs, and what was counted.
+    """The simulator of a problem that counts noise of its inputs and anchors; notes on inputs.
 
     Args:
         simulator: of the problem at its nominal values, whose runs say how noisy inputs are.
@@ -50,7 +52,8 @@ def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
         CosimError: it cannot be simulated.
     """
     problem = simulator.problem
-    if not any(sigma for run in problem.runs for sigma in run.noisy.values()):
+    noisy = any(sigma for run in problem.runs for sigma in run.noisy.values())
+    if not noisy and not problem.relative:
         return simulator, []
     found = simulator.spread(lambda run: _noise(simulator, run), problem.runs)
     largest: dict[tuple[str, ...], tuple[float, float, str]] = {}
@@ -75,10 +78,8 @@ def _noise(
     simulator: Simulator, run: MeasuredRun
 ) -> tuple[InputNoise | None, dict[tuple[str, ...], tuple[float, str]]]:
     """Directions of a run; inputs -> the largest deviation that they give a channel, and which."""
-    if not run.noisy:
-        return None, {}
     channels = [c.name for c in simulator.problem.channels]
-    parts, sizes = [], {}
+    parts, sizes = anchor_noise(simulator.problem, run), {}
     beyond = np.zeros(run.data.shape)
     for tables in _shared(run):
         part, bridges = _columns(simulator, run, tables)
