@@ -42,7 +42,7 @@ WITHHELD = "--clean 0 --repeats 1 --withheld"
 SERIES = (
     *(Series("motor", "one", 140005 + i, ONE.format(7)) for i in range(5)),
     *(Series("motor", "several", 140104 + i, SOME.format(10, 5)) for i in range(4)),
-    *(Series("motor", "withheld", 140202 + i, WITHHELD) for i in range(2)),
+    *(Series("motor", "withheld", 140203 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141002 + i, ONE.format(6)) for i in range(2)),
     *(Series("crawler", "several", 141102 + i, SOME.format(10, 4)) for i in range(2)),
     Series("crawler", "withheld", 141201, WITHHELD),
