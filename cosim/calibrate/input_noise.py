@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.signals import Table
-from .anchored import anchor_noise
+from .anchored import anchor_noise, anchor_sizes
 from .between import Parts
 from .checks.finding import Finding
 from .whitening import LEAST, InputNoise
@@ -55,12 +55,15 @@ def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
     noisy = any(sigma for run in problem.runs for sigma in run.noisy.values())
     if not noisy and not problem.relative:
         return simulator, []
-    found = simulator.spread(lambda run: _noise(simulator, run), problem.runs)
+    sizes = anchor_sizes(problem)
+    found = simulator.spread(
+        lambda run: _noise(simulator, run, anchor_noise(problem, run, sizes)), problem.runs
+    )
     largest: dict[tuple[str, ...], tuple[float, float, str]] = {}
     runs = []
-    for run, (noise, sizes) in zip(problem.runs, found, strict=True):
+    for run, (noise, moved) in zip(problem.runs, found, strict=True):
         runs.append(replace(run, noise=noise))
-        for targets, (size, channel) in sizes.items():
+        for targets, (size, channel) in moved.items():
             if size > largest.get(targets, (0.0, 0.0, ""))[0]:
                 largest[targets] = size, abs(run.noisy[targets[0]]), channel
     findings = [
@@ -75,11 +78,16 @@ def propagated(simulator: Simulator) -> tuple[Simulator, list[Finding]]:
 
 
 def _noise(
-    simulator: Simulator, run: MeasuredRun
+    simulator: Simulator, run: MeasuredRun, parts: list[Vector]
 ) -> tuple[InputNoise | None, dict[tuple[str, ...], tuple[float, str]]]:
-    """Directions of a run; inputs -> the largest deviation that they give a channel, and which."""
+    """Directions of a run; inputs -> the largest deviation that they give a channel, and which.
+
+    Args:
+        simulator, run: of the problem.
+        parts: columns of A that are known.
+    """
     channels = [c.name for c in simulator.problem.channels]
-    parts, sizes = anchor_noise(simulator.problem, run), {}
+    parts, sizes = list(parts), {}
     beyond = np.zeros(run.data.shape)
     for tables in _shared(run):
         part, bridges = _columns(simulator, run, tables)
