@@ -1,6 +1,6 @@
 """Zero of a sensor that wanders steadily.
 
-    y = v + d,   d' = rate,   d = 0 at the start of a run
+    y = v + rate t,   t' = 1,   t = 0 at the start of a run
 
 The heading that a gyro integrates, a load cell or an amplifier that warms up. A vector signal has a
 `share` for each element, so that one joint or axis alone can be wrong.
@@ -12,13 +12,15 @@ Source: textbook; for gyros IEEE Std 528 (drift rate).
 
 from __future__ import annotations
 
+import casadi as ca
+
 from ..effect import Effect
 from ..effect_model import EffectModel
-from ..laws.signal_effect import in_unit, per_time, share
+from ..laws.signal_effect import per_time, share
 from ..quantity import Quantity
 
 RATE = Quantity("rate", "1", "error gained per time, 0 = absent", start=0.01, strength=True)
-D = Quantity("d", "1", "error gained since the start")
+T = Quantity("t", "s", "time since the start")
 
 EFFECT = Effect(
     "zero_drift",
@@ -31,6 +33,6 @@ EFFECT = Effect(
 
 def law(e: EffectModel) -> None:
     """Add what has been gained."""
-    d = e.state(in_unit(e, D))
-    e.derivative(d, e.parameter(per_time(e, RATE)))
-    e.add(d * share(e))
+    rate, t = e.parameter(per_time(e, RATE)), e.state(T)
+    e.derivative(t, ca.SX(1.0))
+    e.add(rate * t * share(e))
