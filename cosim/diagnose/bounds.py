@@ -18,7 +18,7 @@ from ..display.html import unit as shown_unit
 from ..errors import CosimError, UnknownNameError
 from .facts import Value
 from .fitter import Fitter
-from .models import Fitted, is_open
+from .models import Fitted, is_open, value_of
 
 ROOM = 10.0
 """Times as far from 0 that a bound is opened, or as near: an order of magnitude, in which a device
@@ -63,16 +63,11 @@ def ended(parameter: Parameter, fitted: Fitted) -> str:
 
 def beyond(declared: Fitted, found: Fitted) -> tuple[Value, ...]:
     """Values of the opened parameters, with the bounds that the mapping gives them."""
-    estimate = found.estimate
     return tuple(
-        Value(
-            p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]),
-            float(estimate.high[i]), p.minimum, p.maximum, bool(estimate.identifiable[i]),
-        )
+        value_of(p, found.estimate)
         for p in declared.problem.parameters
         if _opened(p, ended(p, declared), declared.problem) != p
-        for i in [found.problem.index(p.name)]
-    )  # fmt: skip
+    )
 
 
 def told(before: Fitted, after: Fitted) -> Iterable[str]:

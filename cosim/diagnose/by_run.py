@@ -23,7 +23,7 @@ from ..errors import CosimError
 from .answer import over, percent
 from .facts import Left, Value
 from .linear import Absorber
-from .models import GATE_Z, Fitted, compare
+from .models import GATE_Z, Fitted, compare, value_of
 from .search import Search
 from .table import left_of
 from .values import Values, exact
@@ -197,18 +197,10 @@ def _fitted(search: Search, base: Fitted, parameter: Parameter) -> ByRun | None:
     need = threshold(len(problem.parameters)) + len(unused)  # a nat for each value
     if gate.gain < need or gate.z < GATE_Z:
         return None
-    values = {p.run: _value(p, fits[p.run in unused]) for p in own}
+    values = {p.run: value_of(p, fits[p.run in unused]) for p in own}
     if sum(v.determined for v in values.values()) < 2:
         return None
     left = sorted((x for x in left_of(search, found) if x.structured), key=lambda x: -x.rms)
     if left and explained < 1.0 - TENTH**2:  # a law that acts otherwise in each run shows so, too
         return None
     return ByRun(parameter.name, parameter.unit, min(explained, 1.0), values, tuple(left), costs[1])
-
-
-def _value(parameter: Parameter, estimate: Estimate) -> Value:
-    """A value of one run."""
-    i, p = estimate.problem.index(parameter.name), parameter
-    return Value(p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]),
-                 float(estimate.high[i]), p.minimum, p.maximum,
-                 bool(estimate.identifiable[i]))  # fmt: skip

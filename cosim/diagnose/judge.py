@@ -16,10 +16,10 @@ from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .candidates import SKEW, Candidate
-from .facts import Gain, Law, Value
+from .facts import Gain, Law
 from .linear import MATERIAL, SampleStack
 from .memo import Memo
-from .models import GATE, GATE_Z, Fitted, Gate, compare, is_open, more_general
+from .models import GATE, GATE_Z, Fitted, Gate, compare, is_open, more_general, value_of
 from .whiteness import UNNAMED, whiteness_tests
 
 Vector = NDArray[np.float64]
@@ -134,16 +134,11 @@ class Judge:
             p_value: of its score.
         """
         problem, estimate, prefix = fitted.problem, fitted.estimate, candidate.prefix
-        own = [(i, p) for i, p in enumerate(problem.parameters) if p.name.startswith(prefix)]
-        strength = next(p for _, p in own if p.strength)
+        own = [p for p in problem.parameters if p.name.startswith(prefix)]
+        strength = next(p for p in own if p.strength)
         values = tuple(
-            Value(
-                p.name.removeprefix(prefix), p.unit, float(estimate.theta[i]),
-                float(estimate.low[i]), float(estimate.high[i]), p.minimum, p.maximum,
-                bool(estimate.identifiable[i]),
-            )
-            for i, p in own
-        )  # fmt: skip
+            replace(value_of(p, estimate), name=p.name.removeprefix(prefix)) for p in own
+        )
         names = {n for n in (*problem.names, *problem.held) if n.startswith(prefix)}
         rest = fitted.labels - {candidate.label}
         # a model that cannot be simulated without it misses it as much as all effects together

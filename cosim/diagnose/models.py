@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate.estimate import Estimate
+from ..calibrate.parts import Parameter
 from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from .candidates import Candidate
+from .facts import Value
 from .linear import SampleStack
 from .signature import Signature
 from .values import Values
@@ -132,6 +134,15 @@ def compare(data: Vector, first: Vector, second: Vector, stack: SampleStack) -> 
     amplitude = float(direction @ middle)
     sums = stack.sums(direction * (residual - direction * float(direction @ residual) / square))
     return Gate(gain, amplitude / math.sqrt(max(float(sums @ sums), square)))
+
+
+def value_of(parameter: Parameter, estimate: Estimate) -> Value:
+    """A parameter with what an estimate says of the one of this name."""
+    i, p = estimate.problem.index(parameter.name), parameter
+    return Value(
+        p.name, p.unit, float(estimate.theta[i]), float(estimate.low[i]), float(estimate.high[i]),
+        p.minimum, p.maximum, bool(estimate.identifiable[i]),
+    )  # fmt: skip
 
 
 def more_general(first: Fitted, second: Fitted) -> bool:

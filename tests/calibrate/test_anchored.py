@@ -11,19 +11,13 @@ from cosim.calibrate import read_problem
 from cosim.calibrate.fit import fit
 from cosim.calibrate.input_noise import propagated
 from cosim.intake.example import RADIUS, drive, write_csv
+from tests.diagnose.test_late_columns import MAPPING
 from tests.problems import simulator
-from tests.robot_logs import ROBOT, write_system
+from tests.robot_logs import write_system
 
 pytestmark = pytest.mark.slow
 
-MAPPING = f"""relative = [["x", "y", "yaw"]]{ROBOT}[[parameter]]
-name = "r"
-unit = "m"
-nominal = {RADIUS}
-min = 0.04
-max = 0.06
-targets = "base.r"
-
+RELATIVE = f"""relative = [["x", "y", "yaw"]]{MAPPING}
 [[run]]
 name = "one"
 purpose = "identification"
@@ -36,7 +30,7 @@ LOGS = 12
 def test_intervals_hold_the_truth_where_the_anchor_counts(tmp_path: Path, counted: bool) -> None:
     """A heading that is off by 4 mrad turns a way of metres by far more than 2 mm."""
     write_system(tmp_path)
-    (tmp_path / "dataset.toml").write_text(MAPPING)
+    (tmp_path / "dataset.toml").write_text(RELATIVE)
     off, inside = [], []
     for seed in range(LOGS):
         write_csv(drive(70 + seed), "one", tmp_path)

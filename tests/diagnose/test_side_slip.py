@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from cosim.calibrate.problem import Problem
-from cosim.diagnose.candidates import Candidate, candidates, delays
-from cosim.diagnose.models import Fitted
-from cosim.diagnose.search import Search
+from cosim.diagnose.candidates import candidates, delays
 from cosim.intake.example import FRAME, PERIOD, RADIUS, TRACK, drive
 from tests.diagnose.test_late_columns import NAMES, written
-from tests.problems import simulator
+from tests.diagnose.test_misread_columns import found
 
 pytestmark = pytest.mark.slow
 LAW = "side_slip at base.across"
@@ -33,14 +31,6 @@ def slipping(folder: Path, k: float, power: float = 1.0) -> Problem:
         rows[1:, :2] += moved[:, every - 1 :: every].T[: len(rows) - 1]
         data[name] = rows
     return problem.with_data(data)
-
-
-def found(problem: Problem, few: list[Candidate]) -> tuple[Fitted, Fitted | None]:
-    search = Search(simulator(problem, 1), only=few)
-    base = search.calibrated()
-    winner = search.round(base).winner
-    search.close()
-    return base, winner
 
 
 @pytest.mark.parametrize(("k", "power"), [(0.05, 1.0), (0.2, 2.0)])
