@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cosim.calibrate import Problem
+from cosim.calibrate.checks.averaged import averaged, check_averaged
 from cosim.calibrate.checks.clipped import check_clipped
 from cosim.calibrate.checks.finding import NO_SOURCE, Finding
 from cosim.calibrate.checks.smooth import check_stated
@@ -96,3 +97,64 @@ def test_a_value_that_is_held_where_a_log_ends_is_no_limit(again: bool) -> None:
     problem: Any = SimpleNamespace(runs=[run], channels=[channel])
     found = list(check_clipped(problem, {"A": (true + 1.0)[:, None]}))
     assert len(found) == again
+
+
+def mean_over(window: int, values: np.ndarray) -> np.ndarray:
+    """Centred, as tools give it."""
+    return np.convolve(values, np.ones(window) / window, "same")
+
+
+@pytest.mark.parametrize("window", [3, 4, 11, 100])
+def test_a_moving_mean_is_told_with_its_window(window: int) -> None:
+    white = np.random.default_rng(window).standard_normal((2, 600))
+    assert averaged([mean_over(window, row) for row in white]) == window
+    # a corner that the mean has rounded is motion, and so is what a fit leaves of a slow law
+    corner = mean_over(window, white[0] + np.abs(np.arange(600) - 300.0)) - np.abs(
+        np.arange(600) - 300.0
+    )
+    slow = 3.0 * np.sin(np.arange(600) / 40.0)
+    assert averaged([corner + slow]) == window
+
+
+def test_what_is_no_moving_mean() -> None:
+    """White noise, lags, held and interpolated values, a ripple, a gap, a quantised motion."""
+    random = np.random.default_rng(8)
+    white, times = random.standard_normal(600), np.arange(600)
+    lagged = white.copy()
+    for k in range(1, 600):
+        lagged[k] += 0.9 * lagged[k - 1]
+    gap = white.copy()
+    gap[200:300] = np.nan
+    few = np.arange(0, 601, 10)
+    for values in (
+        white, lagged, gap, np.repeat(white[:60], 10), np.interp(times, few, white[: few.size]),
+        np.sin(2.0 * np.pi * times / 7.0), np.round(30.0 * np.sin(0.01 * times)), 0.0 * white,
+    ):  # fmt: skip
+        assert averaged([values]) == 0
+
+
+def test_a_mean_is_an_error_where_the_sheet_states_the_noise_or_nothing_else_is_left(
+    noisy, exact
+) -> None:
+    problem = noisy(0)
+    index = [c.name for c in problem.channels].index("current")
+
+    def left(source: Any, channels: Any) -> list[Finding]:
+        residuals = []
+        for run in problem.chosen("identification"):
+            rest = (run.data - exact[run.name]) / problem.sigma
+            for k in channels:
+                rest[:, k] = mean_over(9, rest[:, k])
+            residuals.append((run.name, rest))
+        estimate: Any = SimpleNamespace(problem=problem.changed(source=source), residuals=residuals)
+        return list(check_averaged(estimate))
+
+    everything = range(len(problem.channels))
+    [found] = left(NO_SOURCE, [index])
+    assert (found.severity, found.kind, found.column) == ("warning", "smoothed", "current")
+    assert "is a moving mean over 9 samples" in found.text
+    [found] = left(replace(NO_SOURCE, instruments=frozenset(["current"])), [index])
+    assert found.severity == "error"
+    assert {f.severity for f in left(NO_SOURCE, everything)} == {"error"}
+    assert left(NO_SOURCE, []) == []
+    assert left(replace(NO_SOURCE, made=frozenset(["current"])), [index]) == []

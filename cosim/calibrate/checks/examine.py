@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
+from .averaged import check_averaged
+from .begun import check_begun
 from .clipped import check_clipped
 from .copies import check_columns, check_copies, check_repeated
 from .finding import Finding, passed, quantity
@@ -75,7 +77,12 @@ def check_data(problem: Problem) -> list[Finding]:
 
 def check_fit(estimate: Estimate) -> list[Finding]:
     """Problems that show in what a fit leaves; errors that the mapping allows are warnings."""
-    found = [*check_late(estimate), *check_stated(estimate), *check_priors(estimate)]
+    found = list(check_averaged(estimate))
+    means = {f.column for f in found}
+    found += [f for f in check_stated(estimate) if f.column not in means]
+    found += [*check_late(estimate), *check_priors(estimate)]
+    if not any(f.severity == "error" for f in found):
+        found += check_begun(estimate)
     return passed(found, estimate.problem.source.allow)
 
 
