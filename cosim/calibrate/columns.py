@@ -184,6 +184,7 @@ def _held(entry: Mapping[str, Any], clocks: Clocks) -> tuple[Vector, Vector] | N
 
 MAKING = {
     "unwrap", "limit", "despike", "fresh", "gap", "ends", "quaternion", "lowpass", "derivative",
+    "missing",
 }  # fmt: skip
 """Keys with which something else is made of a column than its values at other times."""
 LATEST = 1e6
@@ -269,6 +270,8 @@ def _column(
     if name != clocks.main:
         check_rising(log, name, own, twice=True)
     own = own - float(entry.get("late", 0.0))
+    if "missing" in entry:
+        values = np.where(values == float(entry["missing"]), np.nan, values)
     if "limit" in entry:
         values = np.where(np.abs(values) > float(entry["limit"]), np.nan, values)
     if entry.get("despike", False):
@@ -359,8 +362,7 @@ def _yaw(log: Log, names: list[str], where: str) -> Vector:
     """
     parts = np.stack([log[name] for name in names])
     length = np.sqrt(np.sum(parts**2, axis=0))
-    length = np.where(length > 0.0, length, np.nan)  # all zeros: nothing was measured
-    good = np.isfinite(length)
+    good = np.isfinite(length) & (length > 0.0)
     if good.any():
         low, usual, high = (float(f(length[good])) for f in (np.min, np.median, np.max))
         alike = high - low < SAME_LENGTH * usual
@@ -370,7 +372,13 @@ def _yaw(log: Log, names: list[str], where: str) -> Vector:
                 "must be 1, or all the same: name the columns in the order x, y, z, w, or mend "
                 "the log"
             )
-    x, y, z, w = parts / length
+    return yaw_of(parts)
+
+
+def yaw_of(parts: Vector) -> Vector:
+    """Yaw of quaternions (x, y, z, w) of any length; nan where all are 0: nothing was measured."""
+    length = np.sqrt(np.sum(parts**2, axis=0))
+    x, y, z, w = parts / np.where(length > 0.0, length, np.nan)
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)))
 
 

@@ -93,6 +93,7 @@ COLUMN: dict[str, Check] = {
     "limit": positive, "ends": list_of(text, 2),
     "unwrap": either("true, false or a number greater than 0", flag, positive),
     "quaternion": list_of(text, 4), "fresh": flag, "despike": flag,
+    "missing": number,
 }  # fmt: skip
 PARAMETER: dict[str, Check] = {
     "name": text, "unit": text, "nominal": said, "min": number, "max": number,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from .grouping import plain
 from .guess import is_angle, turn_of
 from .inspect import ColumnReport
 from .matching import Column, Match, Matches
+from .rules.lost import lost
 from .runs import Part, Run
 from .words import COMMAND, pieces, words
 
@@ -206,7 +207,10 @@ def _column(
     column, unit = match.column, match.column.unit
     keys: dict[str, object] = {"source": column.source}
     remarks = [f"{match.place.name}: {match.reason}."]
-    part = runs[0].parts[column.part]
+    part, reports = runs[0].parts[column.part], [r.parts[column.part].report for r in runs]
+    quaternion = part.report.topic.made.get(column.name, ()) if plan.whole else ()
+    if quaternion:
+        keys = {"quaternion": [replace(column, name=name).source for name in quaternion]}
     if column.part != plan.main:
         keys["time"] = f"{column.part}.{clock_column(part, plan.whole)}"
         if drives:
@@ -219,7 +223,7 @@ def _column(
         not plan.whole and unit.sure and "--map" not in unit.reason
     )
     if unit.unit:
-        if not stated:
+        if not stated and not quaternion:
             keys["from"] = unit.unit
         remarks.append(f"In {unit.unit}: {unit.reason}{'' if unit.sure else ' (a guess)'}.")
     if match.place.unit and unit.unit and not (stated and match.place.unit == unit.unit):
@@ -227,10 +231,13 @@ def _column(
     if (
         not drives
         and is_angle(match.place.unit)
-        and any(turn_of(r.parts[column.part].report.topic.log[column.name])[0] for r in runs)
+        and any(turn_of(report.topic.log[column.name])[0] for report in reports)
     ):
         keys["unwrap"] = True
         remarks.append("It begins anew at a turn.")
+    if any(column.name in lost(r.topic, r.clock.column) for r in reports):
+        keys["missing"] = 0
+        remarks.append("Where it is exactly 0 together with others, nothing was measured.")
     for run in runs:
         for finding in run.parts[column.part].report.findings:
             if finding.column == column.name and finding.kind in ("spikes", "saturated"):

@@ -14,11 +14,12 @@ from ..calibrate.checks.smooth import ENOUGH, ORDER, roughness
 from ..errors import UnknownNameError, listing
 from .clock import Clock, find_clock
 from .guess import Guess, guess_unit
-from .rules import cells, copies, limits, spiking, still, times, turning
+from .quaternions import with_yaws
+from .rules import cells, copies, limits, lost, spiking, still, times, turning
 from .sources import open_source
 from .topic import Source, Topic
 
-RULES = (times, cells, still, limits, spiking, turning, copies)
+RULES = (times, cells, lost, still, limits, spiking, turning, copies)
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,7 @@ def check_clock(reports: Iterable[FileReport], clock: str) -> None:
 
 def inspect_topic(topic: Topic) -> TopicReport:
     """What is in a topic."""
+    topic = with_yaws(topic)
     clock = find_clock(topic)
     columns = tuple(
         _column(topic, name) for name in topic.log.columns if name != clock.column
@@ -149,7 +151,13 @@ def inspect_topic(topic: Topic) -> TopicReport:
 def _column(topic: Topic, name: str) -> ColumnReport:
     values = topic.log[name]
     good = values[np.isfinite(values)]
-    guess = guess_unit(name, values, topic.log.units.get(name, ""))
+    part = next((yaw for yaw, parts in topic.made.items() if name in parts), "")
+    guess = (
+        Guess("1", f"of a quaternion, whose yaw is {part}", sure=True) if part
+        else Guess("rad", f"of the quaternion {', '.join(topic.made[name])}", sure=True)
+        if name in topic.made
+        else guess_unit(name, values, topic.log.units.get(name, ""))
+    )  # fmt: skip
     distinct = np.unique(good)
     resolution = float(np.min(np.diff(distinct))) if distinct.size > 1 else 0.0
     return ColumnReport(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +20,7 @@ class Topic:
         clock: name of the column of times where the source says so, "" else.
         frames: of positions and directions, e.g. `odom -> base_link`; "" where unknown.
         notes: what was assumed in reading.
+        made: columns that are the yaw of a quaternion -> its columns x, y, z, w.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Topic:
     clock: str = ""
     frames: str = ""
     notes: tuple[str, ...] = ()
+    made: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
