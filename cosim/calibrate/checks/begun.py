@@ -80,7 +80,8 @@ def check_begun(estimate: Estimate) -> Iterator[Finding]:
     squares = 2.0 * again.cost
     if squares - again.count > asked.noise or _slow(again):
         return
-    zero, little = asked.zeros(names), 2.0 * estimate.cost < OFF * estimate.count
+    alike = asked.alike(names)
+    zero, little = alike and asked.constant(names), 2.0 * estimate.cost < OFF * estimate.count
     told = "; ".join(filter(None, (_told(again, name) for name in names)))
     moved = ", ".join(
         f"{p.name} from {quantity(before, '')} to {quantity(again.values[p.name], p.unit)}"
@@ -105,8 +106,9 @@ def check_begun(estimate: Estimate) -> Iterator[Finding]:
     )
     if zero:
         text += "; or it is the zero of a sensor, as all runs are off alike"
-    elif little:
-        text += "; or a law is missing that does as much"
+    else:
+        text += "; or their frame is turned or moved, as all runs are off alike" * alike
+        text += "; or a law is missing that does as much" * little
     yield Finding("warning" if zero or little else "error", "start", "", "", text)
 
 
@@ -267,11 +269,13 @@ class _Asked:
             taken, gained, values = [*taken, best], more, wider
         return taken if self.explained(gained) else []
 
-    def zeros(self, names: Sequence[str]) -> bool:
-        """Whether one value for all runs does as well, and only adds a constant to channels."""
-        (whole, values), (alike, fewer) = self.gain(names), self.gain(names, alike=True)
-        if values > fewer and whole - alike > chdtri(values - fewer, CHANCE):
-            return False
+    def alike(self, names: Sequence[str]) -> bool:
+        """Whether one value for all runs does as well."""
+        (whole, values), (one, fewer) = self.gain(names), self.gain(names, alike=True)
+        return values == fewer or bool(whole - one < chdtri(values - fewer, CHANCE))
+
+    def constant(self, names: Sequence[str]) -> bool:
+        """Whether these starts only add a constant to channels."""
         for column in self.columns:
             if column.place in names:
                 shown = column.values[:, np.isfinite(column.values).any(axis=0)]
