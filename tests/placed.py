@@ -47,12 +47,16 @@ class Wrong(NamedTuple):
         drift: of the measured heading [rad/s].
         zero: of the measured heading [rad].
         larger: share by which the left wheel is.
+        late: samples by which y comes late.
+        gain: of y.
     """
 
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     drift: float = 0.0
     zero: float = 0.0
     larger: float = 0.0
+    late: int = 0
+    gain: float = 1.0
 
 
 def rows(seed: int, wrong: Wrong) -> np.ndarray:
@@ -70,7 +74,9 @@ def rows(seed: int, wrong: Wrong) -> np.ndarray:
         ahead = pose[2] + turn
         pose = pose + np.array([chord * np.cos(ahead), chord * np.sin(ahead), w * STEP])
     times = np.arange(count) * STEP
-    logged = np.array(found) + NOISE * random.standard_normal((count, 3))
+    logged = np.array(found)
+    logged[:, 1] = wrong.gain * logged[np.maximum(np.arange(count) - wrong.late, 0), 1]
+    logged += NOISE * random.standard_normal((count, 3))
     logged[:, 2] += wrong.zero + wrong.drift * times
     return np.column_stack([times, wheels, logged])
 

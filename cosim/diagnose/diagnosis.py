@@ -140,9 +140,10 @@ def _diagnosed(
         try:
             calibrated = search.calibrated(None if base is None else base.estimate.values)
             late = check_fit(calibrated.estimate)
-            if {f.kind for f in late if f.severity == "error"} == {"start"}:
-                task.say("starts of the runs explain what is left: does one law?")
-                late = passed(late, frozenset(["start"] * _one_law(search, calibrated)))
+            if {f.kind for f in late if f.severity == "error"} in ({"start"}, {"differs"}):
+                task.say("what differs from run to run explains what is left: does one law?")
+                simpler = _one_law(search, calibrated)
+                late = passed(late, frozenset({"start", "differs"} if simpler else ()))
             findings += late
             if any(f.severity == "error" for f in late):
                 return _refused(problem, findings, task)
@@ -174,7 +175,7 @@ def _diagnosed(
 
 
 def _one_law(search: Search, declared: Fitted) -> bool:
-    """Whether one law leaves noise: less to assume than what each run begins with."""
+    """Whether one law leaves noise: less to assume than an error of each run."""
     stage = search.round(declared)
     search.rounds.clear()
     return stage.winner is not None and not search.lacking(stage.winner)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from cosim.calibrate import Problem
 from cosim.calibrate.checks.averaged import averaged, check_averaged
@@ -116,6 +117,12 @@ def test_a_moving_mean_is_told_with_its_window(window: int) -> None:
     assert averaged([corner + slow]) == window
 
 
+@pytest.mark.parametrize(("window", "order"), [(15, 2), (51, 3)])
+def test_polynomials_through_windows_are_told_too(window: int, order: int) -> None:
+    white = np.random.default_rng(window).standard_normal((2, 600))
+    assert averaged([savgol_filter(row, window, order) for row in white]) == window
+
+
 def test_what_is_no_moving_mean() -> None:
     """White noise, lags, held and interpolated values, a ripple, a gap, a quantised motion."""
     random = np.random.default_rng(8)
@@ -152,7 +159,7 @@ def test_a_mean_is_an_error_where_the_sheet_states_the_noise_or_nothing_else_is_
     everything = range(len(problem.channels))
     [found] = left(NO_SOURCE, [index])
     assert (found.severity, found.kind, found.column) == ("warning", "smoothed", "current")
-    assert "is a moving mean over 9 samples" in found.text
+    assert "is smoothed over windows of 9 samples" in found.text
     [found] = left(replace(NO_SOURCE, instruments=frozenset(["current"])), [index])
     assert found.severity == "error"
     assert {f.severity for f in left(NO_SOURCE, everything)} == {"error"}

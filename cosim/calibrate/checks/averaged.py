@@ -33,8 +33,9 @@ def check_averaged(estimate: Estimate) -> Iterator[Finding]:
 
     Of white noise n, a mean over m samples steps by (n[k + m] - n[k]) / m from one sample to the
     next. Such steps, and their differences, have the correlation -1/2 if they are m samples apart;
-    no filter, motion, or law that a model lacks does that at one distance alone. The motion is
-    averaged, too, which bends what bends and is no noise.
+    no filter without an end, motion, or law that a model lacks does that at one distance alone.
+    Polynomials through windows (Savitzky-Golay) do as well. The motion is smoothed, too, which
+    bends what bends and is no noise.
     """
     problem, found, count = estimate.problem, [], 0
     for index, channel in enumerate(problem.channels):
@@ -44,9 +45,9 @@ def check_averaged(estimate: Estimate) -> Iterator[Finding]:
         count += 1
         if window := averaged(columns):
             text = (
-                f"is a moving mean over {window} samples: what the fit leaves begins anew after as "
-                "many. The motion is averaged, too, so that parameters are off by more than their "
-                "intervals; take the raw column"
+                f"is smoothed over windows of {window} samples (a moving mean, a polynomial): what "
+                "the fit leaves steps back after as many. The motion is smoothed, too, so that "
+                "parameters are off by more than their intervals; take the raw column"
             )
             found.append((channel.name, text))
     for name, text in found:

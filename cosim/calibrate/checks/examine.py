@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ...errors import CosimError
 from .averaged import check_averaged
-from .begun import check_begun
 from .clipped import check_clipped
 from .copies import check_columns, check_copies, check_repeated
+from .each_run import check_each_run
 from .finding import Finding, passed, quantity
 from .first_values import check_first_values
 from .gaps import check_gaps
@@ -82,7 +82,7 @@ def check_fit(estimate: Estimate) -> list[Finding]:
     found += [f for f in check_stated(estimate) if f.column not in means]
     found += [*check_late(estimate), *check_priors(estimate)]
     if not any(f.severity == "error" for f in found):
-        found += check_begun(estimate)
+        found += check_each_run(estimate)
     return passed(found, estimate.problem.source.allow)
 
 

@@ -19,6 +19,7 @@ KINDS = {
     "clock": "sample times that do not rise, or columns that are late",
     "constant": "a column or an input that never changes",
     "copy": "runs that are copies of each other, or hold a part of their own twice",
+    "differs": "a column whose clock, zero or gain is another one from run to run",
     "empty": "a channel without a value",
     "frozen": "a sensor that stands still for a while",
     "gap": "missing rows",

@@ -9,7 +9,7 @@ import pytest
 
 from cosim.calibrate import read_problem
 from cosim.calibrate.calibration import calibrated
-from cosim.calibrate.checks.begun import check_begun
+from cosim.calibrate.checks.each_run import check_each_run
 from cosim.calibrate.checks.finding import Finding
 from cosim.calibrate.estimate import Estimate
 from tests.placed import RADIUS, TRACK, Wrong, write
@@ -32,7 +32,7 @@ def estimated(folder: Path, runs: Sequence[Wrong], more: str = "") -> Estimate:
 
 
 def found(folder: Path, runs: Sequence[Wrong], more: str = "") -> list[Finding]:
-    return list(check_begun(estimated(folder, runs, more)))
+    return list(check_each_run(estimated(folder, runs, more)))
 
 
 PLACED = [Wrong((0.0, 0.0, angle)) for angle in (0.012, -0.008, 0.004)]
@@ -51,7 +51,7 @@ def test_headings_placed_by_hand_are_said_with_the_way_out(tmp_path: Path) -> No
 def test_the_way_out_gives_intervals_with_the_truth(tmp_path: Path) -> None:
     """And nothing more to say."""
     estimate = estimated(tmp_path, PLACED, HEADING)
-    assert list(check_begun(estimate)) == []
+    assert list(check_each_run(estimate)) == []
     for name, truth in (("r", RADIUS), ("track", TRACK)):
         k = estimate.problem.index(name)
         # three deviations: seeds were not chosen
@@ -85,11 +85,57 @@ def test_what_only_adds_a_constant_may_be_a_sensors_zero(tmp_path: Path) -> None
     "runs",
     [
         [Wrong()] * 3,
-        [Wrong(drift=rate) for rate in (0.004, -0.003, 0.002)],
+        [Wrong(drift=0.003)] * 3,
         [Wrong(zero=0.02)] * 3,
         [Wrong(larger=0.01)] * 3,
+        [Wrong(late=5)] * 3,
+        [Wrong(gain=1.1)] * 3,
     ],
-    ids=["clean", "a gyro that drifts", "the zero of the heading alone", "unequal wheels"],
+    ids=[
+        "clean",
+        "a gyro that drifts",
+        "the zero of the heading alone",
+        "unequal wheels",
+        "a late column",
+        "a column with a gain",
+    ],
 )
-def test_what_is_no_other_beginning_is_not_called_one(tmp_path: Path, runs: list[Wrong]) -> None:
+def test_what_is_the_same_in_all_runs_is_an_effect(tmp_path: Path, runs: list[Wrong]) -> None:
     assert found(tmp_path, runs) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "what", "size", "target"),
+    [
+        (Wrong(late=5), "how late y is", 0.1, "clock:y"),
+        (Wrong(late=13), "how late y is", 0.26, "clock:y"),
+        (Wrong(gain=-1.0), "the error of the gain of y", -2.0, "column:gain:y"),
+        (Wrong(gain=1.05), "the error of the gain of y", 0.05, "column:gain:y"),
+        (Wrong(zero=0.05), "the zero of yaw", 0.05, "column:bias:yaw"),
+        (Wrong(drift=0.02), "the drift of the zero of yaw", 0.02, "column:zero_drift:yaw"),
+    ],
+)
+@pytest.mark.parametrize("unused", [0, 1], ids=["fitted", "unused"])
+def test_a_column_that_is_another_one_in_one_run(
+    tmp_path: Path, wrong: Wrong, what: str, size: float, target: str, unused: int
+) -> None:
+    folder = write(tmp_path, [Wrong(), Wrong(), wrong], unused=unused)
+    estimate = calibrated(simulator(read_problem(folder)))[0]
+    [finding] = check_each_run(estimate)
+    assert (finding.severity, finding.kind) == ("error", "differs")
+    said = f"a column is another one from run to run: {what} "
+    assert finding.text.startswith(said)
+    # what the fits of single seconds leave of it
+    assert float(finding.text.removeprefix(said).split()[0]) == pytest.approx(size, rel=0.03)
+    assert "instead of 0 in r2 alone. With that" in finding.text
+    assert f'Mend the log, or estimate it: a [[nuisance]] with targets = "{target}"' in finding.text
+
+
+def test_a_drift_that_is_another_one_in_each_run(tmp_path: Path) -> None:
+    [finding] = found(tmp_path, [Wrong(drift=rate) for rate in (0.004, -0.003, 0.002)])
+    assert "the drift of the zero of yaw 0.003" in finding.text
+    assert "in r0, and less so in 2 more" in finding.text
+
+
+def test_a_wheel_that_is_larger_in_one_run_is_no_column(tmp_path: Path) -> None:
+    assert found(tmp_path, [Wrong(), Wrong(), Wrong(larger=0.02)]) == []

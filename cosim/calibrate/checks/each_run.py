@@ -1,0 +1,163 @@
+"""What differs from run to run and is no law: places that runs begin at, faults of their columns.
+
+No first sample shows a heading that is off by a few deviations of its noise, but whole runs do: the
+path turns with it, parameters make up for what they can, and intervals know nothing of it. A column
+that is late in one run, or has another zero there, leaves an excess that no law takes up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import CosimError
+from ..fit import Effort, fit
+from ..nuisance import settled
+from .finding import Finding, quantity
+from .own_errors import Kind, OwnErrors, columns_of, is_slow, starts_of
+
+if TYPE_CHECKING:
+    from ..estimate import Estimate
+
+Vector = NDArray[np.float64]
+OFF = 1.5
+"""Mean square over the noise's from which nothing but errors of runs leaves noise: nine starts of
+three runs leave a sixth of what unequal wheels do, and less is seen. Below it, a law may do as
+well."""
+ALSO = 0.1
+"""Share of what the worst run is off from which others are said to be, too."""
+AGAIN = Effort("near", "intervals", iterations=8)
+"""Of the fit with these errors: they change residuals nearly as a straight line does."""
+
+
+def check_each_run(estimate: Estimate) -> Iterator[Finding]:
+    """Errors of single runs that explain all that a fit leaves (see `own_errors`).
+
+    First what runs begin with is asked, then one error of one column. A gain that noise does not
+    make and that leaves little is tried in a fit. If that leaves noise, white over time, this is
+    what is wrong: of a law that the model lacks, errors of runs make up for a part. Where there is
+    little to explain (`OFF`), that part may be all that shows, and it is a warning.
+
+    Starts that are off alike in all runs are a frame that is turned, which is mended in the same
+    way; where they only add a constant to channels, they may be the zero of a sensor, and are a
+    warning. A column whose error is the same in all runs is another matter: an effect.
+
+    Where fitted runs leave noise and unused ones do not, these are asked.
+    """
+    problem, simulator = estimate.problem, estimate.simulator
+    if problem.unstable or not estimate.jacobian:
+        return
+    asked = OwnErrors(simulator, estimate.theta, estimate.residuals, estimate.jacobian)
+    found = _found(estimate, asked)
+    unused = [run.name for run in problem.chosen("validation")]
+    if found is None and asked.mean < OFF and unused:
+        try:
+            theta = settled(simulator, estimate.theta, unused)
+            residuals = simulator.residuals(theta, unused)
+        except CosimError:  # what cannot be simulated there is told elsewhere
+            return
+        found = _found(estimate, OwnErrors(simulator, theta, residuals, ()))
+    if found is not None:
+        yield found
+
+
+def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:
+    """The finding in the runs that are asked, if there is one."""
+    if not is_slow(asked.residuals) or not asked.residuals:
+        return None
+    asked.ask(list(starts_of(asked.problem)))
+    finding = _tried(estimate, asked, asked.together())
+    if finding is None and asked.mean > OFF:
+        asked.ask(list(columns_of(asked.problem)))
+        kinds = asked.single()
+        if kinds and not (asked.alike(kinds) and len(asked.residuals) > 1):
+            finding = _tried(estimate, asked, kinds)
+    return finding
+
+
+def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Finding | None:
+    """The finding, if a fit with these errors leaves noise."""
+    if not kinds:
+        return None
+    names = [name for name, _ in asked.residuals]
+    fitted = [name for name, _ in estimate.residuals]
+    try:
+        again = fit(*asked.opened(kinds), dict.fromkeys([*fitted, *names]), effort=AGAIN)
+    except CosimError:  # what cannot be fitted explains nothing
+        return None
+    left = [(name, rows) for name, rows in again.residuals if name in names]
+    known = [rows[np.isfinite(rows)] for _, rows in left]
+    count = sum(rows.size for rows in known)
+    squares = sum(float(rows @ rows) for rows in known)
+    if squares - count > asked.noise or is_slow(left):
+        return None
+    starts, alike = kinds[0].starts, asked.alike(kinds)
+    zero, little = starts and alike and asked.constant(kinds), asked.mean < OFF
+    text = (
+        "runs do not begin quite where they are said to: " if starts
+        else "a column is another one from run to run: "
+    ) + "; ".join(filter(None, (_told(again, kind) for kind in kinds)))  # fmt: skip
+    text += (
+        f". With that the mean square over the noise's falls from {asked.mean:.3g} to "
+        f"{squares / max(count, 1):.3g}{_moved(estimate, again)}. "
+        + ("Estimate it: " if starts else "Mend the log, or estimate it: ")
+        + "a [[nuisance]] with "
+        + " and one with ".join(_entry(asked, again, kind) for kind in kinds)
+        + f",{' each' * (len(kinds) > 1)} with per_run = true"
+    )
+    if zero:
+        text += "; or it is the zero of a sensor, as all runs are off alike"
+    elif starts:
+        text += "; or their frame is turned or moved, as all runs are off alike" * alike
+        text += "; or a law is missing that does as much" * little
+    severity = "warning" if zero or little else "error"
+    return Finding(severity, "start" if starts else "differs", "", "", text)
+
+
+def _moved(estimate: Estimate, again: Estimate) -> str:
+    """Which declared parameters leave their intervals."""
+    moved = [
+        f"{p.name} from {quantity(before, '')} to {quantity(again.values[p.name], p.unit)}"
+        for p, before, low, high in zip(
+            estimate.problem.parameters, estimate.theta.tolist(), estimate.low.tolist(),
+            estimate.high.tolist(), strict=True,
+        )
+        if p.role == "declared" and not low <= again.values[p.name] <= high
+    ]  # fmt: skip
+    return f", and it moves {', '.join(moved)}, out of the intervals" if moved else ""
+
+
+def _told(again: Estimate, kind: Kind) -> str:
+    """The run that is farthest off, and how many others are off, too."""
+    found = [
+        (abs(value - p.nominal), quantity(value, p.unit.removeprefix("1")), low, high, p)
+        for p, value, low, high in zip(
+            again.problem.parameters, again.theta.tolist(), again.low.tolist(),
+            again.high.tolist(), strict=True,
+        )
+        if p.targets == ((kind.target, 1.0),) and p.run and not low <= p.nominal <= high
+    ]  # fmt: skip
+    if not found:
+        return ""
+    most, value, low, high, p = max(found, key=lambda item: item[0])
+    more = sum(size > ALSO * most for size, *_ in found) - 1
+    others = f", and less so in {more} more" if more else " alone"
+    return (
+        f"{kind.what} {value} [{low:.4g}, {high:.4g}] instead of {p.nominal:.4g} in {p.run}{others}"
+    )
+
+
+def _entry(asked: OwnErrors, again: Estimate, kind: Kind) -> str:
+    """What a nuisance for it says."""
+    off = [
+        max(abs(value - p.nominal), deviation)
+        for p, value, deviation in zip(
+            again.problem.parameters, again.theta.tolist(), again.deviation.tolist(), strict=True
+        )
+        if p.targets == ((kind.target, 1.0),) and p.run
+    ]
+    first = asked.begins(kind, asked.residuals[0][0])
+    return f'targets = "{kind.target}", nominal = {first:.4g}, span = {4.0 * max(off):.1g}'

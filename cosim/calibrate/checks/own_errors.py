@@ -1,0 +1,307 @@
+"""What single runs may have of their own: where they begin, and what is wrong with their columns.
+
+With J the derivatives of the residuals r by the parameters and S those by errors of single runs,
+errors gain, parameters being free to follow,
+
+    g' M^-1 g,    M = S' S - S' J (J' J)^-1 J' S,    g = S' r - S' J (J' J)^-1 J' r
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from ...errors import CosimError
+from ...spec.units import BASE, per_second
+from ..parts import BIAS, CLOCK, COLUMN, GAIN, ZERO_DRIFT, Parameter
+
+if TYPE_CHECKING:
+    from ..parts import Sensitivity
+    from ..problem import Problem
+    from ..simulator import Simulator
+
+Vector = NDArray[np.float64]
+PLACED = 1e-3
+"""By which positions and angles are moved [m, rad]: to which machines are placed with care."""
+SCALED = 1e-2
+"""By which gains are changed."""
+LATE, LATE_INPUTS = (1, 2, 4, 8, 16, 32), (2, 8)
+"""Samples by which columns are shifted, either way; fewer of inputs, which are simulated."""
+CHANCE = 1e-6
+"""Of a gain in data where nothing is wrong: data sets are many, and so are what each is asked."""
+LEAVES = 0.2
+"""Share of the excess over the noise's that errors may leave, to first order, to be fitted."""
+SPREAD = 2.0
+"""Deviations that the sum of squares of noise may be off."""
+SAME = 1e-9
+"""Share of what an error does from which parameters do not do the same."""
+WIDE = 20.0
+"""Bounds of an error over its size, or its deviation: that they are none."""
+PARTS, LIKELY = 10, 1e-3
+"""Parts of a run whose means show wrong starts and most laws that are missing, which act as slowly
+as a machine moves; and their chance from which they are those of noise."""
+CONSTANT = 0.01
+"""Share of what an error does up to which it is the same at all times."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """An error that a run may have.
+
+    Attributes:
+        target: of a nuisance that sets it.
+        what: it is, for people.
+        unit: of it.
+        step: change of it with which its derivative is taken.
+    """
+
+    target: str
+    what: str
+    unit: str
+    step: float
+
+    @property
+    def starts(self) -> bool:
+        """Whether it is where a run begins."""
+        return not self.target.startswith((CLOCK, COLUMN))
+
+
+def starts_of(problem: Problem) -> Iterator[Kind]:
+    """Positions and angles that the system integrates."""
+    for name, member in problem.plain().members.items():
+        variables = member.description.variables
+        for variable in variables.values():
+            if f"der({variable.name})" not in variables or variable.unit is None:
+                continue
+            parts = {k: n for k, n in zip(BASE, variable.unit.exponents, strict=True) if n}
+            if parts in ({"m": 1}, {"rad": 1}):
+                for element in variable.elements():
+                    yield Kind(f"{name}.{element}", f"{name}.{element}", variable.symbol, PLACED)
+
+
+def columns_of(problem: Problem) -> Iterator[Kind]:
+    """Clocks of columns, and zero, gain and drift of those that are measured."""
+    run = problem.runs[0]
+    interval, duration = run.interval, max(float(r.times[-1] - r.times[0]) for r in problem.runs)
+    clocks = [(c.name, LATE) for c in problem.channels] + [(n, LATE_INPUTS) for n in run.inputs]
+    for name, shifts in clocks:
+        for samples in (sign * n for n in shifts for sign in (1, -1)):
+            yield Kind(CLOCK + name, f"how late {name} is", "s", samples * interval)
+    for c in problem.channels:
+        rate = per_second(c.unit) if c.unit else ""
+        for kind, what, unit, step in (
+            (BIAS, "the zero of", c.unit, c.sigma),
+            (GAIN, "the error of the gain of", "1", SCALED),
+            (ZERO_DRIFT, "the drift of the zero of", rate, c.sigma / duration),
+        ):
+            yield Kind(f"{COLUMN}{kind}{c.name}", f"{what} {c.name}", unit, step)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """What an error of a kind does to the residuals of a run, per change of it."""
+
+    kind: Kind
+    run: str
+    values: Vector
+
+
+class OwnErrors:
+    """What errors of single runs would gain, to first order.
+
+    Args:
+        simulator: of the problem.
+        theta: its parameters.
+        residuals: by run, of the runs that are asked.
+        jacobian: of these runs; none where parameters are held.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        theta: Vector,
+        residuals: Sequence[tuple[str, Vector]],
+        jacobian: Sequence[Sensitivity],
+    ) -> None:
+        problem = self.problem = simulator.problem
+        self.simulator, self.theta = simulator, theta
+        self.residuals, self.jacobian = residuals, {item.run: item for item in jacobian}
+        squares = [r[np.isfinite(r)] ** 2 for _, r in residuals]
+        count = sum(part.size for part in squares)
+        self.mean = sum(float(part.sum()) for part in squares) / max(count, 1)
+        """Square of what is left over the noise's."""
+        self.excess = (self.mean - 1.0) * count + (len(problem.parameters) if jacobian else 0)
+        self.noise = SPREAD * float(np.sqrt(2.0 * count))
+        self.columns: list[_Column] = []
+        self.matrix, self.gradient, self.alone = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+        self._rows: dict[str, tuple[NDArray[np.bool_], Vector, Vector]] = {}
+        own, self._fallen = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
+        for name, residual in residuals:
+            good = np.isfinite(residual)
+            slopes = np.zeros((0, theta.size))
+            if item := self.jacobian.get(name):
+                good &= np.isfinite(item.values).all(axis=2)
+                slopes = np.zeros((int(good.sum()), theta.size))
+                slopes[:, item.columns] = item.values[good] * problem.scale[item.columns]
+                own += slopes.T @ slopes
+                self._fallen += slopes.T @ residual[good]
+            self._rows[name] = good, slopes, residual[good]
+        for k, p in enumerate(problem.parameters):
+            own[k, k] += (problem.scale[k] / p.prior) ** 2 if p.prior else 0.0
+        self._inverse = np.linalg.pinv(own, rcond=SAME, hermitian=True)
+
+    def ask(self, kinds: Sequence[Kind]) -> None:
+        """Simulate errors of these kinds, those that no parameter sets already."""
+        names = [name for name, _ in self.residuals]
+        set_in = {
+            (target, run) for p in (*self.problem.parameters, *self.problem.late)
+            for target, _ in p.targets for run in ([p.run] if p.run else names)
+        }  # fmt: skip
+        self.columns = []
+        for kind in kinds:
+            runs = [name for name in names if (kind.target, name) not in set_in]
+            begins = [self.begins(kind, name) for name in runs]
+            added = [free(kind, r, b, abs(kind.step)) for r, b in zip(runs, begins, strict=True)]
+            moved = self.problem.with_parameters([*self.problem.parameters, *added])
+            theta = np.concatenate([self.theta, np.array(begins) + kind.step])
+            try:
+                others = dict(self.simulator.of(moved).residuals(theta, runs))
+            except CosimError:  # what cannot be simulated there says nothing
+                continue
+            for name, residual in self.residuals:
+                if name in others:
+                    change = (others[name] - residual) / kind.step
+                    if np.nansum(change**2) > 0.0:
+                        self.columns.append(_Column(kind, name, np.nan_to_num(change)))
+        self._summed()
+
+    def _summed(self) -> None:
+        count = len(self.columns)
+        self.matrix, self.gradient = np.zeros((count, count)), np.zeros(count)
+        shared = np.zeros((count, self.theta.size))
+        for i, column in enumerate(self.columns):
+            good, slopes, residual = self._rows[column.run]
+            mine = column.values[good]
+            self.gradient[i] = mine @ residual
+            if slopes.size:
+                shared[i] = slopes.T @ mine
+            for k in range(i + 1):
+                if self.columns[k].run == column.run:
+                    both = float(mine @ self.columns[k].values[good])
+                    self.matrix[i, k] = self.matrix[k, i] = both
+        self.alone = np.maximum(np.diag(self.matrix), 1e-300)
+        self.matrix -= shared @ self._inverse @ shared.T
+        self.gradient -= shared @ self._inverse @ self._fallen
+
+    def begins(self, kind: Kind, run: str) -> float:
+        """What is said of it in a run."""
+        if not kind.starts:
+            return 0.0
+        values = self.problem.values(self.theta, run)
+        if kind.target in values:
+            return values[kind.target]
+        member, (variable, *_) = self.problem.system().variables(kind.target)
+        declared = [value for value in variable.start if value is not None]
+        given = member.parameters.get(variable.name)
+        return float((declared or [0.0])[0] if given is None else str(given))
+
+    def gain(self, kinds: Sequence[Kind], *, alike: bool = False) -> tuple[float, int]:
+        """What errors of some kinds gain, and how many values that takes.
+
+        Args:
+            kinds: of them.
+            alike: one value for all runs.
+        """
+        index = [i for i, c in enumerate(self.columns) if c.kind in kinds]
+        groups = [(self.columns[i].kind, "" if alike else self.columns[i].run) for i in index]
+        known = list(dict.fromkeys(groups))
+        if not known:
+            return 0.0, 0
+        sums = np.array([[float(group == one) for one in known] for group in groups])
+        matrix = sums.T @ self.matrix[np.ix_(index, index)] @ sums
+        alone = np.sqrt(sums.T @ self.alone[index])
+        even, told = matrix / np.outer(alone, alone), sums.T @ self.gradient[index] / alone
+        inverse = np.linalg.pinv(even, rcond=SAME, hermitian=True)
+        return float(told @ inverse @ told), int(np.linalg.matrix_rank(even, SAME, hermitian=True))
+
+    def explained(self, gain: float) -> bool:
+        """Whether what is left is noise, or little beside what was."""
+        return self.excess - gain <= max(LEAVES * self.excess, self.noise)
+
+    def together(self) -> list[Kind]:
+        """As few kinds as explain what is left, each beside the others; none if they do not."""
+        kinds = list(dict.fromkeys(c.kind for c in self.columns))
+        whole, values = self.gain(kinds)
+        if not values or whole < chdtri(values, CHANCE) or not self.explained(whole):
+            return []
+        taken: list[Kind] = []
+        gained, values = 0.0, 0
+        while rest := [kind for kind in kinds if kind not in taken]:
+            best = max(rest, key=lambda kind: self.gain([*taken, kind])[0])
+            more, wider = self.gain([*taken, best])
+            if wider == values or more - gained < chdtri(wider - values, CHANCE):
+                break
+            taken, gained, values = [*taken, best], more, wider
+        return taken if self.explained(gained) else []
+
+    def single(self) -> list[Kind]:
+        """The kind that explains most of what is left, by itself; none if it does not."""
+        kinds = list(dict.fromkeys(c.kind for c in self.columns))
+        if not kinds:
+            return []
+        best = max(kinds, key=lambda kind: self.gain([kind])[0])
+        gained, values = self.gain([best])
+        sure = gained > chdtri(values, CHANCE / len(kinds)) if values else False
+        return [best] if sure and self.explained(gained) else []
+
+    def alike(self, kinds: Sequence[Kind]) -> bool:
+        """Whether one value for all runs does as well."""
+        (whole, values), (one, fewer) = self.gain(kinds), self.gain(kinds, alike=True)
+        return values == fewer or bool(whole - one < chdtri(values - fewer, CHANCE))
+
+    def constant(self, kinds: Sequence[Kind]) -> bool:
+        """Whether these errors only add a constant to channels."""
+        for column in self.columns:
+            if column.kind in kinds:
+                shown = column.values[self._rows[column.run][0].any(axis=1)]
+                changes = shown - shown.mean(axis=0)
+                if np.sum(changes**2) > CONSTANT**2 * np.sum(shown**2):
+                    return False
+        return True
+
+    def opened(self, kinds: Sequence[Kind]) -> tuple[Simulator, Vector]:
+        """The problem with these errors as parameters, and where a fit of it begins."""
+        index = [i for i, c in enumerate(self.columns) if c.kind in kinds]
+        inverse = np.linalg.pinv(self.matrix[np.ix_(index, index)], rcond=SAME, hermitian=True)
+        # residuals are what was measured less the model
+        off = -inverse @ self.gradient[index]
+        added, values = [], []
+        for i, value, variance in zip(index, off.tolist(), np.diag(inverse), strict=True):
+            kind, run = self.columns[i].kind, self.columns[i].run
+            begins, size = self.begins(kind, run), max(abs(value), float(variance) ** 0.5)
+            added.append(free(kind, run, begins, WIDE * max(size, abs(kind.step))))
+            values.append(begins + value)
+        wider = self.problem.with_parameters([*self.problem.parameters, *added])
+        return self.simulator.of(wider), np.concatenate([self.theta, values])
+
+
+def free(kind: Kind, run: str, begins: float, wide: float) -> Parameter:
+    """An error of a run as a parameter."""
+    return Parameter(f"{kind.target}@{run}", kind.unit, begins, begins - wide, begins + wide,
+                     ((kind.target, 1.0),), "nuisance", run)  # fmt: skip
+
+
+def is_slow(residuals: Sequence[tuple[str, Vector]]) -> bool:
+    """Whether means of parts of the runs are more than noise."""
+    total, count = 0.0, 0
+    for _, residual in residuals:
+        for part in np.array_split(residual, PARTS):
+            known = np.isfinite(part).sum(axis=0)
+            total += float(np.sum(np.nansum(part, axis=0)[known > 0] ** 2 / known[known > 0]))
+            count += int(np.count_nonzero(known))
+    return bool(count) and total > float(chdtri(count, LIKELY))
