@@ -37,10 +37,7 @@ def scaled(run: MeasuredRun, factor: float) -> MeasuredRun | None:
     for name, signal in run.inputs.items():
         if not isinstance(signal, Table):
             return None
-        inputs[name] = Table(
-            signal.times, np.asarray(signal.values) * factor, unit=signal.unit,
-            interpolation=signal.interpolation, text=signal.text, extend=signal.extend,
-        )  # fmt: skip
+        inputs[name] = signal.scaled(factor)
     return replace(run, inputs=inputs)
 
 

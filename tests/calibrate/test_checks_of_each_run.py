@@ -139,3 +139,11 @@ def test_a_drift_that_is_another_one_in_each_run(tmp_path: Path) -> None:
 
 def test_a_wheel_that_is_larger_in_one_run_is_no_column(tmp_path: Path) -> None:
     assert found(tmp_path, [Wrong(), Wrong(), Wrong(larger=0.02)]) == []
+
+
+@pytest.mark.parametrize(
+    "wrong", [Wrong(late=5), Wrong(gain=1.1), Wrong((0.004, 0.0, 0.0))], ids=str
+)
+def test_one_run_says_nothing_of_what_differs(tmp_path: Path, wrong: Wrong) -> None:
+    """A gain, a late column, a zero: effects, as long as no other run lacks them."""
+    assert [f for f in found(tmp_path, [wrong]) if f.severity == "error"] == []

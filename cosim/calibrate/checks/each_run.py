@@ -34,7 +34,7 @@ AGAIN = Effort("near", "intervals", iterations=8)
 
 
 def check_each_run(estimate: Estimate) -> Iterator[Finding]:
-    """Errors of single runs that explain all that a fit leaves (see `own_errors`).
+    """Errors of single runs that explain all that a fit leaves (`own_errors`).
 
     First what runs begin with is asked, then one error of one column. A gain that noise does not
     make and that leaves little is tried in a fit. If that leaves noise, white over time, this is
@@ -73,7 +73,8 @@ def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:
     if finding is None and asked.mean > OFF:
         asked.ask(list(columns_of(asked.problem)))
         kinds = asked.single()
-        if kinds and not (asked.alike(kinds) and len(asked.residuals) > 1):
+        # what is the same in all fitted runs is an effect
+        if kinds and not (asked.fitted and asked.alike(kinds)):
             finding = _tried(estimate, asked, kinds)
     return finding
 
@@ -94,12 +95,15 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     squares = sum(float(rows @ rows) for rows in known)
     if squares - count > asked.noise or is_slow(left):
         return None
-    starts, alike = kinds[0].starts, asked.alike(kinds)
+    kinds = [kind for kind in kinds if _told(again, kind)]  # bends look like others to first order
+    if not kinds:
+        return None
+    starts, alike = kinds[0].starts, asked.fitted and asked.alike(kinds)
     zero, little = starts and alike and asked.constant(kinds), asked.mean < OFF
     text = (
         "runs do not begin quite where they are said to: " if starts
         else "a column is another one from run to run: "
-    ) + "; ".join(filter(None, (_told(again, kind) for kind in kinds)))  # fmt: skip
+    ) + "; ".join(_told(again, kind) for kind in kinds)  # fmt: skip
     text += (
         f". With that the mean square over the noise's falls from {asked.mean:.3g} to "
         f"{squares / max(count, 1):.3g}{_moved(estimate, again)}. "
@@ -111,7 +115,9 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     if zero:
         text += "; or it is the zero of a sensor, as all runs are off alike"
     elif starts:
-        text += "; or their frame is turned or moved, as all runs are off alike" * alike
+        text += "; or their frame is turned or moved, as all runs are off alike" * (
+            alike and len(names) > 1
+        )
         text += "; or a law is missing that does as much" * little
     severity = "warning" if zero or little else "error"
     return Finding(severity, "start" if starts else "differs", "", "", text)

@@ -19,6 +19,7 @@ from .gaps import check_gaps
 from .jumps import check_jumps
 from .lags import check_lags
 from .late import check_late
+from .odd_run import check_odd_run
 from .prior import check_priors
 from .scale import check_scale
 from .smooth import check_smooth, check_stated
@@ -81,8 +82,9 @@ def check_fit(estimate: Estimate) -> list[Finding]:
     means = {f.column for f in found}
     found += [f for f in check_stated(estimate) if f.column not in means]
     found += [*check_late(estimate), *check_priors(estimate)]
-    if not any(f.severity == "error" for f in found):
-        found += check_each_run(estimate)
+    for check in (check_each_run, check_odd_run):
+        if not any(f.severity == "error" for f in found):
+            found += check(estimate)
     return passed(found, estimate.problem.source.allow)
 
 

@@ -130,7 +130,8 @@ class OwnErrors:
     ) -> None:
         problem = self.problem = simulator.problem
         self.simulator, self.theta = simulator, theta
-        self.residuals, self.jacobian = residuals, {item.run: item for item in jacobian}
+        self.residuals, self.fitted = residuals, bool(jacobian)
+        slopes_of = {item.run: item for item in jacobian}
         squares = [r[np.isfinite(r)] ** 2 for _, r in residuals]
         count = sum(part.size for part in squares)
         self.mean = sum(float(part.sum()) for part in squares) / max(count, 1)
@@ -144,7 +145,7 @@ class OwnErrors:
         for name, residual in residuals:
             good = np.isfinite(residual)
             slopes = np.zeros((0, theta.size))
-            if item := self.jacobian.get(name):
+            if item := slopes_of.get(name):
                 good &= np.isfinite(item.values).all(axis=2)
                 slopes = np.zeros((int(good.sum()), theta.size))
                 slopes[:, item.columns] = item.values[good] * problem.scale[item.columns]

@@ -155,27 +155,36 @@ def check_inputs(
 ) -> Iterator[Finding]:
     """Pairs of inputs that explain the data far better when exchanged."""
     problem = simulator.problem
-    run = max(problem.runs, key=lambda item: _cost(problem, item, models[item.name]))
-    straight = _cost(problem, run, models[run.name])
-    if straight < 10.0 * run.data.size:
+    costs = {run.name: _cost(problem, run, models[run.name]) for run in problem.runs}
+    run = max(problem.runs, key=lambda item: costs[item.name])
+    if costs[run.name] < 10.0 * run.data.size:
         return
+
+    def exchanged(run: MeasuredRun, first: str, second: str) -> float:
+        """What the inputs leave in each other's place, over what they leave."""
+        inputs = {**run.inputs, first: run.inputs[second], second: run.inputs[first]}
+        trial = simulator.of(problem.only([run.name]).changed(runs=[replace(run, inputs=inputs)]))
+        try:
+            model = trial.simulate(theta[problem.columns(run.name)], run.name)
+        except CosimError:
+            return np.inf
+        finally:
+            trial.close()
+        return _cost(problem, run, model) / max(costs[run.name], 1e-300)
+
     names = [name for name in run.inputs if "[" not in name]
     for a, first in enumerate(names):
         for second in names[a + 1 :]:
-            exchanged = {**run.inputs, first: run.inputs[second], second: run.inputs[first]}
-            trial = simulator.of(
-                problem.only([run.name]).changed(runs=[replace(run, inputs=exchanged)])
-            )
-            try:
-                model = trial.simulate(theta[problem.columns(run.name)], run.name)
-            except CosimError:
-                continue
-            finally:
-                trial.close()
-            if _cost(problem, run, model) < 0.1 * straight:
+            if exchanged(run, first, second) < 1.0 / WORSE:
                 columns = [run.inputs[n].text.rpartition(":")[2] for n in (first, second)]
+                others = [
+                    r for r in problem.runs if r is not run and {first, second} <= {*r.inputs}
+                ]
+                alone = any(exchanged(other, first, second) > WORSE for other in others)
                 text = "explain the data far better exchanged: the two columns look swapped"
-                yield Finding("error", "swapped", "", " and ".join(columns), text)
+                where = run.name if alone else ""
+                text += ", in this run and not in all others" * alone
+                yield Finding("error", "swapped", where, " and ".join(columns), text)
 
 
 def _cost(problem: Problem, run: MeasuredRun, model: Vector) -> float:
