@@ -71,7 +71,7 @@ def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:
     asked.ask(list(starts_of(asked.problem)))
     finding = _tried(estimate, asked, asked.together())
     if finding is None and asked.mean > OFF:
-        asked.ask(list(columns_of(asked.problem)))
+        asked.ask(list(columns_of(asked.problem, asked.alone())))
         kinds = asked.single()
         # what is the same in all fitted runs is an effect
         if kinds and not (asked.fitted and asked.alike(kinds)):

@@ -8,7 +8,7 @@ errors gain, parameters being free to follow,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -84,15 +84,21 @@ def starts_of(problem: Problem) -> Iterator[Kind]:
                     yield Kind(f"{name}.{element}", f"{name}.{element}", variable.symbol, PLACED)
 
 
-def columns_of(problem: Problem) -> Iterator[Kind]:
-    """Clocks of columns, and zero, gain and drift of those that are measured."""
+def columns_of(problem: Problem, measured: Collection[str]) -> Iterator[Kind]:
+    """Clocks of columns, and zero, gain and drift of those that are measured.
+
+    Args:
+        problem: with inputs.
+        measured: channels that are asked.
+    """
     run = problem.runs[0]
     interval, duration = run.interval, max(float(r.times[-1] - r.times[0]) for r in problem.runs)
-    clocks = [(c.name, LATE) for c in problem.channels] + [(n, LATE_INPUTS) for n in run.inputs]
+    channels = [c for c in problem.channels if c.name in measured]
+    clocks = [(c.name, LATE) for c in channels] + [(n, LATE_INPUTS) for n in run.inputs]
     for name, shifts in clocks:
         for samples in (sign * n for n in shifts for sign in (1, -1)):
             yield Kind(CLOCK + name, f"how late {name} is", "s", samples * interval)
-    for c in problem.channels:
+    for c in channels:
         rate = per_second(c.unit) if c.unit else ""
         for kind, what, unit, step in (
             (BIAS, "the zero of", c.unit, c.sigma),
@@ -139,7 +145,7 @@ class OwnErrors:
         self.excess = (self.mean - 1.0) * count + (len(problem.parameters) if jacobian else 0)
         self.noise = SPREAD * float(np.sqrt(2.0 * count))
         self.columns: list[_Column] = []
-        self.matrix, self.gradient, self.alone = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+        self.matrix, self.gradient, self._sizes = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
         self._rows: dict[str, tuple[NDArray[np.bool_], Vector, Vector]] = {}
         own, self._fallen = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
         for name, residual in residuals:
@@ -152,9 +158,10 @@ class OwnErrors:
                 own += slopes.T @ slopes
                 self._fallen += slopes.T @ residual[good]
             self._rows[name] = good, slopes, residual[good]
-        for k, p in enumerate(problem.parameters):
-            own[k, k] += (problem.scale[k] / p.prior) ** 2 if p.prior else 0.0
-        self._inverse = np.linalg.pinv(own, rcond=SAME, hermitian=True)
+        priors = [(k / p.prior) ** 2 if p.prior else 0.0
+                  for k, p in zip(problem.scale, problem.parameters, strict=True)]  # fmt: skip
+        self._priors = np.diag(priors)
+        self._inverse = np.linalg.pinv(own + self._priors, rcond=SAME, hermitian=True)
 
     def ask(self, kinds: Sequence[Kind]) -> None:
         """Simulate errors of these kinds, those that no parameter sets already."""
@@ -195,7 +202,7 @@ class OwnErrors:
                 if self.columns[k].run == column.run:
                     both = float(mine @ self.columns[k].values[good])
                     self.matrix[i, k] = self.matrix[k, i] = both
-        self.alone = np.maximum(np.diag(self.matrix), 1e-300)
+        self._sizes = np.maximum(np.diag(self.matrix), 1e-300)
         self.matrix -= shared @ self._inverse @ shared.T
         self.gradient -= shared @ self._inverse @ self._fallen
 
@@ -225,7 +232,7 @@ class OwnErrors:
             return 0.0, 0
         sums = np.array([[float(group == one) for one in known] for group in groups])
         matrix = sums.T @ self.matrix[np.ix_(index, index)] @ sums
-        alone = np.sqrt(sums.T @ self.alone[index])
+        alone = np.sqrt(sums.T @ self._sizes[index])
         even, told = matrix / np.outer(alone, alone), sums.T @ self.gradient[index] / alone
         inverse = np.linalg.pinv(even, rcond=SAME, hermitian=True)
         return float(told @ inverse @ told), int(np.linalg.matrix_rank(even, SAME, hermitian=True))
@@ -259,6 +266,26 @@ class OwnErrors:
         gained, values = self.gain([best])
         sure = gained > chdtri(values, CHANCE / len(kinds)) if values else False
         return [best] if sure and self.explained(gained) else []
+
+    def alone(self) -> list[str]:
+        """Channels without which, parameters free to follow, little is left.
+
+        Whatever is wrong with any other one by itself, more than it can take up stays.
+        """
+        found = []
+        for i, channel in enumerate(self.problem.channels):
+            own, fallen = np.zeros_like(self._inverse), np.zeros_like(self._fallen)
+            left = 0.0
+            for good, slopes, residual in self._rows.values():
+                others = np.broadcast_to(np.arange(good.shape[1]) != i, good.shape)[good]
+                left += float(np.sum(residual[others] ** 2 - 1.0))
+                if slopes.size:
+                    own += slopes[others].T @ slopes[others]
+                    fallen += slopes[others].T @ residual[others]
+            inverse = np.linalg.pinv(own + self._priors, rcond=SAME, hermitian=True)
+            if self.explained(self.excess - (left - float(fallen @ inverse @ fallen))):
+                found.append(channel.name)
+        return found
 
     def alike(self, kinds: Sequence[Kind]) -> bool:
         """Whether one value for all runs does as well."""
