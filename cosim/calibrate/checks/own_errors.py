@@ -30,6 +30,9 @@ PLACED = 1e-3
 """By which positions and angles are moved [m, rad]: to which machines are placed with care."""
 SCALED = 1e-2
 """By which gains are changed."""
+ROWS = 3000
+"""Samples of a run that are looked at, at least, where it has many more: what is worth a word shows
+in so many."""
 LATE, LATE_INPUTS = (1, 2, 4, 8, 16, 32), (2, 8)
 """Samples by which columns are shifted, either way; fewer of inputs, which are simulated."""
 CHANCE = 1e-6
@@ -109,6 +112,40 @@ def columns_of(problem: Problem, measured: Collection[str]) -> Iterator[Kind]:
 
 
 @dataclass(frozen=True)
+class _Rows:
+    """What is left in a run, one sample after the other, and what the parameters do there.
+
+    Attributes:
+        good: known ones of all that is asked, every `stride`-th sample.
+        channel: of each.
+        columns: of the parameters.
+        slopes: derivatives by these.
+    """
+
+    stride: int
+    good: NDArray[np.bool_]
+    channel: NDArray[np.intp]
+    residual: Vector
+    columns: NDArray[np.intp]
+    slopes: Vector
+
+    @classmethod
+    def of(cls, rows: Vector, item: Sensitivity | None, problem: Problem) -> _Rows:
+        stride = max(len(rows) // ROWS, 1)
+        rows = rows[::stride]
+        good = np.isfinite(rows)
+        columns = np.zeros(0, np.intp) if item is None else item.columns
+        slopes = np.zeros((*rows.shape, 0)) if item is None else item.values[::stride]
+        good &= np.isfinite(slopes).all(axis=2)
+        return cls(stride, good, np.nonzero(good)[1], rows[good], columns,
+                   slopes[good] * problem.scale[columns])  # fmt: skip
+
+    def of_all(self, rows: Vector) -> Vector:
+        """The same samples of others."""
+        return np.nan_to_num(rows[:: self.stride][self.good])
+
+
+@dataclass(frozen=True)
 class _Column:
     """What an error of a kind does to the residuals of a run, per change of it."""
 
@@ -137,35 +174,40 @@ class OwnErrors:
         problem = self.problem = simulator.problem
         self.simulator, self.theta = simulator, theta
         self.residuals, self.fitted = residuals, bool(jacobian)
+        self.columns: list[_Column] = []
+        self.matrix, self.gradient, self._sizes = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
         slopes_of = {item.run: item for item in jacobian}
-        squares = [r[np.isfinite(r)] ** 2 for _, r in residuals]
+        self._rows = {
+            name: _Rows.of(rows, slopes_of.get(name), problem) for name, rows in residuals
+        }
+        squares = [part.residual**2 for part in self._rows.values()]
         count = sum(part.size for part in squares)
         self.mean = sum(float(part.sum()) for part in squares) / max(count, 1)
         """Square of what is left over the noise's."""
         self.excess = (self.mean - 1.0) * count + (len(problem.parameters) if jacobian else 0)
         self.noise = SPREAD * float(np.sqrt(2.0 * count))
-        self.columns: list[_Column] = []
-        self.matrix, self.gradient, self._sizes = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
-        self._rows: dict[str, tuple[NDArray[np.bool_], Vector, Vector]] = {}
-        own, self._fallen = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
-        for name, residual in residuals:
-            good = np.isfinite(residual)
-            slopes = np.zeros((0, theta.size))
-            if item := slopes_of.get(name):
-                good &= np.isfinite(item.values).all(axis=2)
-                slopes = np.zeros((int(good.sum()), theta.size))
-                slopes[:, item.columns] = item.values[good] * problem.scale[item.columns]
-                own += slopes.T @ slopes
-                self._fallen += slopes.T @ residual[good]
-            self._rows[name] = good, slopes, residual[good]
         priors = [(k / p.prior) ** 2 if p.prior else 0.0
                   for k, p in zip(problem.scale, problem.parameters, strict=True)]  # fmt: skip
         self._priors = np.diag(priors)
-        self._inverse = np.linalg.pinv(own + self._priors, rcond=SAME, hermitian=True)
+        self._own, self._fallen = self._normal()
+        self._inverse = self._inverted(self._own)
+
+    def _inverted(self, own: Vector) -> Vector:
+        return np.asarray(np.linalg.pinv(own + self._priors, rcond=SAME, hermitian=True))
+
+    def _normal(self, channel: int | None = None) -> tuple[Vector, Vector]:
+        """J' J and J' r, of one channel if given."""
+        own, fallen = np.zeros((self.theta.size, self.theta.size)), np.zeros(self.theta.size)
+        for part in self._rows.values():
+            kept = slice(None) if channel is None else part.channel == channel
+            slopes = part.slopes[kept]
+            own[np.ix_(part.columns, part.columns)] += slopes.T @ slopes
+            fallen[part.columns] += slopes.T @ part.residual[kept]
+        return own, fallen
 
     def ask(self, kinds: Sequence[Kind]) -> None:
         """Simulate errors of these kinds, those that no parameter sets already."""
-        names = [name for name, _ in self.residuals]
+        names = list(self._rows)
         set_in = {
             (target, run) for p in (*self.problem.parameters, *self.problem.late)
             for target, _ in p.targets for run in ([p.run] if p.run else names)
@@ -183,9 +225,9 @@ class OwnErrors:
                 continue
             for name, residual in self.residuals:
                 if name in others:
-                    change = (others[name] - residual) / kind.step
-                    if np.nansum(change**2) > 0.0:
-                        self.columns.append(_Column(kind, name, np.nan_to_num(change)))
+                    change = self._rows[name].of_all((others[name] - residual) / kind.step)
+                    if np.any(change):
+                        self.columns.append(_Column(kind, name, change))
         self._summed()
 
     def _summed(self) -> None:
@@ -193,14 +235,12 @@ class OwnErrors:
         self.matrix, self.gradient = np.zeros((count, count)), np.zeros(count)
         shared = np.zeros((count, self.theta.size))
         for i, column in enumerate(self.columns):
-            good, slopes, residual = self._rows[column.run]
-            mine = column.values[good]
-            self.gradient[i] = mine @ residual
-            if slopes.size:
-                shared[i] = slopes.T @ mine
+            part = self._rows[column.run]
+            self.gradient[i] = column.values @ part.residual
+            shared[i, part.columns] = part.slopes.T @ column.values
             for k in range(i + 1):
                 if self.columns[k].run == column.run:
-                    both = float(mine @ self.columns[k].values[good])
+                    both = float(column.values @ self.columns[k].values)
                     self.matrix[i, k] = self.matrix[k, i] = both
         self._sizes = np.maximum(np.diag(self.matrix), 1e-300)
         self.matrix -= shared @ self._inverse @ shared.T
@@ -274,16 +314,14 @@ class OwnErrors:
         """
         found = []
         for i, channel in enumerate(self.problem.channels):
-            own, fallen = np.zeros_like(self._inverse), np.zeros_like(self._fallen)
-            left = 0.0
-            for good, slopes, residual in self._rows.values():
-                others = np.broadcast_to(np.arange(good.shape[1]) != i, good.shape)[good]
-                left += float(np.sum(residual[others] ** 2 - 1.0))
-                if slopes.size:
-                    own += slopes[others].T @ slopes[others]
-                    fallen += slopes[others].T @ residual[others]
-            inverse = np.linalg.pinv(own + self._priors, rcond=SAME, hermitian=True)
-            if self.explained(self.excess - (left - float(fallen @ inverse @ fallen))):
+            own, fallen = (a - b for a, b in zip(
+                (self._own, self._fallen), self._normal(i), strict=True
+            ))  # fmt: skip
+            left = sum(
+                float(np.sum(part.residual[part.channel != i] ** 2 - 1.0))
+                for part in self._rows.values()
+            )
+            if self.explained(self.excess - left + float(fallen @ self._inverted(own) @ fallen)):
                 found.append(channel.name)
         return found
 
@@ -296,9 +334,9 @@ class OwnErrors:
         """Whether these errors only add a constant to channels."""
         for column in self.columns:
             if column.kind in kinds:
-                shown = column.values[self._rows[column.run][0].any(axis=1)]
-                changes = shown - shown.mean(axis=0)
-                if np.sum(changes**2) > CONSTANT**2 * np.sum(shown**2):
+                channel, values = self._rows[column.run].channel, column.values
+                means = np.bincount(channel, values) / np.maximum(np.bincount(channel), 1)
+                if np.sum((values - means[channel]) ** 2) > CONSTANT**2 * np.sum(values**2):
                     return False
         return True
 
