@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..data.segments import relative_pose
-from ..data.signals import Signal
+from ..data.signals import Shifted, Signal, Table
 from ..errors import FmuCallError, ValueRangeError
 from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
@@ -130,12 +130,26 @@ class Simulator:
             master,
             count * size,
             {
-                "inputs": run.inputs,
+                "inputs": {n: self._driving(s, first) for n, s in run.inputs.items()},
                 "record": list(dict.fromkeys(channel.signal for channel in problem.channels)),
                 "every": every,
                 "start": first if abs(first) > COINCIDENT * interval else 0.0,
             },
         )
+
+    def _driving(self, signal: Signal, first: float) -> Signal:
+        """An input as it drives a run that begins at this time.
+
+        What is held from moments between two steps is given as its mean over each step: read when a
+        step begins, it comes late by half of one, at random. A rig with ticks reads it so itself.
+        """
+        if self.problem.tick is not None or not isinstance(signal, Table):
+            return signal
+        places = (signal.times - first) / self.problem.step
+        even = np.max(np.abs(places - np.rint(places))) <= COINCIDENT
+        if even or signal.interpolation != "hold" or not np.isfinite(signal.values).all():
+            return signal
+        return Shifted(signal, 0.0, self.problem.step)
 
     def simulate(self, theta: Vector, run: MeasuredRun | str) -> Vector:
         """What the channels would read: one row per sample, NaN where clocks have moved it out.

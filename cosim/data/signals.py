@@ -233,18 +233,19 @@ class Shifted:
     """A signal that comes some time later, or earlier, than it says.
 
     What is held is given as its mean over an interval, so that it follows the shift smoothly where
-    its steps lie between communication points. Beyond a table's ends its first and last value hold.
+    its steps lie between communication points. Beyond a table's ends its first and last value hold,
+    if it comes at another time.
 
     Args:
         signal: which.
-        later: by so much [s]; negative for earlier.
+        later: by so much [s]; negative for earlier, 0 for in time.
         interval: over which what is held is read, from the time that is asked for on [s].
     """
 
     def __init__(self, signal: Signal, later: float, interval: float) -> None:
         self.signal, self.later, self.interval = signal, later, interval
         self.unit = signal.unit
-        self.text = f"{signal.text}, {later:+.6g} s"
+        self.text = f"{signal.text}, {later:+.6g} s" if later else signal.text
 
     def at(self, times: Vector) -> Vector:
         """Values at these times."""
@@ -252,6 +253,8 @@ class Shifted:
         if not isinstance(table, Table):
             values: Vector = table.at(wanted)
             return values
+        if not self.later:
+            table.at(times[[0, -1]])  # says where it ends too early
         if table.interpolation == "linear":
             return np.asarray(np.interp(wanted, table.times, table.values))
         knots = table.times

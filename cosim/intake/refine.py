@@ -36,9 +36,6 @@ less than a nat to 2000 samples, which nobody can take for physics."""
 SEARCHED = 1.0
 """What a search's step may change, over the noise: a diagnosis takes it from the data, where the
 parameters of its fits hardly change it (`calibrate.deferred`)."""
-HELD = 20.0
-"""Steps in an interval of commands with a clock of their own, at most: commands that come between
-two steps are late by half a step, so errors fall with the step only, and slowly."""
 PART = 0.37
 """Of a sample, by which a clock is late when steps are tried: no simple fraction."""
 FIRST = 5
@@ -144,8 +141,7 @@ def choose_steps(problem: Problem, shortest: float) -> Steps:
                 known[division] = None
         return known[division]
 
-    least = shortest / HELD if clocks else 0.0
-    allowed = [n for n in DIVISIONS if least <= period / n <= 0.5 * shortest]
+    allowed = [n for n in DIVISIONS if period / n <= 0.5 * shortest]
     allowed = allowed or [DIVISIONS[-1]]
 
     def changed(division: int, finer: int) -> float:
