@@ -142,6 +142,7 @@ def _print(result: Diagnosis) -> None:
     from rich.table import Table
 
     from ..calibrate.checks.finding import lines
+    from ..diagnose.adding import lines_of
     from ..diagnose.story.verdicts import in_words
 
     console = open_console(120)
@@ -155,12 +156,21 @@ def _print(result: Diagnosis) -> None:
             others = " or ".join(o if " at " in o else f"at {o}" for o in found)
             text = f"    or {others}: these runs do not tell which"
             console.print(text, soft_wrap=True, highlight=False)
+    model = result.to_dict()["model"]
+    system, mapping = lines_of(model, [e["place"] for e in result.answer.effects()])
+    if result.verdict == "effect_found" and not result.adapters and (system or mapping):
+        where = "the system file" if system else "dataset.toml"
+        console.print(f"  to add it, write in {where}:", soft_wrap=True)
+        for line in system or mapping:
+            console.print(f"    {line}", soft_wrap=True, markup=False, highlight=False)
     if result.verdict == "confounded":
         console.print(f"  to tell them apart: {in_words(result.experiment)}", soft_wrap=True)
     for hint in result.answer.hints:
         console.print(f"  hint: {hint}; no name, since {'; '.join(hint.why)}", soft_wrap=True)
-    said = lines(result.findings)  # the report has these
+    # the report has the rest of these
+    said = lines(f for f in result.findings if f.severity != "warning")
     for text in [w for w in result.warnings if w not in said]:
+        text = text.removeprefix("warning: ")  # as findings begin
         console.print(f"  warning: {text}", soft_wrap=True, markup=False, highlight=False)
     if (law := result.to_dict()["law_from_data"]) is not None:
         _print_law(law, console)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from ..calibrate.parts import LOGGED
@@ -9,17 +10,26 @@ from ..calibrate.problem import Problem
 from ..installation import places
 from .models import Fitted
 
+WIDE = 3.0
+"""Bounds of a value that was found, over it: wide enough for another machine of the same kind."""
+
 
 def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
     """Variants that differ from the declared ones, and calibrated values, by full names.
 
-    Values of single runs are left out.
+    Values of single runs are left out. `logged` has those that a mapping sets: clocks, and what is
+    wrong with columns.
 
     Args:
         problem: as declared.
         fitted: the model, None where there is none.
     """
-    table: dict[str, Any] = {"scenario": scenario_of(problem), "variants": {}, "values": {}}
+    table: dict[str, Any] = {
+        "scenario": scenario_of(problem),
+        "variants": {},
+        "values": {},
+        "logged": {},
+    }
     if fitted is None:
         return table
     declared, model = problem.instances, problem.model
@@ -31,13 +41,38 @@ def made_of(problem: Problem, fitted: Fitted | None) -> dict[str, Any]:
     estimate = fitted.estimate
     for parameter, value in zip(estimate.problem.parameters, estimate.theta.tolist(), strict=True):
         if parameter.role != "nuisance" and not parameter.run:
-            own = parameter.set(value).items()
-            table["values"].update((n, v) for n, v in own if not n.startswith(LOGGED))
+            for name, own in parameter.set(value).items():
+                table["logged" if name.startswith(LOGGED) else "values"][name] = own
     given = {n: v for n, v in estimate.problem.constants.items() if n not in problem.constants}
     mine = tuple(f"{item.place}." for item in fitted.effects)
     held = {n: v for n, v in given.items() if n.startswith(mine) and not n.startswith(LOGGED)}
     table["values"] = held | table["values"]
     return table
+
+
+def lines_of(
+    model: Mapping[str, Mapping[str, Any]], places: Collection[str]
+) -> tuple[list[str], list[str]]:
+    """What to write in the system file, and in the mapping, for the model that was found.
+
+    Args:
+        model: as of `made_of`.
+        places: of what was found, whose values are new.
+    """
+    mine = tuple(f"{place}." for place in places)
+    new = {n: v for n, v in model["values"].items() if n.startswith(mine)}
+    system = []
+    if model["variants"]:
+        system = ["[instances]", *(f'{n} = "{v}"' for n, v in model["variants"].items())]
+        system += ["[parameters]", *(f'"{n}" = {v:.6g}' for n, v in new.items())] if new else []
+    mapping = []
+    for target, value in {**new, **model["logged"]}.items():
+        ends = sorted((value / WIDE, value * WIDE)) if value else [-1.0, 1.0]
+        mapping += [
+            "[[parameter]]", f'name = "{target.replace(":", " ")}"', f"nominal = {value:.6g}",
+            f"min = {ends[0]:.3g}", f"max = {ends[1]:.3g}", f'targets = "{target}"',
+        ]  # fmt: skip
+    return system, mapping
 
 
 def scenario_of(problem: Problem) -> str:

@@ -76,6 +76,7 @@ def table(verdict: str) -> dict[str, Any]:
             "variants": {"load": "inertia.lab_bench/disc+coulomb@flange"} if found else {},
             "values": {"motor.R_a": 0.35802, **({"load.flange.coulomb.tau_c": 0.43781} if found
                                                 else {})},
+            "logged": {},
         },
         "alternatives": [], "localisation": [] if verdict == "nothing_missing" else [PLACE],
         "power": {

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.diagnose.adding import lines_of
 from cosim.diagnose.candidates import READS
 from cosim.diagnose.story.facts import Facts, inside, place_in_words
 from cosim.diagnose.story.verdicts import ADVICE, LABELS, run_line, told
@@ -156,6 +157,23 @@ def test_findings_that_cannot_be_let_pass_are_not_offered_to_be() -> None:
     assert "allow = [&quot;spikes&quot;]" in "".join(told(Facts(content)).steps)
     content["findings"][0]["kind"] = "short"  # too few samples: nothing can be fitted to them
     assert "allow" not in "".join(told(Facts(content)).steps)
+
+
+def test_what_to_write_is_toml_with_the_values_that_were_found() -> None:
+    """An effect's own start value is another one: a model with it alone would be worse."""
+    content = table("effect_found")
+    content["model"]["logged"] = {"column:gain:speed": -0.02, "clock:current": 0.0}
+    system, mapping = lines_of(content["model"], ["load.flange"])
+    written = tomllib.loads("\n".join(system))
+    assert written["instances"] == {"load": "inertia.lab_bench/disc+coulomb@flange"}
+    assert written["parameters"] == {"load.flange.coulomb.tau_c": 0.43781}
+    entries = tomllib.loads("\n".join(mapping))["parameter"]
+    assert {e["targets"]: e["nominal"] for e in entries} == {
+        "load.flange.coulomb.tau_c": 0.43781, "column:gain:speed": -0.02, "clock:current": 0.0,
+    }  # fmt: skip
+    assert all(e["min"] < e["nominal"] < e["max"] for e in entries)
+    steps = "".join(told(Facts(content)).steps)
+    assert "load.flange.coulomb.tau_c&quot; = 0.43781" in steps and "[[parameter]]" in steps
 
 
 def test_without_a_scenario_no_command_is_invented() -> None:

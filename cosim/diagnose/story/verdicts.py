@@ -12,6 +12,7 @@ from typing import Any
 
 from ...calibrate.checks.finding import LASTING
 from ...display.html import Html, command, join, quantity, tag, words
+from ..adding import lines_of
 from .facts import Facts, inside, misses, sentence, some
 from .unexplained import compare, unexplained, white
 
@@ -154,20 +155,26 @@ def run_line(facts: Facts) -> str:
 def _add(facts: Facts) -> list[Html]:
     """How to run the model as it was found."""
     model, line = facts.at("model"), run_line(facts)
-    if not model["variants"]:
-        return []
     if any(name in facts.table.get("adapters", {}) for name in model["variants"]):
         return [join(
             tag("b", "Add it to the model"), ": ", tag("code", "system.toml"), " beside this page "
             "is your system with an adapter that carries it, and with all calibrated values.",
         )]  # fmt: skip
-    changes = words([tag("code", f'{n} = "{v}"') for n, v in model["variants"].items()])
-    parts: list[object] = [
-        tag("b", "Add it to the model"), ": write ", changes, " under ",
-        tag("code", "[instances]"), " of the system file. The FMU that carries it is in ",
-        tag("code", "fmus/"), " beside this page.",
-    ]  # fmt: skip
-    if line:
+    system, mapping = lines_of(model, [effect["place"] for effect in facts.effects])
+    if not system and not mapping:
+        return []
+    parts: list[object] = [tag("b", "Add it to the model")]
+    if system:
+        parts += [
+            ": in the system file write", tag("pre", "\n".join(system)),
+            "The FMU that carries it is in ", tag("code", "fmus/"), " beside this page.",
+        ]  # fmt: skip
+    if mapping:
+        parts += [
+            " To have it estimated with the rest, write in ", tag("code", "dataset.toml"),
+            tag("pre", "\n".join(mapping)),
+        ]  # fmt: skip
+    if system and line:
         parts += [
             " Or run the scenario ", tag("code", model["scenario"]), " with it and all calibrated "
             "values (it compares with its own logs):", command(line),
