@@ -27,7 +27,7 @@ from .models import GATE_Z, Fitted, compare, value_of
 from .search import Search
 from .table import left_of
 from .values import Values, exact
-from .verdict import HALF, TENTH, threshold
+from .verdict import HALF, TENTH, above_noise, threshold
 
 Vector = NDArray[np.float64]
 CLOSE = 0.9
@@ -200,7 +200,7 @@ def _fitted(search: Search, base: Fitted, parameter: Parameter) -> ByRun | None:
     values = {p.run: value_of(p, fits[p.run in unused]) for p in own}
     if sum(v.determined for v in values.values()) < 2:
         return None
-    left = sorted((x for x in left_of(search, found) if x.structured), key=lambda x: -x.rms)
+    left = above_noise(left_of(search, found), named=True)
     if left and explained < 1.0 - TENTH**2:  # a law that acts otherwise in each run shows so, too
         return None
-    return ByRun(parameter.name, parameter.unit, min(explained, 1.0), values, tuple(left), costs[1])
+    return ByRun(parameter.name, parameter.unit, min(explained, 1.0), values, left, costs[1])

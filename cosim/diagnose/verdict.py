@@ -170,15 +170,20 @@ def wanted(gain: Gain | None, candidates: int) -> bool:
 
 
 def above(model: Model) -> tuple[Left, ...]:
-    """Channels that a model leaves above their noise, the worst first.
+    """Channels that a model leaves above their noise, the worst first."""
+    return above_noise(model.left, named=bool(model.laws))
 
-    Of a model with laws also those that are no larger than noise, and slower: wrong laws are.
+
+def above_noise(left: Sequence[Left], *, named: bool) -> tuple[Left, ...]:
+    """Those of some channels that are above their noise, the worst first.
+
+    Args:
+        left: what a model leaves.
+        named: whether it claims a cause: then also those that are no larger than noise, and slower,
+            for wrong causes are.
     """
-    tests, named = len(model.left), bool(model.laws)
-    found = [
-        x for x in model.left
-        if x.structured or (named and slowly(x.slow, x.p_value, tests))
-    ]  # fmt: skip
+    tests = len(left)
+    found = [x for x in left if x.structured or (named and slowly(x.slow, x.p_value, tests))]
     return tuple(sorted(found, key=lambda x: -x.rms))
 
 

@@ -53,7 +53,7 @@ def check_each_run(estimate: Estimate) -> Iterator[Finding]:
     asked = OwnErrors(simulator, estimate.theta, estimate.residuals, estimate.jacobian)
     found = _found(estimate, asked)
     unused = [run.name for run in problem.chosen("validation")]
-    if found is None and asked.mean < OFF and unused:
+    if found is None and unused and not is_slow(asked.residuals):
         try:
             theta = settled(simulator, estimate.theta, unused)
             residuals = simulator.residuals(theta, unused)
@@ -70,7 +70,7 @@ def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:
         return None
     asked.ask(list(starts_of(asked.problem)))
     finding = _tried(estimate, asked, asked.together())
-    if finding is None and asked.mean > OFF:
+    if finding is None:
         asked.ask(list(columns_of(asked.problem, asked.alone())))
         kinds = asked.single()
         # what is the same in all fitted runs is an effect
@@ -118,7 +118,7 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
         text += "; or their frame is turned or moved, as all runs are off alike" * (
             alike and len(names) > 1
         )
-        text += "; or a law is missing that does as much" * little
+    text += "; or a law is missing that does as much" * (little and not zero)
     severity = "warning" if zero or little else "error"
     return Finding(severity, "start" if starts else "differs", "", "", text)
 

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 PLACED = 1e-3
-"""By which positions and angles are moved [m, rad]: to which machines are placed with care."""
+"""By which positions and angles are moved [m, rad]: to which machines are placed with care; and
+their speeds [m/s, rad/s], which such a place hides over a second."""
 SCALED = 1e-2
 """By which gains are changed."""
 ROWS = 3000
@@ -75,14 +76,15 @@ class Kind:
 
 
 def starts_of(problem: Problem) -> Iterator[Kind]:
-    """Positions and angles that the system integrates."""
+    """Positions, angles and their speeds that the system integrates."""
     for name, member in problem.plain().members.items():
         variables = member.description.variables
         for variable in variables.values():
             if f"der({variable.name})" not in variables or variable.unit is None:
                 continue
             parts = {k: n for k, n in zip(BASE, variable.unit.exponents, strict=True) if n}
-            if parts in ({"m": 1}, {"rad": 1}):
+            rate = parts.pop("s", 0)
+            if parts in ({"m": 1}, {"rad": 1}) and rate in (0, -1):
                 for element in variable.elements():
                     yield Kind(f"{name}.{element}", f"{name}.{element}", variable.symbol, PLACED)
 
