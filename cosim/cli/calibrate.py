@@ -35,6 +35,13 @@ if TYPE_CHECKING:
 FAR = 2.0
 """Residual over the noise from which a model evidently lacks something: good ones leave 1, and
 logs whose noise is guessed up to half as much again."""
+HOPELESS = 100.0
+"""The same from which a fit may have ended in a minimum of its own: of what goes over the top, or
+turns over, another one may be as deep for its surroundings."""
+OTHER_END = (
+    "; or the fit has ended far from the machine, as it may where motion is unstable or goes over "
+    "the top: try nominal values that are nearer, or shorter pieces (`window`)"
+)
 
 
 def calibrate_command(
@@ -166,6 +173,8 @@ def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]] | None
         said.append(
             f"the model leaves {fitted[name]:.3g} times the noise in {name}: it lacks something "
             "that values and intervals make up for; `cosim diagnose` looks for it"
+            + OTHER_END
+            * (fitted[name] > HOPELESS)
         )
     over = {n: size / max(fitted[n], 1.0) for n, size in others.items()}
     far = [n for n in sorted(over, key=lambda n: -over[n]) if over[n] > FAR]

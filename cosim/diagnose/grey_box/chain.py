@@ -136,7 +136,7 @@ def _judged(result: LawFromData, law: Law) -> None:
     wanted = gate.gain > result.needed and gate.z > GATE_Z
     material = search.material(result.base, law.fitted)
     result.made = wanted and material
-    where = f"a law of {law.shape.label} at {result.site.label}"
+    where = f"{law.kind} at {result.site.label}"
     if not result.made:
         result.reason = (
             f"Runs that were not used for fitting do not want {where}: they gain {gate.gain:.1f} "

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..models import GATE
 from .basis import Axis, Shape
 from .regression import Gram, regress
-from .trial import Law, Maker, Trial
+from .trial import CONSTANT, Law, Maker, Trial
 
 Vector = NDArray[np.float64]
 Term = Callable[[Vector, Vector], Vector]
@@ -39,7 +39,7 @@ POINTS = 4000
 
 def library(shape: Shape) -> dict[str, Term]:
     """Terms for a shape: word -> function of x and y."""
-    found: dict[str, Term] = {"1": lambda x, y: np.ones_like(x)}
+    found: dict[str, Term] = {CONSTANT: lambda x, y: np.ones_like(x)}
     if shape.x is not None:
         found |= _of_x(shape.x)
     if shape.y is not None:

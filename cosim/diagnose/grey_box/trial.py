@@ -39,6 +39,9 @@ NARROWER = (0.1, 1e-2, 1e-3)
 QUICK = Effort("near", "draft", iterations=4)
 FAR = Effort("far", "draft", iterations=4)
 
+CONSTANT = "1"
+"""The term that is one everywhere, as formulas name it."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -106,9 +109,16 @@ class Law:
         if not self.trial.words:
             kind = "surface" if self.shape.form == "x * y" else "curve"
             return f"smooth {kind} over {self.shape.label}"
-        parts = [f"{value:+.4g} {word}" for value, word in zip(self.free, self.trial.words,
-                                                               strict=True)]  # fmt: skip
+        parts = [f"{value:+.4g}{f' {word}' * (word != CONSTANT)}"
+                 for value, word in zip(self.free, self.trial.words, strict=True)]  # fmt: skip
         return " ".join(parts).removeprefix("+")
+
+    @property
+    def kind(self) -> str:
+        """What it is a law of, for people."""
+        return "a constant" if list(self.trial.words) == [CONSTANT] else (
+            f"a law of {self.shape.label}"
+        )  # fmt: skip
 
     def values(self, x: Vector, y: Vector, *, held: bool = False) -> tuple[Vector, Vector]:
         """The law at points, and its standard deviations there.
