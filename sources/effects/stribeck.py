@@ -45,6 +45,7 @@ EFFECT = Effect(
     ("rotation",),
     TAU_S,
     source="Armstrong 1991",
+    contains=("coulomb",),  # with w_s far above all speeds
 )
 
 
