@@ -117,7 +117,9 @@ def calibrate_command(
         content["exchange"] = exchange.to_dict()
         content["evaluations"] = simulator.evaluations + exchange.evaluations
         content["wall_s"] = time.perf_counter() - started
-        page, table = folder / "report.html", folder / "calibration.json"
+        # the page of a diagnosis took minutes
+        name = "calibration.html" if (folder / "diagnosis.json").exists() else "report.html"
+        page, table = folder / name, folder / "calibration.json"
         content["files"] = [str(table), str(page)]
         try:
             if correlation is not None:

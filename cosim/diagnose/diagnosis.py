@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from ..calibrate.budget import Budget, StoppedError
 from ..calibrate.checks.examine import check_fit, examine
 from ..calibrate.checks.finding import Finding, lines, passed
+from ..calibrate.checks.own_errors import exact_starts
 from ..calibrate.estimate import Estimate
 from ..calibrate.input_noise import propagated
 from ..calibrate.pool import SessionPool
@@ -268,6 +269,8 @@ def _searched(search: Search, base: Fitted, findings: list[Finding], task: _Task
         left_over(result)
         result.warnings += told(base, result.after)
         result.warnings += unsure(result.table, result.after.labels)
+        if result.verdict == "unexplained" and (said := exact_starts(problem)):
+            result.warnings.append(said)
     return result
 
 

@@ -190,6 +190,11 @@ def import_logs(
     finally:
         unfinished.unlink(missing_ok=True)
     write_text(folder / NAME, draft.text())
+    if lost := [column.name for column in draft.columns if "missing" in column.keys]:
+        notes.append(
+            f"{', '.join(lost)}: rows that are exactly 0 together count as no value (missing = 0): "
+            "what a sensor writes that has lost its object"
+        )
     told("checking the data set")
     problem = read_problem(folder, provider)
     findings = examine(Simulator(problem))

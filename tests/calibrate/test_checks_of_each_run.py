@@ -11,6 +11,7 @@ from cosim.calibrate import read_problem
 from cosim.calibrate.calibration import calibrated
 from cosim.calibrate.checks.each_run import check_each_run
 from cosim.calibrate.checks.finding import Finding
+from cosim.calibrate.checks.own_errors import exact_starts
 from cosim.calibrate.estimate import Estimate
 from tests.placed import RADIUS, TRACK, Wrong, write
 from tests.problems import simulator
@@ -147,3 +148,12 @@ def test_a_wheel_that_is_larger_in_one_run_is_no_column(tmp_path: Path) -> None:
 def test_one_run_says_nothing_of_what_differs(tmp_path: Path, wrong: Wrong) -> None:
     """A gain, a late column, a zero: effects, as long as no other run lacks them."""
     assert [f for f in found(tmp_path, [wrong]) if f.severity == "error"] == []
+
+
+def test_what_is_taken_as_exact_is_listed(tmp_path: Path) -> None:
+    """Of a machine that drives about, and where it matters where it begins."""
+    problem = read_problem(write(tmp_path, [Wrong()]))
+    assert "(base.pose_x, base.pose_y, base.pose_phi)" in exact_starts(problem)
+    assert exact_starts(problem.changed(relative=[("x", "y", "yaw")])) == ""
+    free = read_problem(write(tmp_path, [Wrong()], HEADING))
+    assert "(base.pose_x, base.pose_y)" in exact_starts(free)

@@ -60,6 +60,15 @@ def test_nothing_is_done_for_a_folder_that_cannot_be_written(
     assert "out: cannot be written (Not a directory)" in str(done.exception)
 
 
+def test_the_page_of_a_diagnosis_stays(data: Path, tmp_path: Path) -> None:
+    """It took minutes."""
+    for name in ("report.html", "diagnosis.json"):
+        (tmp_path / name).write_text("{}")
+    assert invoked("calibrate", data, "--out", tmp_path, "--samples", "0").exit_code == 0
+    assert (tmp_path / "report.html").read_text() == "{}"
+    assert "<html" in (tmp_path / "calibration.html").read_text()
+
+
 @pytest.mark.parametrize("more", [(), ("--json",)], ids=["text", "json"])
 @pytest.mark.parametrize("command", ["calibrate", "diagnose"])
 def test_what_was_found_is_said_where_it_cannot_be_written(

@@ -89,6 +89,21 @@ def starts_of(problem: Problem) -> Iterator[Kind]:
                     yield Kind(f"{name}.{element}", f"{name}.{element}", variable.symbol, PLACED)
 
 
+def exact_starts(problem: Problem) -> str:
+    """A sentence on where a machine that drives about is taken to begin exactly, "" if nowhere."""
+    free = {t for p in (*problem.parameters, *problem.late) for t, _ in p.targets}
+    starts = [k for k in starts_of(problem) if k.target not in free]
+    drives = {k.target.partition(".")[0] for k in starts if k.unit == "m"}
+    taken = [k.target for k in starts if k.target.partition(".")[0] in drives]
+    if not taken or problem.relative:
+        return ""
+    return (
+        f"runs are taken to begin exactly where they are said to ({', '.join(taken)}): if the "
+        "machine was placed by hand, let that be estimated, by a [[nuisance]] for each with "
+        "per_run = true"
+    )
+
+
 def columns_of(problem: Problem, measured: Collection[str]) -> Iterator[Kind]:
     """Clocks of columns, and zero, gain and drift of those that are measured.
 
