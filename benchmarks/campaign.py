@@ -45,7 +45,7 @@ SERIES = (
     *(Series("motor", "withheld", 140203 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141002 + i, ONE.format(6)) for i in range(2)),
     *(Series("crawler", "several", 141102 + i, SOME.format(10, 4)) for i in range(2)),
-    Series("crawler", "withheld", 141201, WITHHELD),
+    Series("crawler", "withheld", 141202, WITHHELD),
     Series("omni", "one", 142003, ONE.format(6)),
     Series("omni", "several", 142101, SOME.format(8, 2)),
     Series("arm", "one", 143001, ONE.format(6)),
