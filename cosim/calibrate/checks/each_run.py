@@ -68,15 +68,22 @@ def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:
     """The finding in the runs that are asked, if there is one."""
     if not is_slow(asked.residuals) or not asked.residuals:
         return None
-    asked.ask(list(starts_of(asked.problem)))
-    finding = _tried(estimate, asked, asked.together())
-    if finding is None:
-        asked.ask(list(columns_of(asked.problem, asked.alone())))
-        kinds = asked.single()
-        # what is the same in all fitted runs is an effect
-        if kinds and not (asked.fitted and asked.alike(kinds)):
-            finding = _tried(estimate, asked, kinds)
-    return finding
+    worst, starts = asked.worst(), list(starts_of(asked.problem))
+    worst.ask(starts)
+    if worst.possible(singly=False):
+        asked.ask(starts)
+        if (finding := _tried(estimate, asked, asked.together())) is not None:
+            return finding
+    columns = list(columns_of(asked.problem, asked.alone()))
+    worst.ask(columns)
+    if not worst.possible(singly=True):
+        return None
+    asked.ask(columns)
+    kinds = asked.single()
+    # what is the same in all fitted runs is an effect
+    if not kinds or (asked.fitted and asked.alike(kinds)):
+        return None
+    return _tried(estimate, asked, kinds)
 
 
 def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Finding | None:

@@ -94,7 +94,8 @@ def exact_starts(problem: Problem) -> str:
     free = {t for p in (*problem.parameters, *problem.late) for t, _ in p.targets}
     starts = [k for k in starts_of(problem) if k.target not in free]
     drives = {k.target.partition(".")[0] for k in starts if k.unit == "m"}
-    taken = [k.target for k in starts if k.target.partition(".")[0] in drives]
+    taken = [k.target for k in starts
+             if k.target.partition(".")[0] in drives and k.unit in ("m", "rad")]  # fmt: skip
     if not taken or problem.relative:
         return ""
     return (
@@ -190,7 +191,7 @@ class OwnErrors:
     ) -> None:
         problem = self.problem = simulator.problem
         self.simulator, self.theta = simulator, theta
-        self.residuals, self.fitted = residuals, bool(jacobian)
+        self.residuals, self.fitted, self._jacobian = residuals, bool(jacobian), jacobian
         self.columns: list[_Column] = []
         self.matrix, self.gradient, self._sizes = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
         slopes_of = {item.run: item for item in jacobian}
@@ -297,6 +298,24 @@ class OwnErrors:
     def explained(self, gain: float) -> bool:
         """Whether what is left is noise, or little beside what was."""
         return self.excess - gain <= max(LEAVES * self.excess, self.noise)
+
+    def worst(self) -> OwnErrors:
+        """The same of the run that leaves most alone: what does not explain it explains nothing."""
+        name = max(self._rows, key=lambda n: float(np.sum(self._rows[n].residual ** 2 - 1.0)))
+        return OwnErrors(
+            self.simulator, self.theta, [item for item in self.residuals if item[0] == name],
+            [item for item in self._jacobian if item.run == name],
+        )  # fmt: skip
+
+    def possible(self, *, singly: bool) -> bool:
+        """Whether all kinds together explain what is left, or one of them does.
+
+        Of one run of several its parameters are not at their minimum, and go there, too.
+        """
+        kinds = list(dict.fromkeys(c.kind for c in self.columns))
+        sets = [[kind] for kind in kinds] if singly else [kinds]
+        own = float(self._fallen @ self._inverse @ self._fallen)
+        return any(self.explained(self.gain(some)[0] + own) for some in sets)
 
     def together(self) -> list[Kind]:
         """As few kinds as explain what is left, each beside the others; none if they do not."""
