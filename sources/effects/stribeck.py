@@ -45,7 +45,6 @@ EFFECT = Effect(
     ("rotation",),
     TAU_S,
     source="Armstrong 1991",
-    contains=("coulomb",),  # with w_s far above all speeds
 )
 
 

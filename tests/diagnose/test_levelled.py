@@ -35,13 +35,6 @@ def named(rig: Rig) -> Fitted:
     return rig.search.sharpened(quick, rig.base)
 
 
-@pytest.fixture(scope="module")
-def uneven(rig: Rig) -> Fitted:
-    """The same by direction, of which falling friction is no case, nor the other way round."""
-    quick = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY, "a": 0.0})
-    return rig.search.sharpened(quick, rig.base)
-
-
 FALLING = {"tau_s": DRY, "w_s": 30.0}
 """Friction that falls with speed, so slowly that viscous friction makes up for it."""
 NEAR, FAR = 0.001, 0.01
@@ -64,9 +57,9 @@ def known(rig: Rig, fitted: Fitted) -> Fitted:
     return found
 
 
-def test_a_law_close_behind_is_fitted_to_its_minimum(rig: Rig, uneven: Fitted) -> None:
+def test_a_law_close_behind_is_fitted_to_its_minimum(rig: Rig, named: Fitted) -> None:
     best, early = ended(rig, NEAR)
-    search, named, done = rig.search, uneven, {uneven.labels}
+    search, done = rig.search, {named.labels}
     assert search.total(rig.base, early) > CLOSE * search.total(rig.base, named)
     assert search.gain(early, best) > 100.0 * GATE
     levelled(search, named, done)
@@ -77,9 +70,9 @@ def test_a_law_close_behind_is_fitted_to_its_minimum(rig: Rig, uneven: Fitted) -
     assert rig.said[said:] == []
 
 
-def test_a_law_that_does_much_less_is_not(rig: Rig, uneven: Fitted) -> None:
+def test_a_law_that_does_much_less_is_not(rig: Rig, named: Fitted) -> None:
     _, early = ended(rig, FAR)
-    search, named, done = rig.search, uneven, {uneven.labels}
+    search, done = rig.search, {named.labels}
     assert 0.0 < search.total(rig.base, early) < CLOSE * search.total(rig.base, named)
     levelled(search, named, done)
     assert search.gain(early, known(rig, early)) == 0.0
@@ -90,7 +83,7 @@ def test_special_cases_are_fitted_elsewhere(rig: Rig, named: Fitted) -> None:
     """From where the set is, by `simplified`: what is nearly one with them is no other law."""
     either = rig.added(rig.base, "asymmetric_coulomb", {"tau_c": DRY, "a": 0.0})
     assert rig.search.total(rig.base, either) > CLOSE * rig.search.total(rig.base, named)
-    done = {named.labels}
+    done = {named.labels, frozenset(["stribeck at load.flange"])}
     before = set(done)
     levelled(rig.search, named, done)
     assert done == before

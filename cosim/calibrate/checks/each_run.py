@@ -8,6 +8,7 @@ that is late in one run, or has another zero there, leaves an excess that no law
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...errors import CosimError
 from ..fit import Effort, fit
+from ..foretelling import foretold
 from ..nuisance import settled
 from .finding import Finding, quantity
 from .own_errors import Kind, OwnErrors, columns_of, is_slow, starts_of
@@ -52,16 +54,26 @@ def check_each_run(estimate: Estimate) -> Iterator[Finding]:
         return
     asked = OwnErrors(simulator, estimate.theta, estimate.residuals, estimate.jacobian)
     found = _found(estimate, asked)
-    unused = [run.name for run in problem.chosen("validation")]
-    if found is None and unused and not is_slow(asked.residuals):
-        try:
-            theta = settled(simulator, estimate.theta, unused)
-            residuals = simulator.residuals(theta, unused)
-        except CosimError:  # what cannot be simulated there is told elsewhere
-            return
-        found = _found(estimate, OwnErrors(simulator, theta, residuals, ()))
+    if found is None and not is_slow(asked.residuals):
+        theta, residuals = off_in_unused(estimate)
+        found = _found(estimate, OwnErrors(simulator, theta, residuals, ())) if residuals else None
     if found is not None:
         yield found
+
+
+def off_in_unused(estimate: Estimate) -> tuple[Vector, list[tuple[str, Vector]]]:
+    """Unused runs that are off by more than intervals make of it: parameters, and what is left."""
+    simulator = estimate.simulator
+    names = [run.name for run in estimate.problem.chosen("validation")]
+    if not names:
+        return estimate.theta, []
+    try:
+        theta = settled(simulator, estimate.theta, names)
+        residuals = list(simulator.residuals(theta, names))
+        beside = dict(foretold(replace(estimate, theta=theta), residuals))
+    except CosimError:  # what cannot be simulated there is told elsewhere
+        return estimate.theta, []
+    return theta, [(name, rows) for name, rows in residuals if is_slow([(name, beside[name])])]
 
 
 def _found(estimate: Estimate, asked: OwnErrors) -> Finding | None:

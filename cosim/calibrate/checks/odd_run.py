@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ...data.signals import Signal, Table
 from ...errors import CosimError
 from ..fit import Effort, fit
+from ..foretelling import foretold
 from ..nuisance import settled
-from .each_run import OFF
+from .each_run import OFF, off_in_unused
 from .finding import Finding
 from .own_errors import SPREAD, is_slow
 from .scale import FACTORS
@@ -44,9 +45,8 @@ def check_odd_run(estimate: Estimate) -> Iterator[Finding]:
         return
     left = {name: _Left.of(rows) for name, rows in estimate.residuals}
     total = sum(item.excess for item in left.values())
-    unused = [run.name for run in problem.chosen("validation")]
     if total <= _noise(list(left.values())):
-        yield from _unused(estimate, unused)
+        yield from _unused(estimate)
         return
     odd = max(left, key=lambda name: left[name].excess)
     others = [name for name in left if name != odd]
@@ -56,11 +56,14 @@ def check_odd_run(estimate: Estimate) -> Iterator[Finding]:
         again = fit(estimate.simulator, estimate.theta, others, effort=AGAIN)
         theta = settled(estimate.simulator, again.theta, [odd])
         ((_, rows),) = estimate.simulator.residuals(theta, [odd])
+        beside = foretold(replace(again, theta=theta), [(odd, rows)])
     except CosimError:  # what cannot be fitted tells nothing
         return
     calm = [_Left.of(values) for _, values in again.residuals]
     apart = _Left.of(rows)
-    if sum(c.excess for c in calm) > _noise(calm) or is_slow(again.residuals) or apart.mean < OFF:
+    if sum(c.excess for c in calm) > _noise(calm) or is_slow(again.residuals):
+        return
+    if apart.mean < OFF or not is_slow(beside):  # no more than intervals make of it
         return
     if (finding := _input(estimate.simulator, theta, odd, apart)) is not None:
         yield finding
@@ -73,17 +76,12 @@ def check_odd_run(estimate: Estimate) -> Iterator[Finding]:
     yield Finding("warning", "differs", odd, "", text)
 
 
-def _unused(estimate: Estimate, names: list[str]) -> Iterator[Finding]:
+def _unused(estimate: Estimate) -> Iterator[Finding]:
     """What is wrong with inputs of runs that were not fitted, where the others leave noise."""
-    simulator = estimate.simulator
-    try:
-        theta = settled(simulator, estimate.theta, names)
-        residuals = simulator.residuals(theta, names)
-    except CosimError:  # told elsewhere
-        return
+    theta, residuals = off_in_unused(estimate)
     for name, rows in residuals:
         left = _Left.of(rows)
-        if left.mean >= OFF and (finding := _input(simulator, theta, name, left)) is not None:
+        if left.mean >= OFF and (finding := _input(estimate.simulator, theta, name, left)):
             yield finding
 
 
