@@ -19,7 +19,7 @@ from ..fit import Effort, fit
 from ..foretelling import foretold
 from ..nuisance import settled
 from .finding import Finding, quantity
-from .own_errors import Kind, OwnErrors, columns_of, is_slow, starts_of
+from .own_errors import Kind, OwnErrors, Rest, columns_of, is_slow, starts_of
 
 if TYPE_CHECKING:
     from ..estimate import Estimate
@@ -32,7 +32,8 @@ well."""
 ALSO = 0.1
 """Share of what the worst run is off from which others are said to be, too."""
 AGAIN = Effort("near", "intervals", iterations=8)
-"""Of the fit with these errors: they change residuals nearly as a straight line does."""
+"""Of a fit with these errors, or without the run that has them: they change residuals nearly as a
+straight line does, and have bent the parameters, not turned them round."""
 
 
 def check_each_run(estimate: Estimate) -> Iterator[Finding]:
@@ -109,23 +110,21 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     except CosimError:  # what cannot be fitted explains nothing
         return None
     left = [(name, rows) for name, rows in again.residuals if name in names]
-    known = [rows[np.isfinite(rows)] for _, rows in left]
-    count = sum(rows.size for rows in known)
-    squares = sum(float(rows @ rows) for rows in known)
-    if squares - count > asked.noise or is_slow(left):
+    rest = Rest.of(rows for _, rows in left)
+    if rest.excess > rest.chance or is_slow(left):
         return None
     kinds = [kind for kind in kinds if _told(again, kind)]  # bends look like others to first order
     if not kinds:
         return None
     starts, alike = kinds[0].starts, asked.fitted and asked.alike(kinds)
-    zero, little = starts and alike and asked.constant(kinds), asked.mean < OFF
+    zero, little = starts and alike and asked.constant(kinds), asked.rest.mean < OFF
     text = (
         "runs do not begin quite where they are said to: " if starts
         else "a column is another one from run to run: "
     ) + "; ".join(_told(again, kind) for kind in kinds)  # fmt: skip
     text += (
-        f". With that the mean square over the noise's falls from {asked.mean:.3g} to "
-        f"{squares / max(count, 1):.3g}{_moved(estimate, again)}. "
+        f". With that the mean square over the noise's falls from {asked.rest.mean:.3g} to "
+        f"{rest.mean:.3g}{_moved(estimate, again)}. "
         + ("Estimate it: " if starts else "Mend the log, or estimate it: ")
         + "a [[nuisance]] with "
         + " and one with ".join(_entry(asked, again, kind) for kind in kinds)

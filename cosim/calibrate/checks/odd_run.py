@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ...data.signals import Signal, Table
 from ...errors import CosimError
-from ..fit import Effort, fit
+from ..fit import fit
 from ..foretelling import foretold
 from ..nuisance import settled
-from .each_run import OFF, off_in_unused
+from .each_run import AGAIN, OFF, off_in_unused
 from .finding import Finding
-from .own_errors import SPREAD, is_slow
+from .own_errors import Rest, is_slow
 from .scale import FACTORS
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 SHARE = 0.5
 """Of the excess over the noise's that a run must leave by itself to be asked."""
-AGAIN = Effort("near", "intervals", iterations=8)
-"""Of the fit of the others: the odd one has bent their parameters, not turned them round."""
 TRIED, STEPS, NEAR = 0.02, 6, 1e-4
 """By how much a gain of an input is changed first, fits of it at most, and the change that ends
 them: a hundredth of what a sensor's gain is known to."""
@@ -43,14 +41,14 @@ def check_odd_run(estimate: Estimate) -> Iterator[Finding]:
     problem = estimate.problem
     if problem.unstable or not estimate.jacobian:
         return
-    left = {name: _Left.of(rows) for name, rows in estimate.residuals}
-    total = sum(item.excess for item in left.values())
-    if total <= _noise(list(left.values())):
+    left = {name: Rest.of([rows]) for name, rows in estimate.residuals}
+    total = Rest.of(rows for _, rows in estimate.residuals)
+    if total.excess <= total.chance:
         yield from _unused(estimate)
         return
     odd = max(left, key=lambda name: left[name].excess)
     others = [name for name in left if name != odd]
-    if left[odd].mean < OFF or left[odd].excess < SHARE * total or len(others) < 2:
+    if left[odd].mean < OFF or left[odd].excess < SHARE * total.excess or len(others) < 2:
         return  # of two runs none is the odd one
     try:
         again = fit(estimate.simulator, estimate.theta, others, effort=AGAIN)
@@ -59,9 +57,9 @@ def check_odd_run(estimate: Estimate) -> Iterator[Finding]:
         beside = foretold(replace(again, theta=theta), [(odd, rows)])
     except CosimError:  # what cannot be fitted tells nothing
         return
-    calm = [_Left.of(values) for _, values in again.residuals]
-    apart = _Left.of(rows)
-    if sum(c.excess for c in calm) > _noise(calm) or is_slow(again.residuals):
+    calm = Rest.of(values for _, values in again.residuals)
+    apart = Rest.of([rows])
+    if calm.excess > calm.chance or is_slow(again.residuals):
         return
     if apart.mean < OFF or not is_slow(beside):  # no more than intervals make of it
         return
@@ -80,38 +78,12 @@ def _unused(estimate: Estimate) -> Iterator[Finding]:
     """What is wrong with inputs of runs that were not fitted, where the others leave noise."""
     theta, residuals = off_in_unused(estimate)
     for name, rows in residuals:
-        left = _Left.of(rows)
+        left = Rest.of([rows])
         if left.mean >= OFF and (finding := _input(estimate.simulator, theta, name, left)):
             yield finding
 
 
-@dataclass(frozen=True)
-class _Left:
-    """What is left in a run: sum of squares over the noise, and how many."""
-
-    squares: float
-    count: int
-
-    @classmethod
-    def of(cls, rows: Vector) -> _Left:
-        known = rows[np.isfinite(rows)]
-        return cls(float(known @ known), known.size)
-
-    @property
-    def excess(self) -> float:
-        return self.squares - self.count
-
-    @property
-    def mean(self) -> float:
-        return self.squares / max(self.count, 1)
-
-
-def _noise(left: list[_Left]) -> float:
-    """What noise may leave beyond itself."""
-    return SPREAD * float(np.sqrt(2.0 * sum(item.count for item in left)))
-
-
-def _input(simulator: Simulator, theta: Vector, name: str, before: _Left) -> Finding | None:
+def _input(simulator: Simulator, theta: Vector, name: str, before: Rest) -> Finding | None:
     """The finding on an input of a run, if there is one that makes all of it noise."""
     inputs = simulator.problem.run(name).inputs
     tables = {n: s for n, s in inputs.items() if isinstance(s, Table)}
@@ -131,12 +103,12 @@ def _input(simulator: Simulator, theta: Vector, name: str, before: _Left) -> Fin
             trial.close()
         return rows
 
-    def noise(rows: Vector | None) -> _Left | None:
-        left = None if rows is None else _Left.of(rows)
-        good = left is not None and left.excess <= _noise([left])
+    def noise(rows: Vector | None) -> Rest | None:
+        left = None if rows is None else Rest.of([rows])
+        good = left is not None and left.excess <= left.chance
         return left if good and rows is not None and not is_slow([(name, rows)]) else None
 
-    def finding(column: str, what: str, after: _Left) -> Finding:
+    def finding(column: str, what: str, after: Rest) -> Finding:
         text = (
             f"{what} in this run alone: with that the mean square over the noise's falls from "
             f"{before.mean:.3g} to {after.mean:.3g}. Mend the log, or leave the run out"

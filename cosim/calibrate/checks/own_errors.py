@@ -8,7 +8,7 @@ errors gain, parameters being free to follow,
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -51,6 +51,35 @@ PARTS, LIKELY = 10, 1e-3
 as a machine moves; and their chance from which they are those of noise."""
 CONSTANT = 0.01
 """Share of what an error does up to which it is the same at all times."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is left: sum of squares over the noise, and how many."""
+
+    squares: float
+    count: int
+
+    @classmethod
+    def of(cls, parts: Iterable[Vector]) -> Rest:
+        """Of residuals over the noise; gaps are nan."""
+        known = [rows[np.isfinite(rows)] for rows in parts]
+        return cls(sum(float(rows @ rows) for rows in known), sum(rows.size for rows in known))
+
+    @property
+    def excess(self) -> float:
+        """Beyond that of noise."""
+        return self.squares - self.count
+
+    @property
+    def mean(self) -> float:
+        """Mean square over the noise's."""
+        return self.squares / max(self.count, 1)
+
+    @property
+    def chance(self) -> float:
+        """What noise may leave beyond itself."""
+        return SPREAD * float(np.sqrt(2.0 * self.count))
 
 
 @dataclass(frozen=True)
@@ -198,12 +227,8 @@ class OwnErrors:
         self._rows = {
             name: _Rows.of(rows, slopes_of.get(name), problem) for name, rows in residuals
         }
-        squares = [part.residual**2 for part in self._rows.values()]
-        count = sum(part.size for part in squares)
-        self.mean = sum(float(part.sum()) for part in squares) / max(count, 1)
-        """Square of what is left over the noise's."""
-        self.excess = (self.mean - 1.0) * count + (len(problem.parameters) if jacobian else 0)
-        self.noise = SPREAD * float(np.sqrt(2.0 * count))
+        self.rest = Rest.of(part.residual for part in self._rows.values())
+        self.excess = self.rest.excess + (len(problem.parameters) if jacobian else 0)
         priors = [(k / p.prior) ** 2 if p.prior else 0.0
                   for k, p in zip(problem.scale, problem.parameters, strict=True)]  # fmt: skip
         self._priors = np.diag(priors)
@@ -297,7 +322,7 @@ class OwnErrors:
 
     def explained(self, gain: float) -> bool:
         """Whether what is left is noise, or little beside what was."""
-        return self.excess - gain <= max(LEAVES * self.excess, self.noise)
+        return self.excess - gain <= max(LEAVES * self.excess, self.rest.chance)
 
     def worst(self) -> OwnErrors:
         """The same of the run that leaves most alone: what does not explain it explains nothing."""
