@@ -80,14 +80,16 @@ def told(before: Fitted, after: Fitted) -> Iterable[str]:
         for p in fitted.problem.parameters:
             if key := ended(p, fitted):
                 bound = p.maximum if key == "max" else p.minimum
-                text = (
-                    f"{p.name} ended at its bound {key} = {bound:.4g} {shown_unit(p.unit)}".rstrip()
-                )
+                text = f"{p.name} ({key} = {bound:.4g} {shown_unit(p.unit)}".rstrip() + ")"
                 where.setdefault(text, []).append(model)
+    together: dict[str, list[str]] = {}
     for text, found in where.items():
+        together.setdefault(" and in ".join(found), []).append(text)
+    for found_in, names in together.items():
         yield (
-            f"{text} in {' and in '.join(found)}: laws and other parameters may make up for what "
-            "it may not; give a wider bound in the mapping if the machine may be beyond this one"
+            f"{', '.join(names)} ended at {'its bound' if len(names) == 1 else 'their bounds'} in "
+            f"{found_in}: laws and other parameters may make up for what lies beyond; give wider "
+            "bounds in the mapping if the machine may be there"
         )
 
 

@@ -37,7 +37,8 @@ def test_a_bound_in_the_wrong_place_is_told_and_no_law_named_for_it(
     found = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
     assert found["verdict"] == verdict, found["reason"]
     assert found["parameters"][name]["before"]["at_bound"]
-    (warning,) = [w for w in found["warnings"] if w.startswith(f"{name} ended at its bound max")]
+    (warning,) = [w for w in found["warnings"] if w.startswith(f"{name} (max = ")]
+    assert ") ended at its bound in the declared model" in warning
     assert warning in told.stdout
     assert list(found["bounds_opened"]) == ([] if friction else [name])
     if friction:
