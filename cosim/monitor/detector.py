@@ -18,8 +18,10 @@ from scipy.special import stdtrit
 
 from ..diagnose.linear import MATERIAL
 from ..diagnose.models import GATE
+from .amounts import UNEVEN, Sums
 from .change import Change, Found
 from .evidence import Evidence, Moments
+from .gains import Gains, Scored
 from .patterns import Direction
 from .profiles import (
     PARTS,
@@ -46,8 +48,14 @@ EXACT = 0.01
 FINALISTS = 4
 """Likeliest names, and likeliest declared parameters, whose patterns are taken at their full size
 before one of them is chosen."""
+RIVAL = 0.5
+"""So are all names that explain this share of what the likeliest one does: the first order of a
+large change (a heading that goes astray) may be off by a third."""
+NEAR = 0.1
+"""Share by which a size may differ from that at which its pattern was taken: sizes are good to so
+much (`SHARE`)."""
 PASSES = 4
-"""Times that names and dates of all changes are weighed anew at most."""
+"""Times that names and dates of all changes, or sizes of patterns, are weighed anew at most."""
 DATES = 1.92
 """Fall of the log likelihood at the ends of a 95 % interval [nats]."""
 CURVED = 0.25
@@ -74,11 +82,12 @@ class Detector:
         self.matrix = np.array([shape.values for shape in self.shapes])
         keys = [tuple(self.patterns.keys[name] for name in log.runs) for log in logs]
         self.known = constants(keys)
-        self.centred = self._centred(self.matrix)
-        rest, whole = (np.sum(m**2, axis=1) for m in (self.centred, self.matrix))
-        self.unseen = [self.shapes[k] for k in np.flatnonzero(rest < 1e-9 * whole)]
+        basis = np.linalg.qr(self.known)[0]
+        centred = self.matrix - (self.matrix @ basis) @ basis.T
+        rest, whole = (np.sum(m**2, axis=1) for m in (centred, self.matrix))
+        self._hidden = np.flatnonzero(rest < 1e-9 * whole)
+        self.unseen = [self.shapes[k] for k in self._hidden]
         """What cannot be told from logs that are driven otherwise."""
-        self._squared = self.centred**2
         self.moments = evidence.moments()
         own = self.moments.own()[0]
         self.watched = [k for k in range(self.patterns.width) if np.isfinite(own[:, k]).sum() > 3]
@@ -91,11 +100,6 @@ class Detector:
         self._chosen = np.log(self.among / self.among.min())
         """What the best of many profiles gains more by chance than the best of few [nats]."""
         self._changes: list[Change] = []
-
-    def _centred(self, shapes: Vector) -> Vector:
-        """Profiles without the constants."""
-        basis = np.linalg.qr(self.known)[0]
-        return np.asarray(shapes - (shapes @ basis) @ basis.T)
 
     # -- sums with changes taken off -----------------------------------------------------------
 
@@ -127,36 +131,26 @@ class Detector:
 
     # -- names and dates ---------------------------------------------------------------------------
 
-    def gains(
-        self, changes: Sequence[Change], root: Vector
-    ) -> tuple[dict[int, Vector], Vector, Vector]:
-        """Per direction the gain of each profile beside changes [nats]; weighted sums."""
+    def gains(self, changes: Sequence[Change], root: Vector) -> Gains:
+        """What each direction gains with each profile beside changes."""
         moments = self._without(changes)
-        z, weight = moments.weighted(root)
+        sums = Sums(*moments.weighted(root), self.known, self.patterns.declared)
         own = moments.own()
-        projected = self.centred @ z
-        found = {}
-        for index, direction in enumerate(self.patterns.directions):
-            columns = list(direction.columns)
-            u = projected[:, columns]
-            block = weight[:, columns][:, :, columns]
-            h = (self._squared @ block.reshape(len(block), -1)).reshape(-1, *block.shape[1:])
-            h = (
-                h
-                + 1e-12
-                * np.eye(len(columns))
-                * np.maximum(np.trace(h, axis1=1, axis2=2), 1e-300)[:, None, None]
-            )
-            solved = np.linalg.solve(h, u[:, :, None])[:, :, 0]
-            gain = 0.5 * np.einsum("ai,ai->a", u, solved) - (len(columns) - 1.0)
-            found[index] = gain - self._chosen
+        directions, dates, chance = self.patterns.directions, [], []
+        for direction in directions:
+            gain, amounts = sums.by_profile(direction.columns, self.matrix)
+            chance.append(self._chosen + (len(direction.columns) - 1.0))
+            gain -= chance[-1]
+            gain[self._hidden] = 0.0
             if direction.least is not None:
                 same = [c for c in changes if c.direction and c.direction.name == direction.name]
                 others = sum((c.amounts[0] * c.profile.values for c in same), 0.0 * self.days)
                 values, deviations = (part[:, direction.columns[0]] for part in own)
-                there = reached(values, deviations, others, self.matrix, solved[:, 0])
-                found[index][there < direction.least] = 0.0
-        return found, z, weight
+                there = reached(values, deviations, others, self.matrix, amounts[:, 0])
+                size = np.abs(amounts[:, 0]) * np.max(np.abs(self.matrix), axis=1)
+                gain[there < direction.least - SHARE * size] = 0.0
+            dates.append(gain)
+        return Gains(sums, directions, self.matrix, dates, chance)
 
     def best(
         self, changes: Sequence[Change], root: Vector, *, further: bool = False, plain: bool = False
@@ -169,39 +163,36 @@ class Detector:
             further: it is one more, and no small one.
             plain: only what has one column: two fit the sum of two changes too well.
         """
-        gains, z, weight = self.gains(changes, root)
+        gains = self.gains(changes, root)
         taken = [(c.direction.name, c.profile) for c in changes if c.direction]
         # what the bend of a pattern leaves of a creep looks like a spell
         bent = {c.direction.name for c in changes if c.profile.kind == "creep" and c.direction}
-        best: list[tuple[float, int, int]] = []
-        for index, gain in gains.items():
-            direction = self.patterns.directions[index]
-            allowed = np.array(
+
+        def allowed(direction: Direction) -> NDArray[np.bool_]:
+            if plain and len(direction.columns) > 1:
+                return np.zeros(len(self.shapes), dtype=np.bool_)
+            return np.array(
                 [not any(name == direction.name and shape.alike(other) for name, other in taken)
                  and not (direction.name in bent and shape.last) for shape in self.shapes]
             )  # fmt: skip
-            if allowed.any() and not (plain and len(direction.columns) > 1):
-                place = int(np.argmax(np.where(allowed, gain, -np.inf)))
-                best.append((float(gain[place]), index, place))
-        if not best:
-            return None
-        best.sort(reverse=True)
+
+        best = gains.best(allowed)
         if further:
             least = max((self._blur(c) for c in changes), default=0.0)
-            while best and self._explained(self._change(gains, z, weight, *best[0])).sum() < least:
+            while best and self._explained(self._change(gains, best[0])).sum() < least:
                 best.pop(0)
-            if not best:
-                return None
-        first = self._change(gains, z, weight, *best[0])
+        if not best:
+            return None
+        first = self._change(gains, best[0])
         names = {name: k for k, name in enumerate(d.name for d in self.patterns.directions)}
-        alike = {best[0][1], *(names[name] for name in first.rivals)}
+        alike = {best[0].direction, *(names[name] for name in first.rivals)}
         simplest = min(
-            (entry for entry in best if entry[1] in alike),
-            key=lambda entry: (self.patterns.directions[entry[1]].complexity, -entry[0]),
-        )
-        if simplest[1] == best[0][1]:
-            return first
-        return self._change(gains, z, weight, *simplest)
+            (entry for entry in best if entry.direction in alike),
+            key=lambda entry: (
+                self.patterns.directions[entry.direction].complexity, -entry.score
+            ),
+        )  # fmt: skip
+        return first if simplest == best[0] else self._change(gains, simplest)
 
     def full(self, changes: Sequence[Change], root: Vector) -> None:
         """Take the patterns of the likeliest next changes at their full sizes.
@@ -209,54 +200,56 @@ class Detector:
         A large change of a parameter does more than many small ones, which would count for another
         name.
         """
-        gains, z, weight = self.gains(changes, root)
         known = {change.direction.name for change in changes if change.direction}
-        order = sorted(
-            (
-                (float(gain.max()), index, int(gain.argmax()))
-                for index, gain in gains.items()
-                if self.patterns.directions[index].name not in known
-            ),
-            reverse=True,
-        )
-        declared = [entry for entry in order if self.patterns.directions[entry[1]].declared]
-        for entry in dict.fromkeys([*order[:FINALISTS], *declared[:FINALISTS]]):
-            change = self._change(gains, z, weight, *entry)
-            self.patterns.secant(entry[1], change.amounts * change.full)
-        self.moments = self.evidence.moments()
+        taken: dict[int, Vector] = {}
+        for _ in range(PASSES):
+            gains = self.gains(changes, root)
+            order = gains.best(lambda d: np.full(len(self.shapes), d.name not in known))
+            declared = [e for e in order if self.patterns.directions[e.direction].declared]
+            close = [e for e in order if e.score > RIVAL * order[0].score]
+            likely = dict.fromkeys([*order[:FINALISTS], *close, *declared[:FINALISTS]])
+            new = False
+            for entry in likely:
+                change = self._change(gains, entry)
+                size = change.amounts * change.full
+                before = taken.get(entry.direction)
+                if before is not None and np.all(np.abs(size - before) <= NEAR * np.abs(before)):
+                    continue
+                self.patterns.secant(entry.direction, size)
+                taken[entry.direction], new = size, True
+            if not new:
+                break
+            self.moments = self.evidence.moments()
 
-    def _change(
-        self, gains: dict[int, Vector], z: Vector, weight: Vector, gain: float, index: int,
-        place: int,
-    ) -> Change:  # fmt: skip
+    def _change(self, gains: Gains, entry: Scored) -> Change:
         """A direction and a profile as a change, with intervals and rivals."""
-        direction, shape = self.patterns.directions[index], self.shapes[place]
+        index, sums = entry.direction, gains.sums
+        direction, shape = self.patterns.directions[index], self.shapes[entry.profile]
+        gain = float(gains.dates[index][entry.profile])
         columns = list(direction.columns)
-        h = self.centred[place]
-        block = np.einsum("n,nij->ij", h**2, weight[:, columns][:, :, columns])
-        inverse = np.linalg.pinv(block)
-        amounts = inverse @ (h @ z[:, columns])
+        fitted = sums.fitted(columns, np.tile(shape.values, (len(columns), 1)))
+        amounts = fitted.values
         # scatter along the direction beyond what the model has of it
         first = columns[int(np.argmax(np.abs(amounts)))]
-        own = weight[:, first, first]
-        rest = z[:, first] - (h[:, None] * weight[:, first][:, columns]) @ amounts
-        safe = np.maximum(own, 1e-300)
-        rest = self._centred((rest / safe)[None, :])[0]
-        freedom = max(rest.size - self.known.shape[1] - 1, 1)
-        spread = max(float(np.sum(rest**2 * own)) / freedom, 1.0)
+        own = np.maximum(sums.weight[:, first, first], 1e-300)
+        freedom = max(self.days.size - self.known.shape[1] - 1, 1)
+        rest = fitted.rest[:, first] ** 2 / own
+        spread = max(float(rest.sum()) / freedom, 1.0)
+        told = own * (amounts[columns.index(first)] * shape.values) ** 2
+        uneven = max(float(np.sum(rest / (1.0 + UNEVEN**2 * told))) / freedom, 1.0)
         alike = [k for k, s in enumerate(self.shapes) if s.kind == shape.kind]
         near = [
-            self.shapes[k].first for k in alike if gains[index][k] > gain - DATES * spread
+            self.shapes[k].first for k in alike if gains.dates[index][k] > gain - DATES * spread
         ]  # fmt: skip
         rivals = []
-        for other, values in gains.items():
+        for other, values in enumerate(gains.dates):
             if other == index or self.patterns.directions[other].contains(direction):
                 continue
-            k = int(np.argmax(values))
-            if float(values[k]) > gain - GATE * spread or self._alike(
-                direction, other, amounts, h, weight, shape
+            theirs = gains.score(other, int(np.argmax(values)))
+            if theirs > entry.score - GATE * uneven or self._alike(
+                sums, direction, other, amounts, shape
             ):
-                rivals.append((float(values[k]), self.patterns.directions[other].name))
+                rivals.append((theirs, self.patterns.directions[other].name))
         rivals.sort(reverse=True)
         named = {d.name: d for d in self.patterns.directions}
         names = [
@@ -264,24 +257,18 @@ class Detector:
             if not any(named[name].contains(named[other]) for _, other in rivals)
         ]  # fmt: skip
         return Change(
-            direction, shape, amounts, np.sqrt(np.diag(inverse) * spread), gain,
+            direction, shape, amounts, np.sqrt(np.diag(fitted.covariance) * spread), gain,
             min(near), max(near), tuple(names), spread=spread,
         )  # fmt: skip
 
     def _alike(
-        self, direction: Direction, other: int, amounts: Vector, h: Vector, weight: Vector,
-        shape: Profile,
+        self, sums: Sums, direction: Direction, other: int, amounts: Vector, shape: Profile
     ) -> bool:  # fmt: skip
         """Whether another direction does the same but for less than has a name."""
         columns = list(direction.columns)
         rival = list(self.patterns.directions[other].columns)
-        block = np.einsum("n,nij->ij", h**2, weight[:, rival][:, :, rival])
-        cross = np.einsum("n,nij->ij", h**2, weight[:, rival][:, :, columns])
-        theirs = np.linalg.pinv(block) @ cross @ amounts
-        # quick: what of the pattern is left, in the metric of the likelihood
-        own = np.einsum("n,nij->ij", h**2, weight[:, columns][:, :, columns])
-        whole = float(amounts @ own @ amounts)
-        if float(theirs @ block @ theirs) < 0.5 * whole:
+        theirs = sums.nearest(shape.values, columns, rival, amounts)
+        if theirs is None:
             return False
         most = float(np.max(np.abs(shape.values)))
         size = self.evidence.largest(
@@ -296,18 +283,13 @@ class Detector:
         """The changes with their amounts fitted together."""
         if not changes:
             return []
-        z, weight = self.moments.weighted(root)
+        sums = Sums(*self.moments.weighted(root), self.known, self.patterns.declared)
         columns = [c for change in changes for c in change.direction.columns]  # type: ignore[union-attr]
-        shapes = self._centred(
-            np.array([change.profile.values for change in changes for _ in change.amounts])
-        )
-        normal = np.einsum(
-            "kn,ln,nkl->kl", shapes, shapes, weight[:, columns][:, :, columns], optimize=True
-        )
-        inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-        amounts = inverse @ np.einsum("kn,nk->k", shapes, z[:, columns])
+        shapes = np.array([change.profile.values for change in changes for _ in change.amounts])
+        fitted = sums.fitted(columns, shapes)
+        amounts = fitted.values
         spreads = np.array([change.spread for change in changes for _ in change.amounts])
-        deviations = np.sqrt(np.diag(inverse) * spreads)
+        deviations = np.sqrt(np.diag(fitted.covariance) * spreads)
         found, place = [], 0
         for change in changes:
             size = change.amounts.size

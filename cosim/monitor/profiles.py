@@ -233,7 +233,7 @@ def paired(values: Vector, deviations: Vector, known: Vector, shapes: Vector) ->
         # Student's t of each gives the share of the squares that is left
         left = 1.0
         for one in (first, second):
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 square = np.where(np.isfinite(one.deviation), (one.slope / one.deviation) ** 2, 0.0)
             left /= 1.0 + float(np.max(square)) / one.freedom
         worst = max(worst, left ** (0.5 * second.freedom))  # F with two degrees of freedom

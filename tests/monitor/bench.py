@@ -20,10 +20,10 @@ APART = 7
 
 
 @cache
-def clean(viscous: float, dry: float) -> tuple[Vector, ...]:
+def clean(viscous: float, dry: float, drive: str = "sweep") -> tuple[Vector, ...]:
     """A check-up without noise; more friction than the disc has."""
     return disc.run(
-        "sweep", lambda w, theta, t: viscous * w + dry * float(np.tanh(w / 0.01)), SECONDS
+        drive, lambda w, theta, t: viscous * w + dry * float(np.tanh(w / 0.01)), SECONDS
     )
 
 
@@ -38,6 +38,7 @@ def write(
     dry: Callable[[int], float] = lambda log: 0.0,
     zero: Callable[[int], float] = lambda log: 0.0,
     *,
+    drive: Callable[[int], str] = lambda log: "sweep",
     dated: bool = True,
     names: Callable[[int], str] = lambda log: f"log{log:02d}",
     seed: int = 5,
@@ -48,6 +49,7 @@ def write(
         folder: where.
         viscous, dry: more friction of a log.
         zero: error of the angle in a log.
+        drive: torque of a log, by its name in `disc`.
         dated: whether runs have a date.
         names: of files.
         seed: of noise and of what differs from log to log.
@@ -59,7 +61,7 @@ def write(
     for log in range(LOGS):
         # oil is warmer or colder; rounded, so that logs of equal warmth share a simulation
         warm = round(float(np.clip(random.standard_normal(), -2.0, 2.0)), 0) * 1e-4
-        time, tau, w, theta = clean(viscous(log) + warm, dry(log))
+        time, tau, w, theta = clean(viscous(log) + warm, dry(log), drive(log))
         w = w + disc.SIGMA["w"] * random.standard_normal(w.size)
         theta = theta + zero(log) + disc.SIGMA["theta"] * random.standard_normal(w.size)
         columns = [time, tau, w, theta]

@@ -164,6 +164,35 @@ def test_limits_come_from_logs_without_the_change(tmp_path: Path) -> None:
     assert chart.centre == pytest.approx(0.03, abs=2e-4)  # a fifth of the change would be 6e-4
 
 
+OTHERWISE = ("slow", "sweep", "again", "steps", "swing", "check")
+"""Torques of logs that are driven otherwise one after the other: they tell a friction by weights
+that differ tenfold."""
+
+
+@pytest.mark.parametrize("size", [0.0012, 0.01])
+@pytest.mark.parametrize("first", [8, 9, 10])
+def test_what_changed_is_named_where_each_log_is_driven_otherwise(
+    tmp_path: Path, size: float, first: int
+) -> None:
+    found = plain(write(
+        tmp_path / "disc", viscous=step(first, size),
+        drive=lambda log: OTHERWISE[log % len(OTHERWISE)],
+    ))  # fmt: skip
+    (change,) = found.changes
+    assert change.direction is not None and change.direction.name == "b", found.sentence(change)
+    assert change.profile.kind == "step" and change.low <= first <= change.high
+    (entry,) = found.to_dict()["changes"]
+    low, high = entry["ci95"]
+    assert low <= size <= high
+
+
+def test_nothing_is_found_where_each_log_is_driven_otherwise(tmp_path: Path) -> None:
+    found = plain(write(
+        tmp_path / "disc", drive=lambda log: OTHERWISE[log % len(OTHERWISE)]
+    ))  # fmt: skip
+    assert found.verdict == "nothing_changed"
+
+
 def test_wear_that_was_repaired_is_not_quiet(tmp_path: Path) -> None:
     first, last = JUMP - 5, NEW
     found = plain(write(
