@@ -27,11 +27,20 @@ from .counts import steady, whole_counts
 from .entries import lookup
 from .mapped_logs import MappedLogs
 from .model import Model
-from .named import named, readings
-from .parts import CLOCK, COINCIDENT, COLUMN, Channel, MeasuredRun, Parameter, check_parameters
+from .named import FIRST, named, read_first, readings
+from .parts import (
+    BIAS,
+    CLOCK,
+    COINCIDENT,
+    COLUMN,
+    Channel,
+    MeasuredRun,
+    Parameter,
+    check_parameters,
+)
 from .problem import Problem
 from .recorder import check_column, column_unit
-from .scales import known, scaled, zeroed
+from .scales import known, scaled, to_unit, zeroed
 from .stamps import apart
 from .steps import steps
 
@@ -118,7 +127,20 @@ class Joined(MappedLogs):
             late=[p for p in stated if p.late],
             source=self._source(present),
             readings=readings(self.table, f"{self.path}: [readings]"),
+            read_off=self._read_off(present),
         )
+
+    def _read_off(self, present: list[Channel]) -> dict[str, dict[str, float]]:
+        """Zero of a column -> starts that are read off it, with the factors into their units."""
+        columns = {self.columns[c.name]: c.name for c in present}
+        found: dict[str, dict[str, float]] = {}
+        for column, entry, unit, where in read_first(self.table, str(self.path)):
+            if column in columns:
+                own, channel = self.units.get(column, ""), columns[column]
+                targets = self.targets(entry, own if unit is None else unit, where)
+                gain = to_unit(own, unit or "", where)[0] / self.converted[channel][0]
+                found.setdefault(BIAS + channel, {}).update({n: gain * f for n, f in targets})
+        return found
 
     def _source(self, present: list[Channel]) -> Source:
         """Where the data come from, for their checks."""
@@ -322,20 +344,10 @@ class Joined(MappedLogs):
         if entry.startswith("begin:"):
             begun = lookup(self.logs[run].values, entry.removeprefix("begin:"), where)
             return begun - float(self.table.get("lead", 0.0))
-        if entry.startswith("first:"):
-            column = entry.removeprefix("first:")
+        if entry.startswith(FIRST):
+            column = entry.removeprefix(FIRST)
             begun = self.first(run, column, where)
-            own = self.units.get(column, "")
-            gain, offset = 1.0, 0.0
-            if own and unit:
-                gain, offset = scaled(
-                    known(own, where),
-                    known(unit, where),
-                    None,
-                    f"{where}: column {column}",
-                    "unit",
-                    "",
-                )
+            gain, offset = to_unit(self.units.get(column, ""), unit, f"{where}: column {column}")
             return begun * gain + offset
         return lookup(self.logs[run].values, entry, where)
 
@@ -348,9 +360,8 @@ class Joined(MappedLogs):
         for key, entry in self.table.get("starts", {}).items():
             where = f"{self.path}: [starts] {key}"
             value = self.value(key, name, where)
-            first = key.startswith("first:")
-            own = self.units.get(key.removeprefix("first:"), "") if first else ""
-            noise = sigma.get(key.removeprefix("first:"), 0.0) if first else 0.0
+            column = key.removeprefix(FIRST) if key.startswith(FIRST) else ""
+            own, noise = self.units.get(column, ""), sigma.get(column, 0.0)
             for target, factor in self.targets(entry, own, where):
                 starts[target], unsure[target] = factor * value, abs(factor) * noise
         lead = float(self.table.get("lead", 0.0))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import ScenarioError, UnknownNameError, listing
 from ..files import flatten
+
+FIRST = "first:"
+"""Before the name of a column whose first value is meant."""
 
 
 def named(entry: Any, where: str) -> tuple[tuple[str, float], ...]:
@@ -48,3 +51,22 @@ def readings(table: Mapping[str, Any], where: str) -> dict[str, dict[str, float]
                     f"{where} {error}: [starts] sets no {name!r}; {listing(starts, name)}"
                 )
     return found
+
+
+def read_first(
+    table: Mapping[str, Any], path: str
+) -> Iterator[tuple[str, Any, str | None, str]]:  # fmt: skip
+    """Starts that are read off the first value of a column, as the mapping says it.
+
+    Yields:
+        The column, the entry that names what begins so, its unit (None: the column's), and where
+        it stands.
+    """
+    for key, entry in table.get("starts", {}).items():
+        if key.startswith(FIRST):
+            yield key.removeprefix(FIRST), entry, None, f"{path}: [starts] {key}"
+    for entry in table.get("nuisance", []):
+        nominal = str(entry["nominal"])
+        if nominal.startswith(FIRST):
+            where = f"{path}: nuisance {entry.get('name')}"
+            yield nominal.removeprefix(FIRST), entry["targets"], str(entry.get("unit", "")), where

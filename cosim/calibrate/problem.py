@@ -65,6 +65,8 @@ class Problem:
         turns: angle of a periodic effect (see `shaft`) -> how far it turns in a run at most [rad].
         readings: error that an effect adds to a sensor -> starts of runs that it has read, with
             factors: a run begins there less the error.
+        read_off: the same of a column's zero (`bias:CHANNEL`), and of starts that are estimated
+            about its first value, too: they are what it would have read without noise.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Problem:
     shafts: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     turns: Mapping[str, float] = field(default_factory=dict)
     readings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    read_off: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("parameters", "channels", "runs", "relative", "late", "further"):
@@ -262,6 +265,11 @@ class Problem:
             if off := values.get(error, 0.0):
                 # an estimated start is the true one
                 for name in starts.keys() & values.keys() - set_here.keys():
+                    values[name] -= starts[name] * off
+        errors = self.log_errors(theta, run) if self.read_off else {}
+        for error, starts in self.read_off.items():
+            if off := errors.get(error, 0.0):
+                for name in starts.keys() & values.keys():
                     values[name] -= starts[name] * off
         return values
 

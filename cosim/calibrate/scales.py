@@ -80,6 +80,17 @@ def scaled(
     )
 
 
+def to_unit(own: str, wanted: str, where: str) -> tuple[float, float]:
+    """Gain and offset from one unit to another, of nothing where one of them is not given.
+
+    Raises:
+        UnitError: the units do not fit.
+    """
+    if not own or not wanted:
+        return 1.0, 0.0
+    return scaled(known(own, where), known(wanted, where), None, where, "unit", "")
+
+
 def zeroed(offset: float, given: float) -> float:
     """The offset between two units with one that the mapping gives, which may be that one itself.
 

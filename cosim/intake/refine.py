@@ -58,7 +58,7 @@ PARALLEL = 0.9
 """Cosine of what two such values do to the others, from which the second one adds nothing."""
 NEARER = 2.0
 """What a parameter counts more that belongs to what is measured, where another does the same."""
-BUILT = ("ratio", "teeth", "poles", "counts")
+BUILT = ("ratio", "teeth", "poles", "counts", "gravity")
 """Words in names of parameters that are known from how a machine is built; all but the first also
 in what is said of them, where a ratio may be one of damping."""
 

@@ -90,9 +90,9 @@ def torque(name: str, t: Vector) -> Vector:
 
 
 def run(
-    name: str, law: Law, seconds: float, friction: float = B
+    name: str, law: Law, seconds: float, friction: float = B, begun: float = 0.0
 ) -> tuple[Vector, Vector, Vector, Vector]:
-    """Time, torque, speed and angle of a run without noise."""
+    """Time, torque, speed and angle of a run without noise, which begins with a speed."""
     time = np.arange(round(seconds / INTERVAL) + 1) * INTERVAL
     tau, h = torque(name, time), INTERVAL / SPLIT
     w, theta = np.zeros(time.size), np.zeros(time.size)
@@ -102,7 +102,8 @@ def run(
         drive = tau[k] + (tau[k + 1] - tau[k]) * (t / INTERVAL - k)
         return float((drive - friction * speed - law(speed, angle, t)) / J)
 
-    speed = angle = 0.0
+    speed, angle = begun, 0.0
+    w[0] = begun
     for i in range(1, time.size):
         for j in range(SPLIT):
             t = time[i - 1] + j * h
@@ -117,20 +118,22 @@ def run(
 
 def write(
     folder: Path, law: Law, seed: int = 3, seconds: float = 4.0, names: Iterable[str] = RUNS,
-    frictions: Mapping[str, float] = NO_OTHERS,
+    frictions: Mapping[str, float] = NO_OTHERS, begun: float = 0.0, zero: float = 0.0,
 ) -> Path:  # fmt: skip
     """The data set of a disc with this law, of all runs or of those that are named.
 
     Args:
         folder, law, seed, seconds, names: see above.
         frictions: viscous friction in runs where it is another one.
+        begun: speed that all runs begin with.
+        zero: error of the logged speed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     text = MAPPING
     for name in names:
-        time, tau, w, theta = run(name, law, seconds, frictions.get(name, B))
-        columns = [time, tau, w + SIGMA["w"] * random.standard_normal(w.size),
+        time, tau, w, theta = run(name, law, seconds, frictions.get(name, B), begun)
+        columns = [time, tau, w + zero + SIGMA["w"] * random.standard_normal(w.size),
                    theta + SIGMA["theta"] * random.standard_normal(w.size)]  # fmt: skip
         np.savetxt(folder / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.7g",
                    header="time,tau,w,theta", comments="")  # fmt: skip

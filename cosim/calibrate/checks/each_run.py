@@ -113,7 +113,7 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     rest = Rest.of(rows for _, rows in left)
     if rest.excess > rest.chance or is_slow(left):
         return None
-    kinds = [kind for kind in kinds if _told(again, kind)]  # bends look like others to first order
+    kinds = [kind for kind in kinds if told(again, kind)]  # bends look like others to first order
     if not kinds:
         return None
     starts, alike = kinds[0].starts, asked.fitted and asked.alike(kinds)
@@ -121,13 +121,13 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     text = (
         "runs do not begin quite where they are said to: " if starts
         else "a column is another one from run to run: "
-    ) + "; ".join(_told(again, kind) for kind in kinds)  # fmt: skip
+    ) + "; ".join(told(again, kind) for kind in kinds)  # fmt: skip
     text += (
         f". With that the mean square over the noise's falls from {asked.rest.mean:.3g} to "
-        f"{rest.mean:.3g}{_moved(estimate, again)}. "
+        f"{rest.mean:.3g}{moved(estimate, again)}. "
         + ("Estimate it: " if starts else "Mend the log, or estimate it: ")
         + "a [[nuisance]] with "
-        + " and one with ".join(_entry(asked, again, kind) for kind in kinds)
+        + " and one with ".join(entry_of(asked, again, kind) for kind in kinds)
         + f",{' each' * (len(kinds) > 1)} with per_run = true"
     )
     if zero:
@@ -141,7 +141,7 @@ def _tried(estimate: Estimate, asked: OwnErrors, kinds: Sequence[Kind]) -> Findi
     return Finding(severity, "start" if starts else "differs", "", "", text)
 
 
-def _moved(estimate: Estimate, again: Estimate) -> str:
+def moved(estimate: Estimate, again: Estimate) -> str:
     """Which declared parameters leave their intervals."""
     moved = [
         f"{p.name} from {quantity(before, '')} to {quantity(again.values[p.name], p.unit)}"
@@ -154,7 +154,7 @@ def _moved(estimate: Estimate, again: Estimate) -> str:
     return f", and it moves {', '.join(moved)}, out of the intervals" if moved else ""
 
 
-def _told(again: Estimate, kind: Kind) -> str:
+def told(again: Estimate, kind: Kind) -> str:
     """The run that is farthest off, and how many others are off, too."""
     found = [
         (abs(value - p.nominal), quantity(value, p.unit.removeprefix("1")), low, high, p)
@@ -174,7 +174,7 @@ def _told(again: Estimate, kind: Kind) -> str:
     )
 
 
-def _entry(asked: OwnErrors, again: Estimate, kind: Kind) -> str:
+def entry_of(asked: OwnErrors, again: Estimate, kind: Kind) -> str:
     """What a nuisance for it says."""
     off = [
         max(abs(value - p.nominal), deviation)

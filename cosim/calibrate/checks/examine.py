@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import CosimError
 from .averaged import check_averaged
+from .begun import check_begun
 from .clipped import check_clipped
 from .copies import check_columns, check_copies, check_repeated
 from .each_run import check_each_run
@@ -82,7 +83,7 @@ def check_fit(estimate: Estimate) -> list[Finding]:
     means = {f.column for f in found}
     found += [f for f in check_stated(estimate) if f.column not in means]
     found += [*check_late(estimate), *check_priors(estimate)]
-    for check in (check_each_run, check_odd_run):
+    for check in (check_each_run, check_begun, check_odd_run):
         if not any(f.severity == "error" for f in found):
             found += check(estimate)
     return passed(found, estimate.problem.source.allow)

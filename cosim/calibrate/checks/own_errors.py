@@ -191,6 +191,12 @@ class _Rows:
         """The same samples of others."""
         return np.nan_to_num(rows[:: self.stride][self.good])
 
+    def by_channel(self, values: Vector) -> Vector:
+        """Of such samples one row at a time with a column per channel, 0 where nothing is known."""
+        found = np.zeros(self.good.shape)
+        found[self.good] = values
+        return found
+
 
 @dataclass(frozen=True)
 class _Column:
@@ -272,6 +278,10 @@ class OwnErrors:
                     if np.any(change):
                         self.columns.append(_Column(kind, name, change))
         self._summed()
+
+    def by_channel(self, column: _Column) -> Vector:
+        """What an error does to each channel of its run, over time."""
+        return self._rows[column.run].by_channel(column.values)
 
     def _summed(self) -> None:
         count = len(self.columns)
