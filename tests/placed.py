@@ -49,6 +49,7 @@ class Wrong(NamedTuple):
         larger: share by which the left wheel is.
         late: samples by which y comes late.
         gain: of y.
+        said: heading that the run says it begins with [rad], as `heading`.
     """
 
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -57,6 +58,7 @@ class Wrong(NamedTuple):
     larger: float = 0.0
     late: int = 0
     gain: float = 1.0
+    said: float = 0.0
 
 
 def rows(seed: int, wrong: Wrong) -> np.ndarray:
@@ -92,5 +94,6 @@ def write(folder: Path, runs: Sequence[Wrong], more: str = "", unused: int = 0) 
                    header="t,left,right,x,y,yaw", comments="")  # fmt: skip
         purpose = "identification" if k < len(runs) - unused else "validation"
         table += f'[[run]]\nname = "r{k}"\nfile = "r{k}.csv"\npurpose = "{purpose}"\n'
+        table += f"heading = {wrong.said}\n"
     (folder / "dataset.toml").write_text(table)
     return folder

@@ -10,6 +10,7 @@ import pytest
 from cosim.calibrate import read_problem
 from cosim.calibrate.calibration import calibrated
 from cosim.calibrate.checks.each_run import check_each_run
+from cosim.calibrate.checks.examine import examine
 from cosim.calibrate.checks.finding import Finding
 from cosim.calibrate.checks.own_errors import exact_starts
 from cosim.calibrate.estimate import Estimate
@@ -47,6 +48,26 @@ def test_headings_placed_by_hand_are_said_with_the_way_out(tmp_path: Path) -> No
     assert "instead of 0 in r0, and less so in 2 more" in finding.text
     assert 'a [[nuisance]] with targets = "base.pose_phi", nominal = 0' in finding.text
     assert "pose_x" not in finding.text
+
+
+SAID = '[starts]\nheading = "base.pose_phi"\n'
+
+
+def test_runs_that_say_another_heading_each_keep_it_as_the_nominal_one(tmp_path: Path) -> None:
+    """One number for all runs would begin most of them the wrong way round."""
+    runs = [
+        Wrong((0.0, 0.0, angle + off), said=angle)
+        for angle, off in ((0.0, 0.012), (1.5, -0.008), (-1.5, 0.004))
+    ]
+    [finding] = found(tmp_path, runs, SAID)
+    assert 'targets = "base.pose_phi", nominal = "heading", span = 0.05' in finding.text
+    entry = HEADING.replace("nominal = 0.0", 'nominal = "heading"')
+    estimate = estimated(tmp_path, runs, SAID + entry)
+    for k, wrong in enumerate(runs):
+        value = estimate.values[f"heading@r{k}"]
+        # three deviations, as below
+        deviation = estimate.deviation[estimate.problem.index(f"heading@r{k}")]
+        assert abs(value - wrong.pose[2]) < 3.0 * deviation
 
 
 def test_the_way_out_gives_intervals_with_the_truth(tmp_path: Path) -> None:
@@ -157,3 +178,17 @@ def test_what_is_taken_as_exact_is_listed(tmp_path: Path) -> None:
     assert exact_starts(problem.changed(relative=[("x", "y", "yaw")])) == ""
     free = read_problem(write(tmp_path, [Wrong()], HEADING))
     assert "(base.pose_x, base.pose_y)" in exact_starts(free)
+
+
+def test_a_start_that_is_said_in_another_turn_is_told_as_that(tmp_path: Path) -> None:
+    """The twin is said in the turn in which the column begins."""
+    runs = [Wrong((0.0, 0.0, 0.0)), Wrong((0.0, 0.0, 3.14), said=-3.143)]
+    told = examine(simulator(read_problem(write(tmp_path, runs, SAID))))
+    [finding] = [f for f in told if f.kind == "start"]
+    assert finding.run == "r1" and "begins a whole turn from where it is said to (yaw 3.1" in (
+        finding.text
+    )
+    runs[1] = runs[1]._replace(said=3.14)
+    assert not any(
+        f.kind == "start" for f in examine(simulator(read_problem(write(tmp_path, runs, SAID))))
+    )

@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
+from ...installation.examples import read_mapping
 from ..fit import Effort, fit
 from ..foretelling import foretold
+from ..named import named
 from ..nuisance import settled
 from .finding import Finding, quantity
 from .own_errors import Kind, OwnErrors, Rest, columns_of, is_slow, starts_of
 
 if TYPE_CHECKING:
     from ..estimate import Estimate
+    from ..problem import Problem
 
 Vector = NDArray[np.float64]
 OFF = 1.5
@@ -183,5 +186,17 @@ def entry_of(asked: OwnErrors, again: Estimate, kind: Kind) -> str:
         )
         if p.targets == ((kind.target, 1.0),) and p.run
     ]
-    first = asked.begins(kind, asked.residuals[0][0])
-    return f'targets = "{kind.target}", nominal = {first:.4g}, span = {4.0 * max(off):.1g}'
+    values = {asked.begins(kind, run) for run, _ in asked.residuals}
+    nominal = f"{next(iter(values)):.4g}"
+    if len(values) > 1:  # runs say each where they begin, by an entry or a first value
+        nominal = f'"{said_of(asked.problem, kind.target)}"'
+    return f'targets = "{kind.target}", nominal = {nominal}, span = {4.0 * max(off):.1g}'
+
+
+def said_of(problem: Problem, target: str) -> str:
+    """The key in [starts] of what begins otherwise in each run."""
+    table = read_mapping(problem.source.path)
+    for key, entry in table.get("starts", {}).items():
+        if any(name == target for name, _ in named(entry, f"[starts] {key}")):
+            return str(key)
+    return "ENTRY of the run, or first:COLUMN"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import CosimError
-from ...spec.units import BASE
+from ...spec.units import BASE, parse
 from .finding import Finding
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ OFF = 10.0
 RESTS = 3.0
 """Deviations of one sample by which means of `FIRST` samples may differ in a machine that stands:
 five of their own, so that noise does not do it in any channel of any run."""
+LITTLE = 0.02
+"""Of a turn, by which a machine that was placed by hand may be off: seven degrees."""
 MOVES = 0.25
 """Share of the way to the bounds by which the parameters are changed."""
 
@@ -84,6 +86,13 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
             )
             yield Finding("warning", "start", run.name, "", text)
             continue
+        if all(_turned(problem, i, off[run.name][i]) for i in wrong):
+            text = (
+                f"begins a whole turn from where it is said to ({names}): give the start in the "
+                "turn in which the column begins"
+            )
+            yield Finding("error", "start", run.name, "", text)
+            continue
         text = (
             f"begins where the model does not ({names}): estimate what the system begins with as "
             'a [[nuisance]] with targets = "VARIABLE" of the start, nominal = "first:COLUMN", a '
@@ -92,6 +101,19 @@ def check_starts(simulator: Simulator, models: Mapping[str, Vector]) -> Iterator
             "sample at rest"
         )
         yield Finding("error", "start", run.name, "", text)
+
+
+def _turned(problem: Problem, index: int, off: float) -> bool:
+    """Whether an angle is off by whole turns, but for what begins a little off."""
+    channel = problem.channels[index]
+    _, (variable, *_) = problem.system().variables(channel.signal)
+    unit = parse(channel.unit) if channel.unit else variable.unit
+    exponents = dict(zip(BASE, unit.exponents, strict=True)) if unit else {}
+    if {k: n for k, n in exponents.items() if n} != {"rad": 1}:
+        return False
+    turn = 2.0 * np.pi / channel.angle
+    rest = off - turn * np.round(off / turn)
+    return bool(abs(off) > 0.5 * turn and abs(rest) < LITTLE * turn)
 
 
 def _held(simulator: Simulator, run: MeasuredRun, model: Vector, wrong: list[int]) -> bool:
