@@ -6,10 +6,13 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from ..data.text import spelled
+from ..errors import UnknownNameError
 from ..spec.units import BASE, Unit, parse
 
+Scalar = TypeVar("Scalar")
 Start = float | bool | str | bytes | None
 INTEGERS = (
     "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration",
@@ -47,6 +50,28 @@ def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str,
             exponents = tuple(int(base.get(key, "0")) for key in BASE)
             units[name] = Unit(name, exponents, factor, offset)
     return units
+
+
+def counted(where: str, name: str, variables: Mapping[str, Scalar]) -> list[Scalar]:
+    """Scalars that count up from `name[0]` or `name[1]`; none where there are none.
+
+    Raises:
+        UnknownNameError: one of them is missing: a value for all would set some.
+    """
+    numbers = sorted(
+        int(index) for one in variables
+        if one.startswith(f"{name}[") and one.endswith("]")
+        and (index := one[len(name) + 1 : -1]).isdecimal()
+    )  # fmt: skip
+    if not numbers:
+        return []
+    gap = sorted({*range(min(numbers[0], 1), numbers[-1])} - {*numbers})
+    if gap:
+        raise UnknownNameError(
+            f"{where}: {name!r} is no vector, since it has {name}[{numbers[0]}] to "
+            f"{name}[{numbers[-1]}] and no {name}[{gap[0]}]; name the elements one by one"
+        )
+    return [variables[f"{name}[{number}]"] for number in numbers]
 
 
 def initial_of(given: str | None, causality: str, variability: str) -> str:

@@ -19,7 +19,16 @@ from ..errors import FmuFileError, UnknownNameError, listing
 from ..reading import markup
 from ..reading.limits import TEXT, VALUES
 from ..spec.units import Unit
-from .attributes import Start, Types, initial_of, number_of, read_units, start_of, unit_of
+from .attributes import (
+    Start,
+    Types,
+    counted,
+    initial_of,
+    number_of,
+    read_units,
+    start_of,
+    unit_of,
+)  # fmt: skip
 from .metadata import read_metadata
 
 Causality = Literal[
@@ -213,15 +222,7 @@ class Description:
                     else f"{self.name}: {whole.name} is an array without elements"
                 )
             return [whole.element(names.index(wanted))]
-        for first in (1, 0):
-            found: list[Variable] = []
-            while f"{name}[{first + len(found)}]" in self.variables:
-                found.append(self.variables[f"{name}[{first + len(found)}]"])
-            if found:
-                if first == 1 and f"{name}[0]" in self.variables:
-                    found.insert(0, self.variables[f"{name}[0]"])
-                return found
-        return [self.find(name)]
+        return counted(self.name, name, self.variables) or [self.find(name)]
 
     def whole(self, name: str) -> Variable:
         """The variable of the FMU that holds a scalar element (`x` for `x[2]` of an array)."""

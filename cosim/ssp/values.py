@@ -201,6 +201,8 @@ def _read_set(root: ET.Element, file: File) -> list[tuple[str, Value]]:
         inner = next((child for child in parameter if child.tag.startswith(f"{{{SSV}}}")), None)
         if inner is None:
             raise file.error(f"{origin} has no value")
+        if name in (known for known, _ in found):
+            raise file.error(f"{origin} is given twice in one set; the standard allows one")
         found.append((name, _read_value(inner, units, origin, file)))
     return found
 

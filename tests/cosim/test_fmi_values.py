@@ -10,7 +10,14 @@ import pytest
 
 import cosim
 from cosim import Constant, Master, Recording, System, Table, read_recording
-from cosim.errors import CosimError, GraphError, ScenarioError, StepError, ValueRangeError
+from cosim.errors import (
+    CosimError,
+    GraphError,
+    ScenarioError,
+    StepError,
+    UnknownNameError,
+    ValueRangeError,
+)
 from cosim.files import flatten
 from cosim.master import kernel
 from sources.packaging.kernel import build_kernel
@@ -479,6 +486,24 @@ def test_scalars_that_count_from_zero_are_a_vector(fmi: int, tmp_path: Path) -> 
     assert short(alone(fmu, {"x": 7.0}))["a.y"].tolist() == [[7.0] * 3] * 5
     assert short(alone(fmu, {"x": [1.0, 2.0, 3.0]}))["a.y"].tolist() == [[1.0, 2.0, 3.0]] * 5
     assert short(alone(fmu), inputs={"a.x[0]": 7.0})["a.y"].tolist() == [[7.0, 0.0, 0.0]] * 5
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [((0, 2), r"has x\[0\] to x\[2\] and no x\[1\]"), ((1, 2, 4), r"no x\[3\]"),
+     ((2, 3), r"no x\[1\]")],
+)  # fmt: skip
+def test_scalars_with_one_missing_are_no_vector(
+    numbers: tuple[int, ...], told: str, tmp_path: Path
+) -> None:
+    """One value for all would set those before the gap."""
+    variables = [V(f"x[{k}]", "Float64", "input", "0") for k in numbers]
+    fmu = tiny(tmp_path, [*variables, V("y", "Float64", "output")])
+    with pytest.raises(UnknownNameError, match=told):
+        short(alone(fmu, {"x": 7.0}))
+    with pytest.raises(UnknownNameError, match=told):
+        short(alone(fmu), inputs={"a.x": 7.0})
+    short(alone(fmu), inputs={f"a.x[{numbers[-1]}]": 7.0})
 
 
 def test_structural_parameters_are_refused_in_one_sentence(tmp_path: Path) -> None:

@@ -55,6 +55,8 @@ TWO = component("a", A) + component("b", A)
          r"parameter 'a' is of type Binary, which cannot be given to an FMU"),
         (system(component("a", A, binding(ssv(real("a", "1 2"))))),
          r"parameter 'a' has 2 values, but a.a takes 1"),
+        (system(component("a", A, binding(ssv(real("a", "1"), real("a", "2"))))),
+         r"parameter 'a' is given twice in one set"),
         (system(component("a", A, binding("<x/>"))), r"of a has neither source nor ParameterSet"),
         (system(""), "holds no FMU"),
     ],
