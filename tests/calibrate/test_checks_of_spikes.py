@@ -61,3 +61,19 @@ def test_a_jolt_that_the_model_lacks_is_no_fault_where_the_command_switches(nois
     )
     runs = [replace(r, data=data) if r.name == "stairs" else r for r in problem.runs]
     assert found(problem.changed(runs=runs)) == []
+
+
+@pytest.mark.parametrize("size", [1, 40])
+def test_steps_of_one_count_are_no_spikes(noisy, size: int) -> None:
+    """The twin stands out by many counts."""
+    problem = noisy(0)
+    index = [c.name for c in problem.channels].index("speed")
+    count = 10.0 * problem.sigma[index]
+    run = problem.run("stairs")
+    data = run.data.copy()
+    data[:, index] = count * np.rint(data[:, index] / count)
+    at = next(k for k in range(50, len(data)) if np.ptp(data[k - 40 : k + 40, index]) == 0.0)
+    data[at, index] += size * count
+    told = found(problem.changed(runs=[replace(run, data=data)]))
+    assert ("spikes" in {f.kind for f in told}) == (size > 1)
+    assert f"give quantum = {count:.6g} in [channels]" in told[0].text

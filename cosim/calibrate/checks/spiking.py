@@ -29,6 +29,11 @@ with less, a model that leaves noise still passes for one, whether they are faul
 the machine that hide in the noise of the other columns."""
 
 
+ONE = 1.25
+"""Counts that the step of one is at most, with what rounding of a log does."""
+COUNTED, WHOLE, SAME = 50, 0.01, 1e-6
+"""Changes of a column that tell whether it counts; by how much a step of counts may miss whole ones
+(numbers in logs have digits); and the share of the largest step below which one is rounding."""
 OUTSIDE = 3.0
 """Times the range of all other values by which a command lies outside of it."""
 USUAL = 1.5
@@ -95,7 +100,16 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             found = spikes(values, channel.sigma)
             if run.name in models:
                 found &= spikes(values - models[run.name][:, index], channel.sigma)
-            at = np.flatnonzero(found)
+            quantum = _quantum(values)
+            flickers = found & (np.abs(_bent(values)) < ONE * quantum)
+            if flickers.any():
+                text = (
+                    f"is whole multiples of {quantity(quantum, channel.unit, '.6g')}, which single "
+                    "samples show as steps of one: counts of an encoder, say; give "
+                    f"quantum = {quantum:.6g} in [channels], in the channel's unit"
+                )
+                yield Finding("warning", "noise", run.name, channel.name, text)
+            at = np.flatnonzero(found & ~flickers)
             alone = [k for k in at if not _shows(
                 rests if _beyond(problem, models, run.name, index, int(k)) else bends,
                 run.name, index, int(k),
@@ -115,6 +129,17 @@ def check_spikes(problem: Problem, models: Mapping[str, Vector]) -> Iterator[Fin
             )
             severity = "error" if harm > HARM else "warning"
             yield Finding(severity, "spikes", run.name, channel.name, text)
+
+
+def _quantum(values: Vector) -> float:
+    """Of what values are whole multiples apart, 0 where they are not."""
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    steps = steps[steps > 0.0]
+    if steps.size < COUNTED:
+        return 0.0
+    least = float(np.min(steps[steps > SAME * np.max(steps)]))
+    counts = steps[steps > SAME * np.max(steps)] / least
+    return least if np.max(np.abs(counts - np.rint(counts))) < WHOLE else 0.0
 
 
 def without_spikes(values: Vector, sigma: float) -> Vector:
