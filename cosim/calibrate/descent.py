@@ -88,6 +88,7 @@ class Descent:
         self.unkept, self.valley = 0.0, False
         self.damping, self.length = FIRM, STEPS[-1]
         self.begun = simulator.evaluations if begun is None else begun
+        self.refused: tuple[Vector, str] | None = None
         self.drawn = drawn(problem)
         self.products, self.straight = pairs(problem), np.zeros(self.theta.size)
         self.residuals = simulator.residuals(self.theta, self.purpose)
@@ -147,7 +148,8 @@ class Descent:
         """Residuals and cost at a point, None if it cannot be simulated."""
         try:
             residuals = self.simulator.residuals(theta, self.purpose)
-        except FmuCallError:
+        except FmuCallError as error:
+            self.refused = theta, str(error)
             return None
         return residuals, self.total(theta, residuals)
 
@@ -156,6 +158,7 @@ class Descent:
         if seen is None or not seen[1] < self.cost:
             return False
         self.theta, (self.residuals, self.cost) = theta, seen
+        self.refused = None
         return True
 
     def meet(self, theta: Vector, residuals: list[tuple[str, Vector]], cost: float) -> None:

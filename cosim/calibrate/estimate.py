@@ -61,6 +61,7 @@ class Estimate:
         evaluations: simulated runs of the fit.
         jacobian, residuals: at the solution, by run.
         unkept: what the last step of a quick fit promised and did not gain [nats]; it has stalled.
+        refused: values beyond the last ones that could not be simulated, and why.
     """
 
     simulator: Simulator
@@ -78,6 +79,7 @@ class Estimate:
     jacobian: list[Sensitivity] = field(repr=False)
     residuals: list[tuple[str, Vector]] = field(repr=False)
     unkept: float = 0.0
+    refused: tuple[Vector, str] | None = None
 
     @property
     def problem(self) -> Problem:
@@ -215,6 +217,7 @@ def estimated(run: Descent, *, confirm: bool = False) -> Estimate:
         jacobian=run.jacobian,
         residuals=run.residuals,
         unkept=run.unkept,
+        refused=run.refused,
     )
 
 

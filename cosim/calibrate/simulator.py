@@ -16,7 +16,7 @@ import numpy as np
 
 from ..data.segments import relative_pose
 from ..data.signals import Shifted, Signal, Table
-from ..errors import FmuCallError, ValueRangeError
+from ..errors import FmuCallError, StepError, ValueRangeError
 from ..master.cores import cores
 from ..master.elsewhere import Elsewhere, locked
 from ..master.master import Master
@@ -238,6 +238,12 @@ class Simulator:
             raise
         ran = Ran(session.names, times, rows, session.work, run.inputs)
         self._pool.give(key, session, run.inputs)
+        if (ended := float(times[-1])) < run.times[-1] - run.interval:
+            raise StepError(
+                f"run {run.name}: an FMU asked to end the simulation at {ended:g} s, and the log "
+                f"goes on to {run.times[-1]:g} s; end the run there, or ask why it ends",
+                time=ended,
+            )
         if self._pool.remember(key, which, ran):
             with self._lock:
                 self.evaluations += 1

@@ -114,6 +114,8 @@ def calibrate_command(
         beside = None if problem.unstable else partial(_beside_intervals, settled, unused)
         for line in _far(content["channels"], beside):
             typer.echo(f"warning: {line}", err=True)
+        if estimate.refused:
+            typer.echo(f"warning: {_refused(estimate)}", err=True)
         content["exchange"] = exchange.to_dict()
         content["evaluations"] = simulator.evaluations + exchange.evaluations
         content["wall_s"] = time.perf_counter() - started
@@ -151,6 +153,22 @@ def _beside_intervals(unused: Estimate, residuals: Residuals) -> dict[str, float
     except CosimError:  # it cannot be simulated beside its parameters: as they are, then
         beside = residuals
     return channel_rms(unused.problem, beside)
+
+
+def _refused(estimate: Estimate) -> str:
+    """What the fit wanted and could not have."""
+    problem, (theta, why) = estimate.problem, estimate.refused or (estimate.theta, "")
+    moved = {
+        p.name: f"{p.name} = {there:.4g}"
+        for p, here, there in zip(
+            problem.parameters, estimate.theta.tolist(), theta.tolist(), strict=True
+        )
+        if abs(there - here) > 1e-9 * p.scale
+    }
+    return (
+        f"the fit ended beside values that cannot be simulated ({', '.join(moved.values())}): "
+        f"{why}; if the machine may be there, values and intervals are wrong"
+    )
 
 
 def _far(channels: dict[str, Any], beside: Callable[[], dict[str, float]] | None) -> list[str]:

@@ -100,10 +100,9 @@ def _print(result: Monitored, page: Path) -> None:
     from ..monitor.result import VERDICTS
 
     console = open_console(120)
-    logs = result.series.logs
     console.print(
-        f"{result.series.name}: {VERDICTS[result.verdict].lower()}. {len(logs)} logs from "
-        f"{result.dated(0)} to {result.dated(len(logs) - 1)}, by the {result.series.dated}",
+        f"{result.series.name}: {VERDICTS[result.verdict].lower()}. {result.span}, "
+        f"by the {result.series.dated}",
         soft_wrap=True, markup=False, highlight=False,
     )  # fmt: skip
     for change in result.changes:

@@ -145,7 +145,8 @@ def _usable(series: Series) -> tuple[Series, list[str]]:
     if len(kept) == len(series.logs):
         return series, warnings
     return replace(
-        series, logs=tuple(kept), problem=problem.only(n for log in kept for n in log.runs)
+        series, logs=tuple(kept), problem=problem.only(n for log in kept for n in log.runs),
+        left_out=len(series.logs) - len(kept),
     ), warnings  # fmt: skip
 
 

@@ -78,6 +78,13 @@ class Monitored:
     wall: float
 
     @property
+    def span(self) -> str:
+        """How many logs, from when to when, and how many were no use."""
+        logs, left_out = self.series.logs, self.series.left_out
+        beside = f" ({left_out} more cannot be used)" if left_out else ""
+        return f"{len(logs)} logs from {self.dated(0)} to {self.dated(len(logs) - 1)}{beside}"
+
+    @property
     def changes(self) -> list[Change]:
         """By date."""
         return self.found.changes

@@ -60,12 +60,14 @@ class Series:
         problem: the model, its parameters and all runs.
         logs: by date.
         dated: one of `SOURCES`.
+        left_out: how many more there are, which cannot be used.
     """
 
     name: str
     problem: Problem
     logs: tuple[DatedLog, ...]
     dated: str
+    left_out: int = 0
 
 
 def read_series(

@@ -58,8 +58,7 @@ def monitor_page(result: Monitored) -> str:
 
 
 def _headline(result: Monitored) -> str:
-    logs = result.series.logs
-    span = f"{len(logs)} logs from {result.dated(0)} to {result.dated(len(logs) - 1)}"
+    span = result.span
     if not result.changes:
         return f"In {span} nothing has changed beyond what differs from log to log."
     dates = dict.fromkeys(result.dated(c.profile.first) for c in result.changes)

@@ -194,7 +194,7 @@ def _mapped(
 
 def _read_set(root: ET.Element, file: File) -> list[tuple[str, Value]]:
     units = units_of(root, "ssv", file)
-    found = []
+    found: list[tuple[str, Value]] = []
     for parameter in root.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
         name = parameter.get("name", "")
         origin = f"parameter {name!r}"

@@ -33,7 +33,7 @@ ONE = 1.25
 """Counts that the step of one is at most, with what rounding of a log does."""
 COUNTED, WHOLE, SAME = 50, 0.01, 1e-6
 """Changes of a column that tell whether it counts; by how much a step of counts may miss whole ones
-(numbers in logs have digits); and the share of the largest step below which one is rounding."""
+(numbers in logs have digits); and the share of the usual step below which one is rounding."""
 OUTSIDE = 3.0
 """Times the range of all other values by which a command lies outside of it."""
 USUAL = 1.5
@@ -137,9 +137,9 @@ def _quantum(values: Vector) -> float:
     steps = steps[steps > 0.0]
     if steps.size < COUNTED:
         return 0.0
-    least = float(np.min(steps[steps > SAME * np.max(steps)]))
-    counts = steps[steps > SAME * np.max(steps)] / least
-    return least if np.max(np.abs(counts - np.rint(counts))) < WHOLE else 0.0
+    steps = steps[steps > SAME * np.median(steps)]
+    counts = steps / np.min(steps)
+    return float(np.min(steps)) if np.max(np.abs(counts - np.rint(counts))) < WHOLE else 0.0
 
 
 def without_spikes(values: Vector, sigma: float) -> Vector:
