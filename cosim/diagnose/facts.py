@@ -259,6 +259,7 @@ class Table:
         opened: the declared model with the bounds opened at which its parameters ended, if it was
             fitted.
         bounds: these parameters' values in it, with the bounds that they have in the mapping.
+        columns: number of columns that are measured or drive the system; 0 if not known.
     """
 
     models: tuple[Model, ...] = ()
@@ -271,6 +272,7 @@ class Table:
     stopped: str = ""
     opened: Model | None = None
     bounds: tuple[Value, ...] = ()
+    columns: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """For a file; `read` is the inverse."""

@@ -87,6 +87,7 @@ def table_of(
         stopped=stopped,
         opened=_opened(judge, declared),
         bounds=beyond(declared, judge.lifted) if judge.lifted else (),
+        columns=len(declared.problem.channels) + len(declared.problem.runs[0].inputs),
     )
     models = [_foretold(judge, table, *pair) for pair in zip(models, fits, strict=True)]
     table = replace(table, models=(*models, *rough))

@@ -21,6 +21,7 @@ from dataclasses import replace
 from itertools import permutations
 
 from .answer import Hint, Verdict, over, past, percent
+from .candidates import DELAY, LOG
 from .facts import Force, Gain, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
 from .models import GATE_Z, LEVEL
@@ -136,6 +137,9 @@ def doubts(table: Table, model: Model) -> list[str]:
         )
     elif model.beyond is not None and not wanted(model.beyond, table.candidates):
         found.append(f"the declared model does no worse with {past(table.bounds)}")
+    late = {law.label for law in model.laws if (law.component, law.effect) == (LOG, DELAY)}
+    if 0 < table.columns <= len(late):
+        found.append("it delays every column of the log, which is no delay of any")
     for law in model.laws:
         if not law.there:
             edge = max(law.absent, law.size.minimum)

@@ -326,6 +326,16 @@ def test_each_law_of_a_set_must_be_missed() -> None:
     assert decide(table(FAR, model(law(), unknown))).kind == "unexplained"
 
 
+@pytest.mark.parametrize("columns", [3, 4])
+def test_delays_of_all_columns_of_a_log_are_none(columns: int) -> None:
+    """Only delays against each other can be seen; the twin has a column that is in time."""
+    late = [law("delay", f"log.{name}") for name in ("u", "y", "phi")]
+    found = decide(replace(table(FAR, model(*late)), columns=columns))
+    assert found.kind == ("unexplained" if columns == 3 else "effect_found")
+    if columns == 3:
+        assert any("delays every column of the log" in why for why in found.hints[0].why)
+
+
 def test_two_laws_that_the_data_do_not_tell_apart_are_confounded() -> None:
     rivals = (model(law(), gain=1.0), model(law("cogging", "motor.shaft")))
     found = decide(table(FAR, *rivals, alike=((1, 2),)))
