@@ -153,7 +153,7 @@ def within(where: str) -> Iterator[None]:
 
 def listing(names: Iterable[str], wanted: str = "", limit: int = 12) -> str:
     """Name what exists, nearest to `wanted` first, for the end of an error text."""
-    everything = list(names)
+    everything = list(dict.fromkeys(names))
     if not everything:
         return "there is none"
     # what differs in case only is near
