@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..data.signals import Signal
 from ..errors import ValueRangeError
-from ..fmu.description import Variable
+from ..fmu.variables import Variable
 from ..spec.hints import NO_HINTS, SearchHints
 from ..spec.units import parse
 from .whitening import InputNoise

@@ -24,7 +24,7 @@ from typing import Any
 from ..calibrate.model import Model
 from ..calibrate.parts import Channel, MeasuredRun
 from ..calibrate.problem import Problem
-from ..fmu.description import Variable
+from ..fmu.variables import Variable
 from ..spec.units import ANY, Unit, conversion, parse
 from ..system.system import Connection, System
 from ..system.toml import DeclaredConnection

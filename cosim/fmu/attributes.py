@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..data.text import spelled
-from ..errors import UnknownNameError
+from ..errors import UnknownNameError, listing
+from ..reading.schema import shown
 from ..spec.units import BASE, Unit, parse
 
 Scalar = TypeVar("Scalar")
@@ -29,12 +30,114 @@ _DEFAULT_INITIAL = {
                    "independent": ""},
 }  # fmt: skip
 """Initial by variability and causality where it is not given; both tables of FMI agree."""
+VARIABILITIES = tuple(_DEFAULT_INITIAL)
+INITIALS = ("exact", "approx", "calculated")
+
+
+class Unsound(ValueError):
+    """A description that cannot be used; the text says why and the way out."""
+
+
+def named(element: ET.Element) -> str:
+    """An element in an error text."""
+    tag, name = element.tag.rpartition("}")[2], element.get("name")
+    return f"<{tag}>" if name is None else f"<{tag}> {shown(name)}"
+
+
+def needed(element: ET.Element, key: str) -> str:
+    """An attribute that must be there.
+
+    Raises:
+        Unsound: it is not.
+    """
+    text = element.get(key)
+    if text is None:
+        raise Unsound(f"{named(element)} has no {key}")
+    return text
+
+
+def one_of(element: ET.Element, key: str, words: Iterable[str], default: str) -> str:
+    """An attribute that is one of some words, spelled like them.
+
+    Raises:
+        Unsound: it is another.
+    """
+    text = element.get(key, default)
+    if text not in words and text != default:
+        raise Unsound(f"{named(element)} has {key} {shown(text)}; {listing(words, text)}")
+    return text
+
+
+def integer_of(element: ET.Element, key: str) -> int:
+    """An attribute that must be a whole number.
+
+    Raises:
+        Unsound: it is missing, or none.
+    """
+    return _read(element, key, needed(element, key), whole_of)
+
+
+def wholes_of(element: ET.Element, key: str) -> list[int]:
+    """An attribute that is a list of whole numbers, empty where it is not given.
+
+    Raises:
+        Unsound: one is none.
+    """
+    return [_read(element, key, item, whole_of) for item in element.get(key, "").split()]
 
 
 def number_of(element: ET.Element, key: str) -> float | None:
-    """A floating-point attribute, None where it is not given."""
+    """A floating-point attribute, None where it is not given.
+
+    Raises:
+        Unsound: it is no number.
+    """
     text = element.get(key)
-    return None if text is None else float(text)
+    return None if text is None else _read(element, key, text, float_of)
+
+
+def _read(element: ET.Element, key: str, text: str, reader: Callable[[str], Scalar]) -> Scalar:
+    try:
+        return reader(text)
+    except ValueError as error:
+        raise Unsound(f"{named(element)} has {key} = {shown(text)}, {error}") from None
+
+
+def whole_of(text: str) -> int:
+    """A whole number as XML writes it.
+
+    Raises:
+        ValueError: it is none; the text says so.
+    """
+    try:
+        return int("" if "_" in text else text)  # Python takes 1_000 for a number
+    except ValueError:
+        raise ValueError("which is no whole number") from None
+
+
+def float_of(text: str) -> float:
+    """A number as XML writes it.
+
+    Raises:
+        ValueError: it is none; the text says so.
+    """
+    try:
+        return float("" if "_" in text else text)
+    except ValueError:
+        raise ValueError("which is no number") from None
+
+
+def _truth_of(text: str) -> bool:
+    if text not in ("true", "1", "false", "0"):
+        raise ValueError("which is neither true nor false")
+    return text in ("true", "1")
+
+
+def _bytes_of(text: str) -> bytes:
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise ValueError("which are no hexadecimal digits") from None
 
 
 def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str, Unit]:
@@ -44,10 +147,11 @@ def read_units(elements: Iterable[ET.Element], namespace: str = "") -> dict[str,
         base = element.find(f"{namespace}BaseUnit")
         name = element.get("name", "")
         if base is not None:
-            factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+            factor, offset = number_of(base, "factor"), number_of(base, "offset")
+            factor, offset = 1.0 if factor is None else factor, offset or 0.0
             if not (math.isfinite(factor) and factor and math.isfinite(offset)):
-                raise ValueError(f"unit {name!r} has factor {factor} and offset {offset}")
-            exponents = tuple(int(base.get(key, "0")) for key in BASE)
+                raise Unsound(f"unit {name!r} has factor {factor} and offset {offset}")
+            exponents = tuple(integer_of(base, key) if key in base.attrib else 0 for key in BASE)
             units[name] = Unit(name, exponents, factor, offset)
     return units
 
@@ -79,20 +183,25 @@ def initial_of(given: str | None, causality: str, variability: str) -> str:
     return given or _DEFAULT_INITIAL.get(variability, {}).get(causality, "")
 
 
-def start_of(text: str | None, type_: str) -> tuple[Start, ...]:
-    """Start values as one attribute has them, () where it is not given."""
+def start_of(element: ET.Element, type_: str, key: str = "start") -> tuple[Start, ...]:
+    """Start values as one attribute has them, () where it is not given.
+
+    Raises:
+        Unsound: they are of another type.
+    """
+    text = element.get(key)
     if text is None:
         return ()
     if type_ == "String":
         return (text,)
     if type_ == "Binary":
-        return (bytes.fromhex(text),)
-    items = text.split()
+        return (_read(element, key, text, _bytes_of),)
+    reader: Callable[[str], Any] = float_of
     if type_.startswith("Boolean"):
-        return tuple(item in ("true", "1") for item in items)
-    if type_ in INTEGERS:
-        return tuple(int(item) for item in items)
-    return tuple(float(item) for item in items)
+        reader = _truth_of
+    elif type_ in INTEGERS:
+        reader = whole_of
+    return tuple(_read(element, key, item, reader) for item in text.split())
 
 
 class Types:
@@ -112,14 +221,14 @@ class Types:
     def number(self, element: ET.Element, key: str) -> float | None:
         """The same of a floating-point attribute."""
         text = self.get(element, key)
-        return None if text is None else float(text)
+        return None if text is None else _read(element, key, text, float_of)
 
     def items(self, element: ET.Element) -> dict[int, str]:
         """Names of the values of an enumeration; FMI 2 counts from 1 where it does not say."""
         declared = self._types.get(element.get("declaredType", ""))
         found = [] if declared is None else declared.findall("Item")
         return {
-            int(item.get("value", index)): item.get("name", "")
+            integer_of(item, "value") if "value" in item.attrib else index: item.get("name", "")
             for index, item in enumerate(found, start=1)
         }
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError, FmuFileError
-from .description import Variable
 from .values import NUMBERS, OBJECTS, TYPES, fitting, refusal
+from .variables import Variable
 
 Vector = NDArray[np.float64]
 Objects = NDArray[np.object_]

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuCallError
-from .description import Variable
 from .values import fitting
+from .variables import Variable
 
 Vector = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ValueRangeError, listing
 from ..reading.schema import is_finite, shown
 from .attributes import INTEGERS
-from .description import Variable
+from .variables import Variable
 
 NUMBERS: dict[str, Any] = {
     "Float64": np.float64, "Float32": np.float32, "Float32Whole": np.float32,
@@ -35,6 +35,8 @@ OBJECTS: dict[str, Any] = {
 """Types that travel as objects; strings and binaries are addresses in memory."""
 TYPES = (*NUMBERS, *OBJECTS)
 """Types whose values can be exchanged: all but clocks."""
+_PLAIN = {"Boolean2": "Boolean", "Enumeration2": "Enumeration", "Float32Whole": "Float32"}
+"""What FMI calls them."""
 ROUNDING = 1e-9
 """Largest distance from a whole number: gains and units of a connection cost some bits of 1e-16,
 and nobody means an integer by a number that is farther away."""
@@ -82,8 +84,7 @@ def whole_number(value: Any) -> int | None:
 
 def refusal(type_: str, value: Any) -> str:
     """Why a type does not carry a number."""
-    plain = {"Boolean2": "Boolean", "Enumeration2": "Enumeration", "Float32Whole": "Float32"}
-    name = plain.get(type_, type_)
+    name = _PLAIN.get(type_, type_)
     if type_ == "Float32Whole" and abs(value) <= float(np.finfo(np.float32).max):
         return f"{int(value)} is an integer that type {name} does not carry exactly"
     if isinstance(value, float) and (boolean(type_) or not bool(whole(value))):
@@ -161,6 +162,11 @@ def _checked(where: str, variable: Variable, value: Any) -> Any:
         return found[0]
     if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
         raise ValueRangeError(f"{where}: {name} = {shown(value)} is not a number")
+    if isinstance(value, (bool, np.bool_)) and type_.startswith("Enumeration"):
+        raise ValueRangeError(
+            f"{where}: {name} = {str(bool(value)).lower()} is a truth value, and {name} an "
+            "enumeration; give the name or the number of an item"
+        )
     if not is_finite(value):
         raise ValueRangeError(f"{where}: {name} = {shown(value)} is not finite")
     number: Any = float(value)

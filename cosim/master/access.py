@@ -13,9 +13,9 @@ import numpy as np
 from ..arguments import need_number
 from ..data.signals import SignalVector, Table
 from ..errors import GraphError, UnitError, UnknownNameError, ValueRangeError, listing
-from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.values import check_values
+from ..fmu.variables import Variable
 from ..spec.units import change
 from ..system.inputs import Driver
 from .driven import DrivenInputs

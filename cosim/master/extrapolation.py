@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..arguments import need_table, need_whole
 from ..errors import UnknownNameError, ValueRangeError, listing
-from ..fmu.description import Description, Variable
+from ..fmu.description import Description
+from ..fmu.variables import Variable
 from ..system.system import System
 from .plan import PARTS, Layout, Mean, Op
 

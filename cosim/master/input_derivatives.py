@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.description import Variable
 from ..fmu.instance import Instance
+from ..fmu.variables import Variable
 from ..system.system import System
 from .plan import Op, Plan
 

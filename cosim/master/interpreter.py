@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ..errors import AlgebraicLoopError, EndRequest, FmuCallError
 from ..fmu.assignment import Assignment
 from ..fmu.attributes import INTEGERS
-from ..fmu.description import Variable
 from ..fmu.exchange import Block
 from ..fmu.instance import Instance
 from ..fmu.intermediate import Moved
+from ..fmu.variables import Variable
 from .extrapolation import continuous, derivatives_at_begin, mean_of_part, mean_of_step
 from .input_derivatives import InputDerivatives, asked_for
 from .newton import Newton, floor

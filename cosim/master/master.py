@@ -41,6 +41,9 @@ from .outline import Outline
 from .plan import Plan
 
 Vector = NDArray[np.float64]
+UNEVEN = 0.01
+"""Part of a step by which its length may be off because times of day are rounded: 0.2 us beside
+steps of 24 us at 2e9 s, the seconds since 1970. Results err by about as much."""
 
 
 @dataclass(frozen=True)
@@ -230,6 +233,12 @@ class Master:
             raise ValueRangeError(
                 f"duration {duration:.9g} s is not a whole number of steps of {self.step:.9g} s; "
                 f"take a duration of {fitting:.9g} s or another step"
+            )
+        apart = float(np.spacing(max(abs(start), abs(start + duration))))
+        if apart > UNEVEN * self.step:
+            raise ValueRangeError(
+                f"start {start:.9g} s: floating-point numbers are {apart:.3g} s apart there, too "
+                f"far for steps of {self.step:.9g} s; let the run begin at 0, or take longer steps"
             )
         return count
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from ..errors import VariantError, listing
 from ..files import write_text
-from ..fmu.description import Description, Variable
+from ..fmu.description import Description
+from ..fmu.variables import Variable
 from ..installation.builder import components
 from ..spec.variant import parse_name
 from ..system.provider import Provider

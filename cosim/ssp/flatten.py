@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ..errors import ConnectError, UnitError, listing
 from ..fmu.archive import Fmu, open_fmu
-from ..fmu.description import Variable
+from ..fmu.variables import Variable
 from ..spec.units import Unit, conversion
 from .document import Element, End, File, Link, Structure, Transformation
 

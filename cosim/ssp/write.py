@@ -19,8 +19,8 @@ from ..data.signals import Constant, Signal, objects
 from ..errors import GraphError, InputError, UnitError
 from ..files import atomic
 from ..fmu.archive import Fmu
-from ..fmu.description import Variable
 from ..fmu.values import TYPES, check_values
+from ..fmu.variables import Variable
 from ..spec.units import change, usual
 from ..system.inputs import Driver, spread
 from ..system.system import Connection, Member, System

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..data.signals import Constant, Signal, SignalVector, as_signal
 from ..errors import ConnectError, GraphError, UnknownNameError, listing
-from ..fmu.description import Variable
 from ..fmu.values import check_values
+from ..fmu.variables import Variable
 from .system import System
 
 Driver = (

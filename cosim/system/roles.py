@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ..errors import ConnectError, GraphError
-from ..fmu.description import Variable
+from ..fmu.variables import Variable
 
 
 def need_settable(where: str, instance: str, variables: Iterable[Variable]) -> None:

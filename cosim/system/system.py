@@ -20,8 +20,9 @@ from typing import Any
 
 from ..errors import ConnectError, GraphError, UnitError, UnknownNameError, listing
 from ..fmu.archive import Fmu, open_fmu
-from ..fmu.description import Description, PowerPort, Variable
+from ..fmu.description import Description, PowerPort
 from ..fmu.values import TYPES, boolean, check_values, plain
+from ..fmu.variables import Variable
 from ..spec.units import conversion
 from . import feedthrough
 from .provider import Provider, locate

@@ -54,6 +54,7 @@ def test_system_of_a_master() -> None:
         ({"every": 1.5}, "every of a run must be a whole number, not 1.5"),
         ({"start": None}, "start of a run must be a number, not None"),
         ({"start": float("nan")}, "start nan s is not finite"),
+        ({"start": 1e17}, "numbers are 16 s apart there, too far for steps of 0.001 s; let"),
         ({"inputs": ["load.tau"]}, "inputs of a run must be a table"),
         ({"inputs": {3: 1.0}}, "a name in inputs of a run must be a text, not 3"),
         ({"inputs": {"load.tau": None}}, "what drives an input must be a signal, .* not None"),

@@ -320,6 +320,8 @@ def test_enumerations_by_name_and_by_number(fmi: int, tmp_path: Path) -> None:
         alone(fmu, {"mode": 3})
     with pytest.raises(ValueRangeError, match=rf"'fats' {items}.*fast"):
         alone(fmu, {"mode": "fats"})
+    with pytest.raises(ValueRangeError, match="mode = true is a truth value, and mode an enumera"):
+        alone(fmu, {"mode": True})
     for given in (["off", "fats"], [1, 3], [1.0, 1.5]):
         with pytest.raises(ValueRangeError, match=r"input a\.mode from table"):
             short(alone(fmu), inputs={"a.mode": Table([0.0, 0.1], given, extend=True)})

@@ -51,6 +51,29 @@ def test_px4(tmp_path: Path) -> None:
         inspect(tmp_path / "y.ulg")
 
 
+def test_a_log_of_px4_that_was_cut_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("pyulog", reason="reads logs of PX4: pip install pyulog")
+    whole = ulog(tmp_path / "x.ulg").read_bytes()
+
+    def notes(content: bytes) -> list[str]:
+        (tmp_path / "y.ulg").write_bytes(content)
+        topic = inspect(tmp_path / "y.ulg").topics[0]
+        return [f.text for f in topic.findings if f.kind == "reading"]
+
+    assert notes(whole) == ["times count from the start"]
+    assert "the file ends 20 bytes into a message: it was cut" in notes(whole[:-5])[1]
+    assert "the file ends 2 bytes into a message" in notes(whole[:-23])[1]
+    assert len(notes(whole[:-25])) == 1
+    lost = struct.pack("<HBH", 2, ord("O"), 250)
+    assert "the logger lost messages 1 times, for 250 ms" in notes(whole + lost)[1]
+    spoilt = bytearray(whole)
+    spoilt[-25:] = struct.pack("<HBH", 22, ord("D"), 777) + bytes(20)
+    assert "the file is damaged" in notes(bytes(spoilt))[1]
+    assert capsys.readouterr().out == ""
+
+
 def test_px4_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyulog", None)
     with pytest.raises(InputError, match="not installed; pip install pyulog"):

@@ -7,7 +7,7 @@ import re
 import xml.etree.ElementTree as ET
 
 from ..attributes import unit_of
-from ..description import FMI3_TYPES
+from ..variables import FMI3_TYPES
 from .finding import Findings
 from .model import RANGES, Model
 from .variables import value_of

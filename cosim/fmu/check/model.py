@@ -10,7 +10,7 @@ from typing import Literal
 
 from ...reading.markup import Markup
 from ..attributes import initial_of
-from ..description import FMI2_TYPES, FMI3_TYPES
+from ..variables import FMI2_TYPES, FMI3_TYPES
 
 FLOATS = ("Real", "Float64", "Float32")
 RANGES = {

@@ -11,13 +11,12 @@ import io
 import re
 import zipfile
 from pathlib import Path
-from typing import Literal
 
 from ...errors import FmuFileError
 from ...reading import archives, markup
 from ...reading.limits import TEXT, UNPACKED
 from ...spec.distribution import has
-from ..description import parse_description
+from ..description import fmi_of, parse_description
 from ..metadata import ENTRY, parse_metadata
 from .content import check_binaries, check_entries, check_folders, check_sources
 from .definitions import check_definitions
@@ -106,13 +105,13 @@ def _description(
     if parsed.root.tag != "fmiModelDescription" or not version:
         inside.error(f"is <{parsed.root.tag[:50]}>, not <fmiModelDescription>", _AGAIN, 1)
         return inside.found
-    if version != "2.0" and re.fullmatch(r"3\.\d+(-.*)?", version) is None:
+    fmi = fmi_of(version)
+    if fmi is None:
         inside.error(
             f"is of FMI version {version!r}", "2.0 and 3.0 can be run: export it for one of them",
             parsed.lines[parsed.root],
         )  # fmt: skip
         return inside.found
-    fmi: Literal[2, 3] = 2 if version == "2.0" else 3
     model = read_model(parsed, fmi)
     check_definitions(model, inside)
     check_variables(model, inside)

@@ -6,6 +6,9 @@ others are guessed by name. Attitudes `q[0..3]` (w, x, y, z) become roll, pitch 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,9 @@ from .messages import LONGEST, PARTS, beside_clock, turned
 
 Vector = NDArray[np.float64]
 ENDS = (".ulg", ".ulog")
+_HEAD = 16
+"""[bytes] Magic, version and time before the first message; each is its length in two bytes, its
+kind in one, and as much content (ULog file format)."""
 _UNITS = {
     "vehicle_local_position": {"x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s",
                                "ax": "m/s2", "ay": "m/s2", "az": "m/s2", "heading": "rad"},
@@ -54,8 +60,10 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
     if excess := DATA.excess(4 * path.stat().st_size):
         raise ScenarioError(f"{path}: {excess}")
     try:
-        found = ULog(str(path)).data_list
-        parts = {_name(item): item for item in found}
+        with redirect_stdout(StringIO()):  # it prints what is said below
+            log = ULog(str(path))
+        parts = {_name(item): item for item in log.data_list}
+        told = _damage(path, log)
     except Exception as error:  # of a parser that does not expect damaged files
         text = str(error).splitlines() or [type(error).__name__]
         raise ScenarioError(f"{path}: is no whole log of PX4 ({text[0][:200]})") from error
@@ -63,7 +71,7 @@ def read(path: Path, topics: tuple[str, ...]) -> Source:
         if name not in parts:
             raise ScenarioError(f"{path}: --topic {name}: {listing(parts, name, limit=30)}")
     left = {name: "not asked for" for name in parts if topics and name not in topics}
-    made = tuple(_topic(name, item) for name, item in parts.items() if name not in left)
+    made = tuple(_topic(name, item, told) for name, item in parts.items() if name not in left)
     return Source(path, "ulog", made, plain=False, left=left)
 
 
@@ -71,7 +79,35 @@ def _name(item: Any) -> str:
     return f"{item.name}_{item.multi_id}" if item.multi_id else str(item.name)
 
 
-def _topic(name: str, item: Any) -> Topic:
+def _damage(path: Path, log: Any) -> list[str]:
+    """What the file lacks, which its messages do not show."""
+    told = []
+    if log.file_corruption:
+        told.append("the file is damaged: messages that could not be read are left out")
+    elif rest := _rest(path.read_bytes()):
+        told.append(
+            f"the file ends {rest} bytes into a message: it was cut, or its machine lost its power"
+        )
+    if log.dropouts:
+        longest = max(item.duration for item in log.dropouts)
+        told.append(
+            f"the logger lost messages {len(log.dropouts)} times, for {longest:g} ms at the longest"
+        )
+    return told
+
+
+def _rest(content: bytes) -> int:
+    """Bytes of a message that the end of the file cuts, 0 if it ends with one."""
+    at, size = _HEAD, len(content)
+    while at < size:
+        begin = at
+        at += 3 + (content[at] | content[at + 1] << 8) if at + 3 <= size else 3
+        if at > size:
+            return size - begin
+    return 0
+
+
+def _topic(name: str, item: Any, told: Sequence[str]) -> Topic:
     clock, origin = integers(np.asarray(item.data["timestamp"]).tolist())
     columns: dict[str, Vector] = {}
     for field, values in item.data.items():
@@ -92,5 +128,6 @@ def _topic(name: str, item: Any) -> Topic:
         origins={"time": origin} if origin else {},
     )  # fmt: skip
     return Topic(
-        name, "PX4 message", log, clock="time", notes=("times count from the start", *notes, *said)
-    )
+        name, "PX4 message", log, clock="time",
+        notes=("times count from the start", *told, *notes, *said),
+    )  # fmt: skip
