@@ -10,9 +10,8 @@ Anything else is refused in one sentence.
 from __future__ import annotations
 
 import codecs
-import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -24,11 +23,11 @@ from numpy.typing import NDArray
 from ..errors import ScenarioError, UnitError
 from ..reading.limits import DATA
 from ..spec.units import parse
-from .cells import EXACT, Gaps, ambiguity, decimal_comma, numbers, thousands
+from . import dates
+from .cells import EXACT, Gaps, ambiguity, decimal_comma, integers, numbers, thousands
+from .rows import before, numeric, separator_of, split
 
 Vector = NDArray[np.float64]
-SEPARATORS = (";", "\t", ",", "|")
-"""Tried in this order: a comma may be in the numbers of a table that something else separates."""
 COMMENTS = ("#", "%")
 _CELL = 9
 """Bytes of memory per byte of a file: seven digits are a text of 56 and two pointers."""
@@ -91,6 +90,16 @@ class Table:
         if origin:
             self.origins[name] = origin
 
+    def add_clock(self, name: str, counts: Sequence[int | None]) -> None:
+        """Take a clock in that counts nanoseconds; None where there is no time."""
+        known = np.array([count is not None for count in counts], dtype=np.bool_)
+        values = np.full(known.size, np.nan)
+        values[known], origin = integers(count for count in counts if count is not None)
+        missing = int(known.size - known.sum())
+        self.units[name] = "ns"
+        self.add(name, values, Gaps(missing, count=known.size), origin,
+                 None if missing else [count for count in counts if count is not None])  # fmt: skip
+
 
 def spelled(unit: str) -> str:
     """A unit as `spec.units` spells it, "" if it knows none such."""
@@ -139,12 +148,18 @@ def text_table(path: Path) -> Table:
     lines = [line for line in lines if not line.startswith(COMMENTS)]
     if not lines:
         raise ScenarioError(f"{path}: is empty")
-    separator = told["separator"] if told else _separator(lines)
-    rows = list(_split(lines, separator, path))
+    if not told and (left := before(lines, path)):
+        table.notes.append(
+            f"{left} lines before the head of the table are left out ({lines[0].strip()[:40]!r} "
+            f"first); its head is {lines[left].strip()[:60]!r}"
+        )
+        lines = lines[left:]
+    separator = told["separator"] if told else separator_of(lines)
+    rows = list(split(lines, separator, path))
     heads = rows.pop(0)
-    if _numeric(heads):
-        last = next(_split([line[1:] for line in begin[-1:]], separator, path), [])
-        if len(last) != len(heads) or _numeric(last):
+    if numeric(heads):
+        last = next(split([line[1:] for line in begin[-1:]], separator, path), [])
+        if len(last) != len(heads) or numeric(last):
             raise ScenarioError(
                 f"{path}: its first row {lines[0][:60]!r} is numbers; the first row must name the "
                 "columns, e.g. time,speed"
@@ -191,8 +206,17 @@ def text_table(path: Path) -> Table:
                 "without separators of thousands, and all with one decimal mark"
             )
             gaps = replace(gaps, fault=fault)
+        times = dates.nanoseconds(cells) if gaps.text else None
+        if times is not None:
+            table.add_clock(name, times[0])
+            table.notes.append(f"column {name!r} holds {times[1]}")
+            continue
         table.units[name] = unit
         table.add(name, values, gaps, origin, exact_of(cells, gaps))
+    for clock, (first, counts) in dates.in_two_parts(table.columns).items():
+        table.add_clock(clock, counts)
+        table.columns = {clock: table.columns[clock], **table.columns}
+        table.notes.append(f"columns {first!r} and its fraction are the clock {clock!r} in ns")
     return table
 
 
@@ -229,62 +253,6 @@ def _decoded(path: Path, table: Table) -> str:
     return text
 
 
-def _separator(lines: list[str]) -> str:
-    """What separates the columns: what is in the head as often as in most rows.
-
-    One more may end the head, or the rows.
-    """
-    some = lines[:1] + lines[1:50]
-    for mark in SEPARATORS:
-        counts = [{line.count(mark), line.removesuffix(mark).count(mark)} for line in some]
-        same = sum(not count.isdisjoint(counts[0]) for count in counts)
-        if mark in lines[0] and same > 0.5 * len(counts):
-            return mark
-    if "," in lines[0]:
-        return ","
-    blanks = [len(line.split()) for line in some]
-    if blanks[0] > 1 and blanks.count(blanks[0]) == len(blanks):
-        return " "
-    return ","
-
-
-def _split(lines: list[str], separator: str, path: Path) -> Iterator[list[str]]:
-    """Rows of lines.
-
-    Raises:
-        ScenarioError: they are none of a table, or a quotation mark makes one of several rows.
-    """
-    if separator == " ":
-        yield from (line.split() for line in lines)
-        return
-    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
-    begin, least = 0, 0
-    try:
-        for row in reader:
-            end = reader.line_num
-            # a cell may go over several lines, but one that holds the marks of a row is none
-            least = least or 2 * (len(row) - 1)
-            over = lines[begin:end] if end > begin + 1 else []
-            if over and sum(line.count(separator) for line in over) >= least > 0:
-                raise ScenarioError(
-                    f"{path}: the quotation mark in {lines[begin][-60:]!r} is not closed in its "
-                    f"line and takes in the {end - begin - 1} rows after it; close it or take it "
-                    "away"
-                )
-            begin = end
-            yield row
-    except csv.Error as error:
-        raise ScenarioError(
-            f"{path}: is not a table of text ({error}); save it as CSV in UTF-8"
-        ) from error
-
-
-def _numeric(row: list[str]) -> bool:
-    """Whether cells are numbers, as no head is."""
-    values, gaps, _ = numbers(row, comma=True)
-    return gaps.strange == 0 and bool(np.isfinite(values).any())
-
-
 def _units(rows: list[list[str]], names: list[tuple[str, str]]) -> list[str]:
     """Units of the columns; a first row that holds units is taken away.
 
@@ -301,7 +269,7 @@ def _units(rows: list[list[str]], names: list[tuple[str, str]]) -> list[str]:
         return units
     timed = known[:1] == [0] and parse(spelled(cells[0])).exponents == parse("s").exponents
     below = [rows[1][index] for index in known if index < len(rows[1])]
-    if not (timed or 2 * len(known) >= len(said)) or not _numeric(below):
+    if not (timed or 2 * len(known) >= len(said)) or not numeric(below):
         return units
     rows.pop(0)
     return [spelled(cell) or cell for cell in cells]
