@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reading.schema import shown
+
 Vector = NDArray[np.float64]
 MISSING = {"", "na", "n/a", "#n/a", "nan", "-nan", "null", "none", "nil", "-", "--", "?", "missing"}
 """Cells that say that nothing was measured, in small letters."""
@@ -61,7 +63,7 @@ class Gaps:
 
     def __str__(self) -> str:
         number = self.empty + self.strange
-        where = f" (the first {self.example!r} in row {self.row})" if self.row else ""
+        where = f" (the first {shown(self.example)} in row {self.row})" if self.row else ""
         return f"{number} of {self.count} cells hold no number{where}"
 
 

@@ -117,6 +117,8 @@ def read_log(path: Path | str, *, units: Mapping[str, str] | None = None) -> Log
         ScenarioError: missing, unreadable or too large.
     """
     path = Path(path)
+    if path.is_dir():
+        raise ScenarioError(f"{path}: is a folder, not a log; name the files in it")
     if not is_file(path):
         near = _beside(path)
         beside = f"; in its folder {listing(near, path.name)}" if near else ""

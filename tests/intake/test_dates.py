@@ -122,3 +122,14 @@ def test_a_head_in_the_first_line_is_the_head(tmp_path: Path, head: str) -> None
     found = read_log(log(tmp_path, head + NUMBERS))
     assert list(found.columns)[:2] == ["time", "u"]
     assert not found.notes
+
+
+def test_a_cell_of_thousands_of_characters_is_cut_in_texts(tmp_path: Path) -> None:
+    found = read_log(log(tmp_path, "time,u\n0,1\n1," + "9" * 5000 + "\n2,3\n"))
+    assert "'9999" in str(found.gaps["u"]) and len(str(found.gaps["u"])) < 150
+
+
+def test_a_folder_with_the_name_of_a_log_is_none(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").mkdir()
+    with pytest.raises(ScenarioError, match=r"a\.csv: is a folder, not a log"):
+        read_log(tmp_path / "a.csv")
