@@ -244,6 +244,9 @@ class Prepared:
 
     def conclude(self, recording: Recording, wall_s: float) -> RunResult:
         """Compare and check what was recorded in `wall_s`."""
+        # of a whole run the last point that is recorded is less than a record period before its end
+        begin, period = self.scenario.start, self.every * self.master.step
+        end = begin + self.scenario.duration - period
         comparisons = {
             name: compare(recording, reference)
             for name, reference in self.scenario.references.items()
@@ -254,7 +257,12 @@ class Prepared:
             recording=recording,
             comparisons=comparisons,
             checks=tuple(
-                evaluate(check, recording, comparisons, check.unfit(self.declared, self.variants))
+                evaluate(
+                    check,
+                    recording,
+                    comparisons,
+                    check.unfit(self.declared, self.variants) or check.unreached(recording, end),
+                )
                 for check in self.scenario.checks
             ),
             wall_s=wall_s,

@@ -96,6 +96,13 @@ class Check:
             if used[name] not in variants
         )
 
+    def unreached(self, recording: Recording, end: float) -> str:
+        """Why it says nothing of a run that an FMU ended before `end` [s]; "" if it does."""
+        last = float(recording.time[-1])
+        if last >= end or self.after <= last:
+            return ""
+        return f"the run ended at {last:.9g} s, before its window begins at {self.after:.9g} s"
+
 
 @dataclass(frozen=True)
 class CheckResult:
@@ -261,7 +268,8 @@ def evaluate(
     Raises:
         UnknownNameError: a signal was not recorded.
     """
-    if unfit and not set(check.needs) <= set(recording.names):
+    unknown = not set(check.needs) <= set(recording.names) or check.after > recording.time[-1]
+    if unfit and unknown:
         measured, unit = math.nan, ""
     else:
         measured, unit = _measure(check, recording, comparisons)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -14,9 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cosim
 from cosim import Master, Recording, System, Table, read_recording
 from cosim.cli import app as cli
-from cosim.errors import StepError
+from cosim.errors import CosimError, StepError
 from cosim.master.session import Session
 from tests import tiny_fmus
 from tests.cosim_fmus import slave
@@ -103,6 +105,24 @@ def test_an_end_that_an_fmu_asks_for_is_one(
     assert "all done" in str(recording.notes)
     read = read_recording(recording.write_parquet(tmp_path / "r.parquet"))
     assert read.notes == recording.notes and read.time.tolist() == recording.time.tolist()
+
+
+def test_a_check_whose_window_an_end_does_not_reach_is_not_judged(tmp_path: Path) -> None:
+    path = tiny(tmp_path, CLOCK, TIME, END)
+    text = "".join(
+        f'[[checks]]\nname = "{name}"\nof = "maximum"\nsignal = "a.y"\nafter = {after}\n'
+        'expected = 0.5\nlimit = 0.01\nsource = "its law"\n'
+        for name, after in (("whole", 0.0), ("late", 0.7))
+    )
+    result = next(iter(cosim.run(scenario(tmp_path, path, text)).runs.values()))
+    whole, late = result.checks
+    assert whole.ok and not whole.unfit
+    assert late.unfit == "the run ended at 0.5 s, before its window begins at 0.7 s"
+    assert math.isnan(late.value) and len(result.recording) == 6
+    going = tiny(tmp_path, CLOCK, TIME, name="going")
+    text = text.replace("after = 0.7", "after = 3.0")
+    with pytest.raises(CosimError, match=r"check 'late': nothing was recorded between 3 s"):
+        cosim.run(scenario(tmp_path, going, text))
 
 
 @pytest.mark.parametrize("every", [1, 3])
