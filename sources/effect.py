@@ -83,7 +83,7 @@ KINDS: dict[str, Kind] = {
     "coefficient": Kind(
         "",
         "",
-        _names(value="the undisturbed coefficient"),
+        _names(value="the coefficient, as the effects before this one leave it"),
         _names(
             x="floor position x [m]",
             y="floor position y [m]",

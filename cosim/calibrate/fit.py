@@ -15,6 +15,7 @@ from .descent import EVEN, STEPS, Descent
 from .estimate import Estimate, estimated
 from .known import Known
 from .loss import Huber, Squares, loss_for
+from .memory import give_back
 from .parts import PURPOSE
 from .simulator import Simulator
 
@@ -87,6 +88,19 @@ def fit(
         ScenarioError: the problem has no parameter.
         FmuCallError: it cannot be simulated where the fit begins.
     """
+    found = _fitted(simulator, theta, purpose, effort, known, goal)
+    give_back()
+    return found
+
+
+def _fitted(
+    simulator: Simulator,
+    theta: Vector | None,
+    purpose: str | Iterable[str],
+    effort: Effort,
+    known: Known | None,
+    goal: float,
+) -> Estimate:
     begun, problem = simulator.evaluations, simulator.problem
     if not problem.parameters:
         raise ScenarioError(

@@ -21,6 +21,7 @@ from ..master.elsewhere import Elsewhere, Workers
 from ..master.outline import Outline
 from ..master.session import RUNAWAY, Session
 from .budget import Budget
+from .memory import give_back
 from .parts import Vector
 
 MOST = 128
@@ -159,3 +160,4 @@ class SessionPool:
             found = [e for key in list(self._idle) if key.kind == kind for e in self._taken(key)]
         for _, session in found:
             session.close()
+        give_back()

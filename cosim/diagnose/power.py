@@ -38,37 +38,47 @@ def power(
     """
     level = LEVEL / max(len(current.signatures) + len(current.aside), 1)  # as of its p values
     trials = [Trials(s.probe, s.value, best=s) for s in current.signatures]
-    if bench is not None:
+    told: dict[str, dict[str, Any]] = {}
 
-        def pursued(group: list[Trials]) -> list[Trials]:
-            for one in group:
+    def pursued(group: list[Trials]) -> list[Trials]:
+        for one in group:
+            assert one.best is not None
+            label = one.best.candidate.label
+            if bench is not None:
                 _pursue(one, bench, level)
-            return group
+            told[label] = _entry(one, level, stack)
+            one.best = None  # what it does at this strength is not needed again
+        return group
 
+    if bench is None:
+        pursued(trials)
+    else:
         bench.spread(pursued, by_problem(trials))
-    table: dict[str, dict[str, Any]] = {}
-    for one in trials:
-        item = one.best
-        assert item is not None
-        p = item.strength
-        entry: dict[str, Any] = {"unit": p.unit, "parameter": p.name, "absorbed": item.absorbed}
-        if item.unseen:
-            entry["smallest_detectable"] = None
-            entry["reason"] = (
-                "the runs do not excite it"
-                if item.score.size == 0.0
-                else "calibration of the declared parameters absorbs all but a thousandth of it"
-            )
-        else:
-            smallest = _smallest(item, level, stack)
-            if smallest <= one.weak:
-                smallest = abs(item.value)  # which shows
-            entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None
-            if not 1.0 / ABOUT <= smallest / abs(item.value) <= ABOUT:
-                entry["extrapolated_from"] = abs(item.value)
-        entry["same_as"] = list(item.same)
-        table[item.candidate.label] = entry
-    return table
+    return {s.candidate.label: told[s.candidate.label] for s in current.signatures}
+
+
+def _entry(trials: Trials, level: float, stack: SampleStack) -> dict[str, Any]:
+    """What is told of an effect that was simulated at about the strength that would show."""
+    item = trials.best
+    assert item is not None
+    p = item.strength
+    entry: dict[str, Any] = {"unit": p.unit, "parameter": p.name, "absorbed": item.absorbed}
+    if item.unseen:
+        entry["smallest_detectable"] = None
+        entry["reason"] = (
+            "the runs do not excite it"
+            if item.score.size == 0.0
+            else "calibration of the declared parameters absorbs all but a thousandth of it"
+        )
+    else:
+        smallest = _smallest(item, level, stack)
+        if smallest <= trials.weak:
+            smallest = abs(item.value)  # which shows
+        entry["smallest_detectable"] = smallest if math.isfinite(smallest) else None
+        if not 1.0 / ABOUT <= smallest / abs(item.value) <= ABOUT:
+            entry["extrapolated_from"] = abs(item.value)
+    entry["same_as"] = list(item.same)
+    return entry
 
 
 def _pursue(trials: Trials, bench: Bench, level: float) -> None:

@@ -124,6 +124,18 @@ def test_voltage_of_a_winding(effect: str, point: tuple[float, float, float]) ->
     assert voltage_of(effect, values) == pytest.approx(law(current, voltage, speed), rel=1e-9)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_laws_of_one_coefficient_act_one_after_the_other(order: int) -> None:
+    """Saturated iron takes its share of the ripple, too: shares multiply."""
+    names = ("torque_constant_saturation", "torque_ripple")[::order]
+    values = {"current": 8.0, "set_voltage": 5.0, "w": 30.0}
+    for name in names:
+        values |= {f"{name}.{key}": value for key, value in WINDING_LAWS[name][0].items()}
+    saturated, rippled = 1.0 - 0.2 * 64.0 / (64.0 + 225.0), 1.0 + 0.05 * math.cos(4 * 0.7 + 0.2)
+    expected = 0.13 * (1.0 - saturated * rippled) * 30.0
+    assert voltage_of("+".join(names), values) == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_warm_winding_settles_where_heat_in_is_heat_out() -> None:
     oracle = oracle_of("dc_motor/sampled+winding_heating")
     current, r_th, alpha = 20.0, 1.5, 0.00393
