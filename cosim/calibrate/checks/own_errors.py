@@ -268,10 +268,14 @@ class OwnErrors:
             added = [free(kind, r, b, abs(kind.step)) for r, b in zip(runs, begins, strict=True)]
             moved = self.problem.with_parameters([*self.problem.parameters, *added])
             theta = np.concatenate([self.theta, np.array(begins) + kind.step])
+            other = self.simulator.of(moved)
             try:
-                others = dict(self.simulator.of(moved).residuals(theta, runs))
+                others = dict(other.residuals(theta, runs))
             except CosimError:  # what cannot be simulated there says nothing
                 continue
+            finally:
+                if kind.target.removeprefix(CLOCK) in self.problem.runs[0].inputs:
+                    other.close()  # its sessions have inputs that no other kind has
             for name, residual in self.residuals:
                 if name in others:
                     change = self._rows[name].of_all((others[name] - residual) / kind.step)
