@@ -134,8 +134,10 @@ class EffectModel:
                 f"effect {self._prefix!r} adds {effort.numel()} elements to balance "
                 f"{self._balance.name!r}, which has {self.size}"
             )
-        share = self._balance.share
+        share, signals = self._balance.share, self._balance.signals
         self._balance.effort = self._balance.effort + (effort if share is None else share * effort)
+        if self.kind == "coefficient":  # the next law acts on what this one has left of it
+            signals["value"] = signals["value"] + effort
 
     def pass_on(self, share: SX, **signals: SX) -> None:
         """Let effects that act after this one see these signals, and add this share of theirs."""

@@ -316,7 +316,7 @@ class Model:
         else:
             effort = ca.SX.zeros(expressions["value"].numel())
         balance = Balance(
-            full, kind, unit or declared.effort_unit, dict(expressions), effort, self._group(name),
+            full, kind, unit or declared.effort_unit, expressions, effort, self._group(name),
             sensor.name if sensor else "",
         )  # fmt: skip
         balance.lean = ca.SX.zeros(3)
@@ -332,8 +332,6 @@ class Model:
                 from .effect_model import EffectModel  # it builds on this module
 
                 attachment.law(EffectModel(self, attachment, balance, grouped=place != full))
-                if kind == "coefficient":  # the next law acts on what this one has left of it
-                    balance.signals["value"] = expressions["value"] + balance.effort
         if not balance.lean.is_zero():
             self._lean(balance)
         return balance

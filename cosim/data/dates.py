@@ -22,6 +22,10 @@ _MOMENT = re.compile(
 )
 """ISO 8601, with a blank for its T, and with slashes, as long as the year comes first."""
 _OF_DAY = re.compile(r"(?P<time>\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)")
+_LIKE = re.compile(
+    r"\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d{1,2}:\d\d.*|.*\d{1,2}:\d\d(:\d\d\S*)? ?[AaPp][Mm].*"
+)
+"""Dates that may have the day or the month first, and hours of half a day."""
 _HALF_DAY = 43200 * 10**9
 """[ns]"""
 _PARTS = {
@@ -55,6 +59,13 @@ def nanoseconds(cells: Sequence[str]) -> tuple[list[int | None], str] | None:
             whole = [None if text.lower() in MISSING else next(each) for text in texts]
             return whole, note
     return None
+
+
+def advice(example: str) -> str:
+    """What to do with a cell that looks like a time and is not read as one, "" of any other."""
+    if not _LIKE.fullmatch(example.strip()):
+        return ""
+    return "it may mean several times: write 2025-03-01T13:00:00.020, or seconds"
 
 
 def _moments(found: list[re.Match[str]]) -> tuple[list[int], str]:

@@ -21,6 +21,7 @@ from ..files import is_file, read_toml
 from ..spec.units import conversion, parse
 from .arrays import matlab_table, npz_table, parquet_table
 from .cells import Gaps
+from .dates import advice
 from .text import text_table
 
 Vector = NDArray[np.float64]
@@ -72,10 +73,11 @@ class Log:
             held = self.texts[column]
             if held.fault:
                 raise ScenarioError(f"{self.name}: column {column!r} {held.fault}")
-            raise ScenarioError(
-                f"{self.name}: column {column!r} holds text: {held}; name another column, or write "
-                "numbers (and nothing, or N/A, where none was measured)"
+            way = advice(held.example) or (
+                "name another column, or write numbers (and nothing, or N/A, where none was "
+                "measured)"
             )
+            raise ScenarioError(f"{self.name}: column {column!r} holds text: {held}; {way}")
         if column not in self.columns:
             raise UnknownNameError(
                 f"{self.name}: has no column {column!r}; {listing(self.columns, column)}"

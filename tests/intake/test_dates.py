@@ -77,6 +77,18 @@ def test_what_is_no_time_or_may_be_two_stays_text(tmp_path: Path, stamps: list[s
         found["stamp"]
 
 
+@pytest.mark.parametrize("stamp", ["01.03.2025 10:00:00,02", "3/1/2025 10:00:00.02", "10:00:00 PM"])
+def test_dates_that_may_mean_several_times_have_advice(tmp_path: Path, stamp: str) -> None:
+    path = log(tmp_path, table("stamp,v", [f'"{stamp}"'] * 3))
+    text = "may mean several times: write 2025-03-01T13:00:00.020, or seconds"
+    with pytest.raises(ScenarioError, match=text):
+        read_log(path)["stamp"]
+    assert text in str(inspect(path).topics[0].findings)
+    other = log(tmp_path, table("stamp,v", ["left", "right", "left"]))
+    with pytest.raises(ScenarioError, match="name another column"):
+        read_log(other)["stamp"]
+
+
 def test_a_clock_in_two_columns_is_one(tmp_path: Path) -> None:
     rows = [f"{1740823200 + i // 50},{i % 50 * 20_000_000},{i}.5\n" for i in range(200)]
     head = "header.stamp.secs,header.stamp.nsecs,v\n"

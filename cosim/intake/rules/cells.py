@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...calibrate.checks.finding import Finding
+from ...data.dates import advice
+from ...reading.schema import shown
 from ..clock import Clock
 from ..topic import Topic
 
@@ -19,7 +21,8 @@ def check(topic: Topic, clock: Clock) -> Iterator[Finding]:
         else:
             yield Finding("note", "gaps", topic.name, name, str(gaps))
     for name, held in topic.log.texts.items():
-        text = held.fault or f"holds text, {held.example!r} first"
+        way = advice(held.example)
+        text = held.fault or f"holds text, {shown(held.example)} first" + (way and f"; {way}")
         severity = "warning" if held.fault else "note"
         yield Finding(severity, "reading", topic.name, name, text)
     for note in (*topic.log.notes, *topic.notes):
