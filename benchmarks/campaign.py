@@ -40,8 +40,8 @@ ONE = "--clean {} --repeats 1"
 SOME = "--clean 0 --repeats 0 --pairs {} --triples {}"
 WITHHELD = "--clean 0 --repeats 1 --withheld"
 SERIES = (
-    *(Series("motor", "one", 140007 + i, ONE.format(7)) for i in range(5)),
-    *(Series("motor", "several", 140104 + i, SOME.format(10, 5)) for i in range(4)),
+    *(Series("motor", "one", 140008 + i, ONE.format(7)) for i in range(5)),
+    *(Series("motor", "several", 140105 + i, SOME.format(10, 5)) for i in range(4)),
     *(Series("motor", "withheld", 140203 + i, WITHHELD) for i in range(2)),
     *(Series("crawler", "one", 141002 + i, ONE.format(6)) for i in range(2)),
     *(Series("crawler", "several", 141102 + i, SOME.format(10, 4)) for i in range(2)),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from ..calibrate.fit import MINIMUM, Effort, fit
 from ..errors import CosimError
 from .models import Fitted
+from .whiteness import UNNAMED, whiteness_tests
 
 if TYPE_CHECKING:
     from .fitter import Fitter
@@ -35,8 +36,7 @@ def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
     """
     raw = fitter.raw
     coarse = raw.tick is not None and raw.search.step != raw.step
-    noise = 0.5 * winner.estimate.count
-    if not coarse or raw.unstable or winner.estimate.cost < noise + EVIDENT * noise**0.5:
+    if not coarse or raw.unstable or not _leaves(fitter, winner):
         return winner
     measured = {run.name: run.data for run in raw.runs}
     problem = winner.simulator.problem.with_data(measured).changed(step=raw.step)
@@ -52,3 +52,15 @@ def grounded(fitter: Fitter, winner: Fitted, base: Fitted) -> Fitted:
         return winner
     fitter.say(f"{winner.effects[-1].label}: a better minimum at the rig's own step")
     return fitter.sharpened(found, base)
+
+
+def _leaves(fitter: Fitter, winner: Fitted) -> bool:
+    """Whether a model leaves more than noise: in all, or by the tests of a verdict.
+
+    What a coarse step has moved is small in the sum over all channels, and slow in one of them.
+    """
+    noise = 0.5 * winner.estimate.count
+    if winner.estimate.cost > noise + EVIDENT * noise**0.5 or fitter.lacking(winner):
+        return True
+    unused = whiteness_tests(fitter.beside(winner), fitter.checking) if fitter.unused else []
+    return any(item.structured or item.slow > UNNAMED for item in unused)
