@@ -22,6 +22,8 @@ _MOMENT = re.compile(
 )
 """ISO 8601, with a blank for its T, and with slashes, as long as the year comes first."""
 _OF_DAY = re.compile(r"(?P<time>\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)")
+YEARS = (1678, 2261)
+"""Whole ones that 64 bits of nanoseconds since 1970 reach."""
 _LIKE = re.compile(
     r"\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d{1,2}:\d\d.*|.*\d{1,2}:\d\d(:\d\d\S*)? ?[AaPp][Mm].*"
 )
@@ -53,7 +55,7 @@ def nanoseconds(cells: Sequence[str]) -> tuple[list[int | None], str] | None:
         if all(found):
             try:
                 counts, note = reader([match for match in found if match])
-            except ValueError:  # the 30th of February, hour 25
+            except ValueError:  # the 30th of February, minute 75, year 9999
                 return None
             each = iter(counts)
             whole = [None if text.lower() in MISSING else next(each) for text in texts]
@@ -69,6 +71,8 @@ def advice(example: str) -> str:
 
 
 def _moments(found: list[re.Match[str]]) -> tuple[list[int], str]:
+    if not all(YEARS[0] <= int(m["date"][:4]) <= YEARS[1] for m in found):
+        raise ValueError("a year that 64 bits of nanoseconds do not reach")
     texts = [f"{m['date'].replace('/', '-')}T{m['time'].replace(',', '.')}" for m in found]
     counts = np.array(texts, dtype="datetime64[ns]").astype(np.int64)
     zones = [_zone(m["zone"]) for m in found]
@@ -91,6 +95,8 @@ def _of_day(found: list[re.Match[str]]) -> tuple[list[int], str]:
     days = 0
     for match in found:
         hours, minutes, seconds = match["time"].replace(",", ".").split(":")
+        if int(minutes) > 59 or float(seconds) >= 60.0:
+            raise ValueError("minutes and seconds end at 60")
         whole, _, part = seconds.partition(".")
         count = (3600 * int(hours) + 60 * int(minutes) + int(whole)) * _SECOND
         count += int(part.ljust(9, "0")) if part else 0

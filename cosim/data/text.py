@@ -3,7 +3,8 @@
 Read are UTF-8 and UTF-16 (with a byte order mark), and else Latin-1, whose bytes all mean
 something; columns separated by semicolons, tabs, commas, bars or blanks; a decimal comma where the
 comma does not separate; heads such as `speed [rad/s]` and `speed (rad/s)`, heads in the last
-comment before the numbers, a second row of units, and the first line `sep=;` of spreadsheets.
+comment before the numbers, lines of a recorder before them, a second row of units, and the first
+line `sep=;` of spreadsheets; dates and times as clocks (`dates`).
 Anything else is refused in one sentence.
 """
 

@@ -69,6 +69,7 @@ def test_times_of_day_go_on_over_midnight(tmp_path: Path) -> None:
     [
         ["2025-02-30T10:00:00Z", "2025-02-30T10:00:01Z"], ["2025-03-01T10:00:00Z", "later"],
         ["01/03/2025 10:00:00", "01/03/2025 10:00:01"], ["10.00.00", "10.00.01"],
+        ["9999-12-31T00:00:00Z", "9999-12-31T00:00:01Z"], ["10:75:00", "10:76:00"],
     ],
 )  # fmt: skip
 def test_what_is_no_time_or_may_be_two_stays_text(tmp_path: Path, stamps: list[str]) -> None:
