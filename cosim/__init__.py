@@ -11,6 +11,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from . import arithmetic
+
 if TYPE_CHECKING:
     from . import errors
     from .data.recording import Recording, read_recording
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from .system.provider import FolderProvider
     from .system.system import System
     from .system.toml import read_system
+
+arithmetic.choose()  # before anything loads NumPy
 
 __all__ = [
     "Constant",

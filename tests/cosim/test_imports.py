@@ -28,8 +28,39 @@ def loaded(program: str) -> set[str]:
 
 def test_importing_the_package_loads_nothing_of_it() -> None:
     found = loaded("import cosim")
-    assert {name for name in found if name.startswith("cosim")} == {"cosim"}
+    assert {name for name in found if name.startswith("cosim")} == {
+        "cosim", "cosim.arithmetic",
+    }  # fmt: skip
     assert not found & {"numpy", "typer", "rich"}
+
+
+CHOICE = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
+
+
+def arithmetic(program: str, **variables: str) -> str:
+    """What a new interpreter prints."""
+    known = {k: v for k, v in os.environ.items() if k not in CHOICE}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, cwd=ROOT,
+        env={**known, "PYTHONPATH": str(ROOT), **variables},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_package_chooses_the_arithmetic_before_numpy_is_loaded() -> None:
+    found = arithmetic("import cosim, os\nprint(os.environ.get('OPENBLAS_CORETYPE'))")
+    features = cosim.arithmetic._features()
+    assert found.strip() == ("Haswell" if {"avx2", "fma"} <= features else "None")
+    assert (
+        arithmetic(
+            "import cosim, os\nprint(os.environ['OPENBLAS_CORETYPE'])", OPENBLAS_CORETYPE="Prescott"
+        ).strip()
+        == "Prescott"
+    )  # who sets it has chosen
+    late = "import numpy, cosim, os\nprint('OPENBLAS_CORETYPE' in os.environ)"
+    assert arithmetic(late).strip() == "False"
 
 
 @pytest.mark.slow
