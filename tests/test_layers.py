@@ -13,8 +13,9 @@ ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "cosim").rglob("*.py"))
 ROOMS = (
     "arithmetic", "errors", "reading", "arguments", "files", "display", "spec", "data", "fmu",
-    "drawing", "system", "master", "installation", "scenario", "ssp", "view", "running", "robots", "control",
-    "study", "calibrate", "diagnose", "intake", "live", "monitor", "report", "cli", "__main__",
+    "drawing", "system", "master", "installation", "scenario", "ssp", "view", "running", "robots",
+    "control", "study", "calibrate", "diagnose", "intake", "live", "monitor", "report", "cli",
+    "__main__",
 )  # fmt: skip
 """Of `cosim`, from the bottom up: each may import those before it."""
 FORBIDDEN = {"sources", "cosim_library", "casadi", "pythonfmu", "ziglang", "scenarios", "tests"}
